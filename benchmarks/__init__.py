@@ -4,6 +4,6 @@ Times are CPU times of this process; only ratios of one run are compared, never 
 out of a run is the same on every machine, as of a command: numpy is told so before it is imported.
 """
 
-from snakewalk.controller.app.cli.main import leave_out_avx512
+from snakewalk.controller.cli.main import leave_out_avx512
 
 leave_out_avx512()

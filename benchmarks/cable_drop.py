@@ -15,7 +15,7 @@ from rich.table import Table
 from snakewalk.config.loader import load_robot, load_world, with_keys
 from snakewalk.config.robot import PowerConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.app.service import cable_drop, supply_check
+from snakewalk.controller.bench import cable_drop, supply_check
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.physics.plant import MujocoPlant

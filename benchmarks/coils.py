@@ -20,11 +20,11 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.capture.coil_film import COILS
-from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.resample import body_points, equal_arc_length
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.resample import body_points, equal_arc_length
 from tests.oracles.rendered_snake import SnakeScene, coiled_midlines, film
 from tests.oracles.skeleton_accuracy import point_error
 

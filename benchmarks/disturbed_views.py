@@ -16,12 +16,12 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import PegsObstacle
-from snakewalk.controller.app.runs.rendered_camera import floor_prints
+from snakewalk.controller.cameras.floor_learning import FloorLearning
+from snakewalk.controller.cameras.lens import Lens
+from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
+from snakewalk.controller.cameras.pose_tracking import BodyPrior
+from snakewalk.controller.cameras.rendered_camera import floor_prints
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
-from snakewalk.controller.localization.floor_learning import FloorLearning
-from snakewalk.controller.localization.lens import Lens
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
-from snakewalk.controller.localization.pose_tracking import BodyPrior
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.rendering.top_view import TopView
 

@@ -16,8 +16,8 @@ from rich.console import Console
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.runs.factory import prepare_walk
-from snakewalk.controller.app.studies.trials import Case, Trial, Value, parse_over, run_trial
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.studies.trials import Case, Trial, Value, parse_over, run_trial
 
 LEG_M = 1.2, 2.4
 TURN_RAD = 2.0

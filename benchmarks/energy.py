@@ -19,11 +19,11 @@ from unittest.mock import patch
 import numpy as np
 
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.app.runs.execute import Finished, execute
-from snakewalk.controller.app.runs.factory import prepare_gait, prepare_walk
-from snakewalk.controller.app.runs.prepared_run import PreparedRun
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.effort import energy_track, sampled_energy
+from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import configure

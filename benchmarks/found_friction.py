@@ -13,8 +13,8 @@ import numpy as np
 from rich.console import Console
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_job
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_job
 
 CASES: dict[str, dict[str, float]] = {
     "as the files": {},

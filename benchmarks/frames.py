@@ -16,12 +16,12 @@ from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import PlannerConfig, RandomGround, WorldConfig
-from snakewalk.controller.app.recordings.animal_synthesis import (
+from snakewalk.controller.animals.legged.animal_synthesis import (
     read_animal,
     synthesise_animal,
 )
-from snakewalk.controller.app.recordings.snake_synthesis import SnakeSynthesis
-from snakewalk.controller.app.runs.walk_run import WalkRun
+from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
+from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.controller.terrain.planner import TerrainPlanner
 
 TITLE = "Synthesis of 250 frames, 100 points, in a world of 10,000 vertices"

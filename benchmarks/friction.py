@@ -25,15 +25,15 @@ from benchmarks.rows import found_table
 from benchmarks.shadow import planted
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.app.identification.friction_fit import (
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
     fit_friction,
     with_mass,
 )
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_gait
-from snakewalk.controller.app.shadow.deviation import NO_DEVIATION, Deviation
-from snakewalk.controller.app.shadow.diagnosis import Goals, goals_of
+from snakewalk.controller.studies.shadow.diagnosis import Goals, goals_of
 from snakewalk.sim.physics.plant import FLOOR_STEP_S
 
 NEXT = {"winding_rad": 0.5, "waves": 1.5}

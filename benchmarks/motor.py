@@ -25,18 +25,18 @@ from benchmarks.rows import found_table
 from snakewalk.config.arrays import Floats
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.app.identification.friction_fit import FrictionLog
-from snakewalk.controller.app.identification.pendulum_fit import fit_pendulum, robot_error_deg
-from snakewalk.controller.app.identification.pendulum_log import PendulumLog, read_pendulum_log
-from snakewalk.controller.app.identification.pendulum_swing import FINE_S, robot_swing_rad
-from snakewalk.controller.app.identification.servo_constants import (
+from snakewalk.controller.run.deviation import NO_DEVIATION
+from snakewalk.controller.studies.identification.friction_fit import FrictionLog
+from snakewalk.controller.studies.identification.pendulum_fit import fit_pendulum, robot_error_deg
+from snakewalk.controller.studies.identification.pendulum_log import PendulumLog, read_pendulum_log
+from snakewalk.controller.studies.identification.pendulum_swing import FINE_S, robot_swing_rad
+from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
     NAMES,
     ServoConstants,
     robot_with,
 )
-from snakewalk.controller.app.shadow.deviation import NO_DEVIATION
-from snakewalk.controller.app.shadow.diagnosis import Goals
+from snakewalk.controller.studies.shadow.diagnosis import Goals
 from snakewalk.sim.servo.motor import motors_of
 
 RANGES = {

@@ -12,10 +12,10 @@ import numpy as np
 from benchmarks.rows import Row, cpu_s
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.capture.frame_status import FrameStatus
+from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
+from snakewalk.controller.cameras.pose_fit import fit_both_ends
 from snakewalk.controller.kinematics.links import pose_at
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
-from snakewalk.controller.localization.pose_fit import fit_both_ends
+from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.overhead_scene import DrawnView
 
 TITLE = "Overhead camera: a frame of 640 x 480 to head, heading and links, on one core"

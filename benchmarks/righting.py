@@ -17,9 +17,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.studies.trials import Case, prepare_case
 from snakewalk.controller.metrics.ground_contact import roll_rad
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.studies.trials import Case, prepare_case
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
 

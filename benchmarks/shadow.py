@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_gait
-from snakewalk.controller.app.shadow.deviation import Deviation
-from snakewalk.controller.app.shadow.diagnosis import Signatures, answers, goals_of
+from snakewalk.controller.run.deviation import Deviation
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.studies.shadow.diagnosis import Signatures, answers, goals_of
 
 KINDS = ("none", "friction", "load", "weaker servo", "slipped horn")
 

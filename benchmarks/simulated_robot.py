@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.controller.app.runs.walk_run import WalkRun
+from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor, OnPaper

@@ -17,10 +17,10 @@ from snakewalk.config.camera import MappingConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.app.runs.execute import Finished, execute
-from snakewalk.controller.app.runs.stereo_head import StereoHead
-from snakewalk.controller.app.runs.walk_run import WalkRun
-from snakewalk.controller.mapping.growing_map import GrowingMap
+from snakewalk.controller.mapping.stereo_head import StereoHead
+from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.sim.physics.plant import MujocoPlant
 

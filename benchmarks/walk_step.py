@@ -13,10 +13,10 @@ from random import Random
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from snakewalk.controller.app.studies.graph_study import graph_source
 from snakewalk.controller.shape.graphs import Graph
 from snakewalk.controller.shape.star import star_order
 from snakewalk.controller.shape.walks import walk
+from snakewalk.controller.studies.graph_study import graph_source
 
 TITLE = "A step of the snake walk"
 

@@ -30,9 +30,9 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_gait
-from snakewalk.controller.app.view.live_view import LiveView
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.view.live_view import LiveView
 
 CONDITIONS = (
     "no page",
@@ -51,7 +51,7 @@ PATIENT = {
 }
 """On a busy machine the simulated servos answer late; the run goes on."""
 _SERVE = (
-    "from snakewalk.controller.app.cli.main import main; "
+    "from snakewalk.controller.cli.main import main; "
     "import sys; sys.argv[1:] = ['bus', 'serve', '--servos', '1-16']; main()"
 )
 

@@ -14,24 +14,24 @@ if TYPE_CHECKING:
     from snakewalk.config.robot.chain import RobotConfig
     from snakewalk.config.run import RunConfig, SafetyConfig
     from snakewalk.config.world import WorldConfig
-    from snakewalk.controller.app.runs.execute import execute
-    from snakewalk.controller.app.runs.factory import (
-        prepare_gait,
-        prepare_policy,
-        prepare_source,
-        prepare_walk,
-    )
-    from snakewalk.controller.app.studies.sweep_measure import measure
-    from snakewalk.controller.app.studies.sweep_points import plan_sweep
     from snakewalk.controller.gaits.gait import Gait, Needs
     from snakewalk.controller.gaits.registry import GAITS, make_gait
     from snakewalk.controller.kinematics.links import BodyView, body_in_world
     from snakewalk.controller.metrics.summary import summary
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.source import MotionSource, Pace
+    from snakewalk.controller.run.execute import execute
+    from snakewalk.controller.run.factory import (
+        prepare_gait,
+        prepare_policy,
+        prepare_source,
+        prepare_walk,
+    )
     from snakewalk.controller.runlog.reader import read_log
     from snakewalk.controller.runlog.record import RunRecord
     from snakewalk.controller.runtime.loop import ticks
+    from snakewalk.controller.studies.sweep_measure import measure
+    from snakewalk.controller.studies.sweep_points import plan_sweep
     from snakewalk.drivers.bus.budget import wire_budget
     from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
     from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -99,15 +99,15 @@ _NAMES = {
     "config.robot.chain": ("RobotConfig",),
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
-    "controller.app.runs.execute": ("execute",),
-    "controller.app.runs.factory": (
+    "controller.run.execute": ("execute",),
+    "controller.run.factory": (
         "prepare_gait",
         "prepare_policy",
         "prepare_source",
         "prepare_walk",
     ),
-    "controller.app.studies.sweep_measure": ("measure",),
-    "controller.app.studies.sweep_points": ("plan_sweep",),
+    "controller.studies.sweep_measure": ("measure",),
+    "controller.studies.sweep_points": ("plan_sweep",),
     "controller.gaits.gait": ("Gait", "Needs"),
     "controller.gaits.registry": ("GAITS", "make_gait"),
     "controller.kinematics.links": ("BodyView", "body_in_world"),

@@ -6,18 +6,18 @@
 
 or ``gymnasium.make("snakewalk.gym:snakewalk/Snake-v0")``. An episode is cut off after 500 steps,
 10 s of the robot. What a step, an action, an observation and the reward are:
-``snakewalk.controller.app.learning.environment``.
+``snakewalk.controller.learning.environment``.
 """
 
 from gymnasium import register
 
 register(
     id="snakewalk/Snake-v0",
-    entry_point="snakewalk.controller.app.learning.environment:SnakeEnvironment",
+    entry_point="snakewalk.controller.learning.environment:SnakeEnvironment",
     max_episode_steps=500,
 )
 register(
     id="snakewalk/SnakeWave-v0",
-    entry_point="snakewalk.controller.app.learning.policy_environment:PolicyEnvironment",
+    entry_point="snakewalk.controller.learning.policy_environment:PolicyEnvironment",
     max_episode_steps=500,
 )

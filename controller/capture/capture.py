@@ -10,16 +10,16 @@ import numpy as np
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.body_detector import BodyDetector
 from snakewalk.controller.capture.coil_film import COIL_LEAST, COILS, solve_coils
 from snakewalk.controller.capture.coil_fit import Outline
-from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
-from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
 from snakewalk.controller.capture.small_body.film_fit import fit_film
+from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _LOST_FRAMES = 5  # for so many frames a lost small body is searched where it was last

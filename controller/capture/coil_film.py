@@ -26,9 +26,9 @@ from snakewalk.controller.capture.coil_fit import (
     line_slopes,
     normal_of,
 )
-from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton, no_skeleton
+from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
 
 _SAMPLE = 40  # good frames from which the body and its usual residual are learnt
 _FEWEST = 5  # good frames

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
-from snakewalk.controller.capture.image.silhouette import Silhouette
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.silhouette import Silhouette
 from snakewalk.drivers.compiling import compiled
 
 COIL_BENDS = 14

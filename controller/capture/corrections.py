@@ -18,10 +18,10 @@ from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.controller.capture.capture import CaptureFile
-from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.identity import margins
-from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton, no_skeleton
+from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
 
 _LONGEST: Final = 4.0
 """Of the film's usual length (ours): a line drawn longer is a slip of the hand."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.medial_axis import Skeleton
-from snakewalk.controller.capture.track import track_from_points
-from snakewalk.controller.capture.wave import measure_wave
+from snakewalk.controller.images.medial_axis import Skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.track import track_from_points
+from snakewalk.controller.track.wave import measure_wave
 
 _SURE = 0.2  # margin from which one frame is enough to tell the ends apart
 _WAVE_FRAMES = 8  # from which a wave's direction is looked at

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.medial_axis import Skeleton, no_skeleton
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
 
 _SPREADS = 6.0  # standard deviations, estimated from the median deviation
 _LENGTH = 0.06  # of the median: a smaller deviation is none

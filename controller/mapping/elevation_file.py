@@ -10,7 +10,6 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.mapping.elevation_map import CellHeight, ElevationMap
 from snakewalk.controller.mapping.point_cloud import read_pcd, read_ply
 from snakewalk.controller.mapping.raster_file import (
     DEGREE,
@@ -21,6 +20,7 @@ from snakewalk.controller.mapping.raster_file import (
     read_numbers,
     read_raster,
 )
+from snakewalk.controller.terrain.elevation_map import CellHeight, ElevationMap
 
 CLOUDS: Final = (".pcd", ".ply", ".xyz")
 MESHES: Final = (".obj", ".stl", ".glb")
@@ -124,7 +124,7 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
         points, faces = read_ply(file)
     else:
         require_extra("meshes need", "trimesh")
-        from snakewalk.controller.capture.mesh.mesh_files import read_mesh  # noqa: PLC0415  an extra
+        from snakewalk.controller.images.mesh_files import read_mesh  # noqa: PLC0415  an extra
 
         mesh = read_mesh(file, "+x", "+z").mesh
         points, faces = mesh.vertices, mesh.faces

@@ -12,8 +12,8 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.mapping.disparity import match
-from snakewalk.controller.mapping.elevation_map import ElevationMap
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
+from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 DISPARITY_ERROR_PX: Final = 0.3
 """Standard error of a disparity that is told (ours): the median on a real pair is 0.15 px."""

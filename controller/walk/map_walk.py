@@ -10,9 +10,9 @@ from collections.abc import Callable
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.mapping.growing_map import GrowingMap
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.map_planner import MapPlanner
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.pilot import Pilot

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import typer
 
-from snakewalk.controller.app.cli.command_line import app
+from snakewalk.controller.cli.command_line import app
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "helpers" / "base_install.py"

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from tests.architecture.test_rooms import sources
+from tests.architecture.test_layout import sources
 
 _WORDS = """
 agenda alive arrivals climb coming_to_rest company debts easing express eyes faint footing

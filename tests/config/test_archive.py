@@ -20,13 +20,13 @@ from PIL import Image as Pillow
 from snakewalk.config.archive import FREE_BYTES, check_expansion, read_arrays, read_bytes
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import _elevation_m
-from snakewalk.controller.capture.fish.postures import load_postures
-from snakewalk.controller.capture.mesh.body_model import read_silhouettes
-from snakewalk.controller.capture.mesh.mesh_files import read_mesh
-from snakewalk.controller.capture.readers.load import load_track
-from snakewalk.controller.localization.lens import Lens
+from snakewalk.controller.animals.fish.postures import load_postures
+from snakewalk.controller.animals.mesh.body_model import read_silhouettes
+from snakewalk.controller.cameras.lens import Lens
+from snakewalk.controller.images.mesh_files import read_mesh
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.controller.runlog.reader import LogError, read_log
+from snakewalk.controller.track.readers.load import load_track
 
 MANY = 20_000_000
 """Bytes that each of these files would expand to, at least."""
@@ -238,8 +238,8 @@ def test_json_from_outside_is_parsed_in_one_place() -> None:
     """
     own = {
         *("config/archive.py", "controller/runlog/reader.py", "drivers/safety/stop_button.py"),
-        *("controller/app/ros/command_codec.py", "controller/app/view/row_line.py"),
-        *("controller/app/view/browser_gamepad.py", "controller/app/view/watcher.py"),
+        *("controller/ros/command_codec.py", "controller/runlog/row_line.py"),
+        *("controller/view/browser_gamepad.py", "controller/run/watcher.py"),
     }
     root = Path(__file__).parents[2]
     found = {

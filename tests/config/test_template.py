@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from snakewalk.config.document import json_schema
 from snakewalk.config.loader import checked, load_robot, load_run, load_world, shipped
 from snakewalk.config.template import template
-from snakewalk.controller.app.cli.commands.files.schema import KINDS, models
+from snakewalk.controller.run.commands.schema import KINDS, models
 
 SHIPPED = [
     *(load_run(name) for name in shipped("runs")),

@@ -1,4 +1,4 @@
-"""The page of rooms: all of them in their order, and the ways of data through files that exist."""
+"""The page of the layout names all packages in their order, and files that exist."""
 
 import ast
 import re
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.architecture.test_rooms import ORDER
+from tests.architecture.layout import ORDER
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -38,16 +38,11 @@ def names_in(path: Path) -> set[str]:
     return found
 
 
-def test_every_room_is_there_in_the_order_of_imports() -> None:
+def test_every_package_is_there_in_the_order_of_imports() -> None:
     rows = re.findall(r"^\| `([\w/]+)` \| ", PAGE, re.MULTILINE)
     rooms = [room.replace(".", "/") for rooms in ORDER.values() for room in rooms]
     tops = [top for top in ORDER if top not in rooms]
     assert [room for room in rows if room not in tops] == rooms
-
-
-def test_the_sub_rooms_of_app_are_named() -> None:
-    rooms = {path.parent.name for path in (ROOT / "controller" / "app").glob("*/__init__.py")}
-    assert {room for room in rooms if f"`{room}` (" not in PAGE} == set()
 
 
 @pytest.mark.parametrize("heading", LONGEST)
@@ -71,7 +66,7 @@ def test_no_way_is_left_unchecked() -> None:
     assert set(ways()) == set(LONGEST)
 
 
-def test_every_room_says_in_a_sentence_what_it_is() -> None:
+def test_every_package_says_in_a_sentence_what_it_is() -> None:
     rooms = {
         file.parent.relative_to(ROOT): str(ast.get_docstring(ast.parse(file.read_text())))
         for top in ORDER

@@ -87,8 +87,8 @@ def simulate_port() -> None:
 
 def call(words: Sequence[str]) -> tuple[int, str, str]:
     """Run ``snakewalk WORDS...``; return exit code, standard output, standard error."""
-    from snakewalk.controller.app.cli import options
-    from snakewalk.controller.app.cli.main import main
+    from snakewalk.controller.cli.main import main
+    from snakewalk.controller.console import options
 
     sys.argv = ["snakewalk", *words]
     out, err = io.StringIO(), io.StringIO()

@@ -6,7 +6,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from typing import NamedTuple
 from unittest.mock import patch
 
-from snakewalk.controller.app.cli.main import main
+from snakewalk.controller.cli.main import main
 
 
 class Ended(NamedTuple):

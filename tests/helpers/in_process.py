@@ -28,7 +28,8 @@ class InProcessExecutor(Executor):
 
 def work_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Studies start no workers; ``test_pool`` shows that those give the same."""
-    from snakewalk.controller.app.studies import pool, tune
+    from snakewalk.controller.console import pool
+    from snakewalk.controller.studies import tune
 
     @contextmanager
     def here(workers: int) -> Iterator[Executor]:
@@ -40,7 +41,7 @@ def work_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def leave_out_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs leave their log and numbers: a page takes two seconds, and is drawn by other tests."""
-    from snakewalk.controller.app.report import artifacts
+    from snakewalk.controller.report import artifacts
 
     def numbers_only(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
         assert numbers is not None, "the command makes a page of a log that was there before"

@@ -16,8 +16,8 @@ from snakewalk.sim.line.sim_line import SimLine
 
 _OPENERS = (
     "snakewalk.drivers.port.network_port.open_port",
-    "snakewalk.controller.app.service.torque_off.open_port",
-    "snakewalk.controller.app.runs.backend.open_port",
+    "snakewalk.controller.bench.torque_off.open_port",
+    "snakewalk.controller.run.backend.open_port",
 )
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.controller.capture.fish.matching import SilhouetteFrame
-from snakewalk.controller.capture.fish.model import FishModel, fish_model
-from snakewalk.controller.capture.fish.postures import Postures
-from snakewalk.controller.capture.fish.rendered_fish import FilmConditions, FishScene
-from snakewalk.controller.capture.fish.silhouettes import silhouette_frame
-from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.controller.animals.fish.matching import SilhouetteFrame
+from snakewalk.controller.animals.fish.model import FishModel, fish_model
+from snakewalk.controller.animals.fish.postures import Postures
+from snakewalk.controller.animals.fish.rendered_fish import FilmConditions, FishScene
+from snakewalk.controller.animals.fish.silhouettes import silhouette_frame
+from snakewalk.controller.images.silhouette import Polarity
 
 Floats = NDArray[np.float64]
 

@@ -13,14 +13,14 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from types import TracebackType
 
-from snakewalk.controller.app.cli.main import main
+from snakewalk.controller.cli.main import main
 
 _SERVER = get_context("forkserver")
 _SERVER.set_forkserver_preload(
     [
         "tests.helpers.swing_child",
-        "snakewalk.controller.app.cli.commands.bus",
-        "snakewalk.controller.app.runs.factory",
+        "snakewalk.controller.bench.commands.bus",
+        "snakewalk.controller.run.factory",
         "snakewalk.sim.serve.pty",
     ]
 )

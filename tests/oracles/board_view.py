@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.localization.calibration_board import CalibrationBoard
-from snakewalk.controller.localization.lens import Lens
+from snakewalk.controller.cameras.calibration_board import CalibrationBoard
+from snakewalk.controller.cameras.lens import Lens
 
 _DOTS = 50.0  # per inch: about as fine as the pictures
 _WHITE = 1  # squares around the board

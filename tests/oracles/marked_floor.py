@@ -2,7 +2,7 @@
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
+from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
 from tests.oracles.overhead_scene import DrawnView
 
 ROBOT = load_robot("yaw16")

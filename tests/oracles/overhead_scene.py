@@ -8,9 +8,9 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.floor_markers import marker_picture
+from snakewalk.controller.cameras.overhead_camera import CameraModel
 from snakewalk.controller.kinematics.links import body_in_world, half_lengths_m
-from snakewalk.controller.localization.floor_markers import marker_picture
-from snakewalk.controller.localization.overhead_camera import CameraModel
 from snakewalk.drivers.types import BodyPose
 
 _FINE = 16.0  # positions in 1/16 px, as cv2's shift of 4 bits

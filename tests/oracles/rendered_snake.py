@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import erf
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.capture.resample import body_points, equal_arc_length
+from snakewalk.controller.track.resample import body_points, equal_arc_length
 
 _STAIN = 0.05  # of the picture's width: how soft a blot is
 _FINE = 8  # parts of a pixel's side in which bodies up to 100 px are drawn

@@ -6,8 +6,8 @@ import numpy as np
 
 from snakewalk.config.animal import AnimalConfig
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.animal.motion_transformation import PathNormals
-from snakewalk.controller.animal.prototype import prototype
+from snakewalk.controller.animals.legged.motion_transformation import PathNormals
+from snakewalk.controller.animals.legged.prototype import prototype
 from snakewalk.controller.terrain.path import SplinePath
 
 NOISE = 0.005

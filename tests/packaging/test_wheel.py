@@ -262,7 +262,7 @@ def test_the_fixture_needs_no_more_than_the_page_says(light: Path, tmp_path: Pat
 
 
 def test_what_needs_more_says_what_to_install(light: Path, tmp_path: Path) -> None:
-    command = "from snakewalk.controller.app.cli.main import main; main()"
+    command = "from snakewalk.controller.cli.main import main; main()"
     done = lightly(light, tmp_path, "-c", command)
     assert done.returncode == 2
     assert done.stderr == (

@@ -11,9 +11,6 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.capture.image.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px
 from snakewalk.controller.capture.small_body.crop import Crop, View, Workspace, reversed_body
 from snakewalk.controller.capture.small_body.film_body import (
@@ -32,6 +29,9 @@ from snakewalk.controller.capture.small_body.ribbon import (
     curve_of,
     curve_slopes,
 )
+from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
 
 ROUGH = 0.01
 """Of the length: a frame of a larger expected error is ``ROUGH``."""

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.image.thin_body_fit import draw_spots
+from snakewalk.controller.images.thin_body_fit import draw_spots
 
 BENDS = 10
 """Coefficients of the tangent angle."""

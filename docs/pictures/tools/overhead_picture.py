@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.controller.localization.overhead_camera import CameraModel, OverheadDetector
-from snakewalk.controller.localization.pose_fit import fit_both_ends
+from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
+from snakewalk.controller.cameras.pose_fit import fit_both_ends
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.rendering.top_view import TopView
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.image.video import open_footage
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.video import open_footage
 from tests.oracles.skeleton_accuracy import distance, swapped
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from snakewalk.controller.capture.body_detector import BodyDetector, make_detector
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.frame_status import FrameStatus
 from snakewalk.controller.capture.identity import head_end, travel_score
-from snakewalk.controller.capture.image.background import median_background, surrounding_ground
-from snakewalk.controller.capture.image.silhouette import Polarity, silhouette_of
 from snakewalk.controller.capture.small_body.crop import crop_body
+from snakewalk.controller.images.background import median_background, surrounding_ground
+from snakewalk.controller.images.body_detector import BodyDetector, make_detector
+from snakewalk.controller.images.silhouette import Polarity, silhouette_of
+from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 

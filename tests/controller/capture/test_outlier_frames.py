@@ -5,15 +5,15 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import capture
-from snakewalk.controller.capture.frame_status import FrameStatus
-from snakewalk.controller.capture.image.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import (
     axis_error_px,
     edge_blur_px,
 )
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.rendered_snake import SnakeScene, empty, film
 
 SCENE = SnakeScene(rows=240, columns=320, length_px=140.0, frames=20, wave_hz=0.6)

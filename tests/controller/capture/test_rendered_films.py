@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.body_detector import make_detector
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.image.silhouette import Polarity
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.silhouette import Polarity
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 

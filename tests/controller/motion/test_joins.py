@@ -13,12 +13,10 @@ from hypothesis import strategies as st
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.app.runs.factory import prepare_walk
-from snakewalk.controller.app.runs.walk_run import WalkRun
-from snakewalk.controller.capture.fish.piece_graph import piece_graph
-from snakewalk.controller.capture.fish.segments import segment_motion
-from snakewalk.controller.capture.fish.swimmer import swim
-from snakewalk.controller.capture.fish.synthesis import joint_motion, random_sequence
+from snakewalk.controller.animals.fish.piece_graph import piece_graph
+from snakewalk.controller.animals.fish.segments import segment_motion
+from snakewalk.controller.animals.fish.swimmer import swim
+from snakewalk.controller.animals.fish.synthesis import joint_motion, random_sequence
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
@@ -34,6 +32,8 @@ from snakewalk.controller.motion.source_switch import SourceSwitch
 from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.drivers.types import BodyPose
 
 DT_S = 0.02

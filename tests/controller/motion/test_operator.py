@@ -11,8 +11,8 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.cli.gamepad import Gamepad, Pad
-from snakewalk.controller.app.cli.keyboard import Keyboard, names
+from snakewalk.controller.console.gamepad import Gamepad, Pad
+from snakewalk.controller.console.keyboard import Keyboard, names
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_motion import GaitMotion

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.path_progress import NoPath, PathProgress, path_progress
 from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.run.factory import prepare_walk
 
 ROBOT = load_robot("yaw16")
 

@@ -7,11 +7,11 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.runs.execute import Finished, execute
-from snakewalk.controller.app.runs.factory import prepare_policy
 from snakewalk.controller.kinematics.links import body_in_world, chain_angles_rad, pose_at
 from snakewalk.controller.motion.policy import PolicyWave, load_policy, save_policy
 from snakewalk.controller.motion.policy_motion import PolicyMotion
+from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.factory import prepare_policy
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant

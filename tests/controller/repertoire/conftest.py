@@ -3,8 +3,8 @@
 import pytest
 
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.controller.app.studies.repertoire_recording import ACTIONS, record
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.controller.app.cli.commands.repertoire.crowd import crowd
-from snakewalk.controller.app.report.crowd_film import CrowdScene, film_crowd
 from snakewalk.controller.repertoire.behaviour import Wandering
+from snakewalk.controller.repertoire.commands.crowd import crowd
+from snakewalk.controller.repertoire.crowd_film import CrowdScene, film_crowd
 from snakewalk.controller.repertoire.detail import (
     FAR,
     HIDDEN,

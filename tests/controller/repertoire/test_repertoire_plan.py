@@ -9,23 +9,23 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_run
-from snakewalk.controller.app.runs.repertoire_run import RouteMotion
-from snakewalk.controller.app.studies.repertoire_physics import FRAME_S
-from snakewalk.controller.app.studies.repertoire_planning import (
+from snakewalk.controller.kinematics.frame import Frame
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.repertoire.motion import RepertoireMotion
+from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.repertoire_physics import FRAME_S
+from snakewalk.controller.repertoire.repertoire_planning import (
     load_plan,
     physics_route,
     plan_route,
     save_plan,
     search_cost,
 )
-from snakewalk.controller.kinematics.frame import Frame
-from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.repertoire.motion import RepertoireMotion
-from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.repertoire_run import RouteMotion
 from snakewalk.controller.repertoire.replay import replay
 from snakewalk.controller.repertoire.search import MotionPrimitives, plane_pose, search
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_run
 from snakewalk.drivers.types import BodyPose
 
 

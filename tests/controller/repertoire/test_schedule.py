@@ -7,11 +7,11 @@ import pytest
 
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.playback import ScheduleConfig
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_run, prepare_schedule
-from snakewalk.controller.app.runs.schedule_run import ScheduleMotion, read_schedule
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_run, prepare_schedule
 from snakewalk.drivers.types import BodyPose
 
 

@@ -3,8 +3,8 @@
 import gc
 from pathlib import Path
 
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_walk
 
 
 def test_a_garbage_collection_in_motion_goes_over_what_the_run_itself_has_made(

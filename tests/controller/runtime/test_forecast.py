@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.app.runs.factory import prepare_walk
+from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.runtime.forecast import Forecast, forecast
 from tests.helpers.command import snakewalk
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.studies.graph_study import graph_source
 from snakewalk.controller.shape.graphs import (
     Graph,
     graph_from_edges,
@@ -17,6 +16,7 @@ from snakewalk.controller.shape.graphs import (
     small_world_edges,
     threshold_graph,
 )
+from snakewalk.controller.studies.graph_study import graph_source
 
 
 def net(graph: Graph) -> "nx.Graph[int]":

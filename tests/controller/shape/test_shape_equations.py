@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded
 from snakewalk.controller.shape.states import energy_kept, to_angles, to_states
+from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 
 S = (np.arange(100) + 0.5) / 100
 PHASES = np.linspace(0, 2 * np.pi, 8, endpoint=False)

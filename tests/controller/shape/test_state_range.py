@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.readers.generated import embedded
 from snakewalk.controller.shape.library import build_library
 from snakewalk.controller.shape.states import random_states, state_range, to_states
+from snakewalk.controller.track.readers.generated import embedded
 
 
 @pytest.mark.parametrize("name", ["worm-like", "lamprey-like"])

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.capture.readers.generated import EMBEDDED, embedded
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.shape import crossing
 from snakewalk.controller.shape.crossing import self_touches
 from snakewalk.controller.shape.library import build_library
 from snakewalk.controller.shape.states import energy_kept, pad, random_states, to_angles, to_states
+from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 
 S = (np.arange(100) + 0.5) / 100
 

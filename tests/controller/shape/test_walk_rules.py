@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.studies.graph_study import graph_source, return_gaps
 from snakewalk.controller.shape.graphs import Graph, graph_from_edges
 from snakewalk.controller.shape.walks import RULES, SHORT_RETURN, Walk, walk
+from snakewalk.controller.studies.graph_study import graph_source, return_gaps
 
 SPECS = ("er:150:3", "er:150:9", "ws:150:3:0.1", "ws:150:6:0.2")
 

@@ -9,9 +9,9 @@ import pytest
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.run import RunConfig
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_job
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.walk.landing import Landing
 
 ROBOT = load_robot("salamander")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.path_progress import OpenWaypoints, PathProgress
+from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.course import Course, OnCourse
 from snakewalk.controller.walk.live_course import WAYPOINTS_MAX, LiveCourse

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.terrain.path import SplinePath
 
 STEP_S = 0.04

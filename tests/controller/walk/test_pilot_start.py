@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from snakewalk.controller.app.runs.factory import prepare_walk
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.controller.run.factory import prepare_walk
 
 PERIOD_S = 0.02
 

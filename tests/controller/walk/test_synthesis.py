@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.run import WalkConfig
-from snakewalk.controller.capture.readers.generated import embedded
+from snakewalk.controller.animals.synthesis.synthesis import (
+    NECK,
+    Behaviour,
+    Locomotion,
+    Targets,
+    synthesise,
+    varied_pulse,
+)
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.shape.states import (
@@ -18,15 +25,8 @@ from snakewalk.controller.shape.states import (
     to_states,
 )
 from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.track.readers.generated import embedded
 from snakewalk.controller.walk.angle_track import AngleTrack
-from snakewalk.controller.walk.synthesis import (
-    NECK,
-    Behaviour,
-    Locomotion,
-    Targets,
-    synthesise,
-    varied_pulse,
-)
 from snakewalk.controller.walk.walker import Walker
 
 N = 100

@@ -5,9 +5,9 @@ import pytest
 
 from snakewalk.config.loader import load_robot
 from snakewalk.config.run import WalkConfig
-from snakewalk.controller.capture.readers.generated import embedded
 from snakewalk.controller.kinematics import retarget
 from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.track.readers.generated import embedded
 from snakewalk.controller.walk import joint_track, time_law
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.joint_track import JointTrack

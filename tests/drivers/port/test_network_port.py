@@ -19,11 +19,11 @@ import serial.rfc2217
 
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.app.cli.main import main
-from snakewalk.controller.app.service import torque_off
-from snakewalk.controller.app.service.adapter import permission
-from snakewalk.controller.app.service.doctor import examine
-from snakewalk.controller.app.service.scan import scan
+from snakewalk.controller.bench import torque_off
+from snakewalk.controller.bench.adapter import permission
+from snakewalk.controller.bench.doctor import examine
+from snakewalk.controller.bench.scan import scan
+from snakewalk.controller.cli.main import main
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import PortError

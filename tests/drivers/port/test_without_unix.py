@@ -23,9 +23,9 @@ sys.platform = "elsewhere"
 for name in ("getuid", "sched_setscheduler", "setpriority", "O_NOFOLLOW", "O_CLOEXEC"):
     delattr(os, name)
 os.environ["USERNAME"] = "somebody"
-from snakewalk.controller.app.cli.main import main
-from snakewalk.controller.app.runs.execute import execute
-from snakewalk.controller.app.runs.factory import prepare_gait
+from snakewalk.controller.cli.main import main
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
 from snakewalk.drivers.safety.stop_button import StopButton, stoppable_runs
 
 def command(*words):

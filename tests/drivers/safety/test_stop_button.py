@@ -8,7 +8,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.app.service.emergency_stop import runs_of
+from snakewalk.controller.bench.emergency_stop import runs_of
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import SafetyTrippedError

@@ -1,0 +1,1 @@
+"""Bodies of animals: mesh, skin, legs, fish, and their synthesis."""

@@ -1,0 +1,1 @@
+"""Commands of animals' bodies, one command per file."""

@@ -1,0 +1,334 @@
+"""``snakewalk body``: a solid body from skeletons and widths, and a skin that moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from snakewalk.controller.animals.mesh.body_model import BodyModel
+    from snakewalk.controller.animals.mesh.body_skin import BodySkin
+    from snakewalk.controller.animals.mesh.mesh import Mesh
+
+    Floats = NDArray[np.float64]
+    Image = NDArray[np.uint8]
+
+
+def body(
+    track: Annotated[
+        str,
+        typer.Argument(
+            metavar="BODY",
+            help="an .npz of skeletons with widths, a shipped recording or skin, an .obj or a .glb",
+            autocompletion=completion.BODIES,
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="body.glb or body.obj")],
+    animate: Annotated[
+        str | None,
+        typer.Option(
+            help="what moves it: a recording, the log of a run, or a spine gait",
+            autocompletion=completion.MOVING,
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="frames a second; default: a recording's own, 25 of a log")
+    ] = None,
+    curves: Annotated[
+        int | None, typer.Option(help="boundary curves of the skin; default 37")
+    ] = None,
+    order: Annotated[
+        int | None,
+        typer.Option(help="of the skin: 1 creased, 2 biharmonic (default), 3 with even curvature"),
+    ] = None,
+    surface: Annotated[
+        bool, typer.Option("--surface", help="of a mesh: the surface through its curves instead")
+    ] = False,
+    forward: Annotated[
+        str | None, typer.Option(help="of a mesh: axis to its head, +x, -z, ...; default: longest")
+    ] = None,
+    up: Annotated[
+        str | None, typer.Option(help="of a mesh: axis that points up; default: +y, of an .obj +z")
+    ] = None,
+    image: Annotated[
+        Path | None, typer.Option(help="picture of the body from above: the skin's texture")
+    ] = None,
+    frame: Annotated[
+        int | None,
+        typer.Option(help="of the track, from 0 (default): that --image shows, or --posed takes"),
+    ] = None,
+    side: Annotated[
+        Path | None, typer.Option(help="an .npz of the same body seen from the side: its heights")
+    ] = None,
+    aspect: Annotated[float, typer.Option(help="height over width, without a side view")] = 0.85,
+    posed: Annotated[
+        bool, typer.Option("--posed", help="bent as in --frame, not straight")
+    ] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw widths, skin and solid here (.png, .svg, .pdf)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Make the body's mesh, or a skin that moves: a textured, animated glTF (--animate)."""
+    require_extra("body: meshes need", "trimesh", *(["pygltflib"] if animate else []))
+    check_picture(picture)
+    if not 0.1 <= aspect <= 10.0:
+        raise InputError(f"aspect: height over width must be from 0.1 to 10, not {aspect:g}")
+    made = _Made(output, picture, force, as_json)
+    from snakewalk.controller.animals.mesh.body_skin import Cut, body_skin, is_skin, model_skin  # noqa: PLC0415
+
+    given = is_skin(track)
+    _check_options(
+        track,
+        given,
+        animate,
+        of_widths={"--image": image, "--side": side, "--posed": posed},
+        of_skins={"--fps": fps, "--curves": curves, "--order": order},
+        of_meshes={"--surface": surface, "--forward": forward, "--up": up},
+    )
+    if frame is not None and image is None and not posed:
+        raise InputError("--frame: is for --image and --posed")
+    how = Cut(37 if curves is None else curves, 2 if order is None else order, forward, up, surface)
+    if given:
+        made.refuse(textured=True)
+        made.skin(body_skin(track, how), animate, fps)
+        return
+    made.refuse(textured=image is not None)
+    frame = frame or 0
+    measured = _measure(track, image, frame, side, aspect)
+    if animate is not None:
+        if posed:
+            raise InputError("--posed: --animate moves the body; it cannot keep one pose")
+        name = Path(track).stem
+        made.skin(model_skin(measured.model, measured.texture, name, how), animate, fps)
+        return
+    made.solid(measured, _skeleton(track, measured.points, frame) if posed else None, image)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A body with widths."""
+
+    model: BodyModel
+    points: Floats
+    texture: Image | None
+    shown: tuple[Image, Floats, Floats] | None
+
+
+@dataclass(frozen=True)
+class _Made:
+    """Where results go."""
+
+    output: Path
+    picture: Path | None
+    force: bool
+    as_json: bool
+
+    @property
+    def drawn(self) -> list[Path]:
+        return [] if self.picture is None else [self.picture]
+
+    def refuse(self, *, textured: bool) -> None:
+        """Check the files before any work."""
+        from snakewalk.controller.images.mesh_files import mesh_files  # noqa: PLC0415
+
+        refuse_to_overwrite([*mesh_files(self.output, textured), *self.drawn], self.force)
+
+    def solid(self, body: _Measured, skeleton: Floats | None, image: Path | None) -> None:
+        """Write the ellipses along a skeleton; None is straight."""
+        from snakewalk.controller.animals.mesh.body_model import straight  # noqa: PLC0415
+        from snakewalk.controller.animals.mesh.mesh import body_mesh  # noqa: PLC0415
+
+        one = body.model
+        mesh = body_mesh(one, straight() if skeleton is None else skeleton)
+        files = self._write(mesh, body.texture)
+        if self.picture is not None:
+            from snakewalk.controller.animals.plots.body import draw_body  # noqa: PLC0415
+
+            draw_body(self.picture, one, mesh, body.texture, body.shown)
+        show(
+            {
+                "files": files,
+                "vertices": len(mesh.vertices),
+                "triangles": len(mesh.faces),
+                "length_m": one.length_m,
+                "widths": "measured" if one.measured else "a plain spindle: the track holds none",
+                "thickest_over_length": round(2.0 * float(one.half_width.max()), 4),
+                "height_over_width": round(float(one.half_height.max() / one.half_width.max()), 3),
+                "texture": None if image is None else str(image),
+                "body_profile": list(one.profile),
+            },
+            self.as_json,
+        )
+
+    def skin(self, body: BodySkin, animate: str | None, fps: float | None) -> None:
+        """Write a skin, at rest or moving."""
+        facts: dict[str, object] = {}
+        skin, motion = body.skin, None
+        if animate is None:
+            files = self._write(skin.mesh, body.texture)
+        else:
+            from snakewalk.controller.animals.mesh.body_motion import animated  # noqa: PLC0415
+            from snakewalk.controller.animals.mesh.rig import spine_rig  # noqa: PLC0415
+            from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415
+
+            if self.output.suffix.lower() != ".glb":
+                raise InputError(f"{self.output}: a skin that moves is written as .glb")
+            skin, motion = animated(skin, animate, fps)
+            with atomic_write(self.output) as part:
+                write_skin(
+                    part,
+                    spine_rig(skin, motion.bone_m),
+                    motion,
+                    body.texture,
+                    body.name,
+                    both_sides=body.both_sides,
+                )
+            files = [str(self.output), *map(str, self.drawn)]
+            facts = {
+                "animated_by": animate,
+                "frames": len(motion.time_s),
+                "duration_s": round(float(motion.time_s[-1]), 3),
+                "bones": len(motion.bone_m),
+            }
+        if self.picture is not None:
+            from snakewalk.controller.animals.plots.body import draw_skin  # noqa: PLC0415
+
+            draw_skin(self.picture, skin, motion, body.texture)
+        sizes = {
+            "files": files,
+            "vertices": len(skin.mesh.vertices),
+            "triangles": len(skin.mesh.faces),
+            "length_m": round(skin.length_m, 6),
+        }
+        show(sizes | facts | body.facts, self.as_json)
+
+    def _write(self, mesh: Mesh, texture: Image | None) -> list[str]:
+        from snakewalk.controller.images.mesh_files import mesh_files, write_mesh  # noqa: PLC0415
+
+        with atomic_write(self.output) as part:
+            write_mesh(part, mesh, texture)
+        return [str(f) for f in [*mesh_files(self.output, texture is not None), *self.drawn]]
+
+
+def _check_options(
+    body: str,
+    given: bool,
+    animate: str | None,
+    *,
+    of_widths: dict[str, object],
+    of_skins: dict[str, object],
+    of_meshes: dict[str, object],
+) -> None:
+    """Refuse options that would do nothing."""
+    from snakewalk.controller.images.mesh_files import MESH_ENDINGS  # noqa: PLC0415
+
+    mesh = given and body.lower().endswith(MESH_ENDINGS)
+    faults = [
+        f"{name}: is for recordings with widths; {body} is none"
+        for name, value in of_widths.items()
+        if given and value
+    ]
+    faults += [
+        f"{name}: is for a mesh, .obj or .glb" for name, v in of_meshes.items() if v and not mesh
+    ]
+    faults += [
+        f"{name}: is for a skin: give --animate"
+        for name, v in of_skins.items()
+        if v is not None and not (given or animate)
+    ]
+    if of_skins["--fps"] is not None and not animate:
+        faults.append("--fps: is for --animate")
+    if faults:
+        raise InputError(list(dict.fromkeys(faults)))
+
+
+def _measure(
+    track: str, image: Path | None, frame: int, side: Path | None, aspect: float
+) -> _Measured:
+    """Widths of a recording, and its texture from a picture."""
+    from snakewalk.controller.animals.mesh import body_model as model  # noqa: PLC0415  heavy
+    from snakewalk.controller.track.readers.generated import EMBEDDED, embedded  # noqa: PLC0415
+
+    if track in EMBEDDED:
+        if image is not None or side is not None:
+            raise InputError(f"{track}: is made from figures, without widths; give an .npz")
+        recording = embedded(track)
+        return _Measured(model.spindle(recording.length_m), recording.points, None, None)
+    top = model.read_silhouettes(Path(track))
+    seen = None if side is None else model.read_silhouettes(side)
+    texture, shown = None, None
+    if image is not None:
+        _check_frame(str(image), top.points, frame)
+        shown = _read_picture(image), top.points[frame], top.radius[frame]
+        texture = _texture(image, shown, top.pixels)
+    points = top.points * [1.0, -1.0] if top.pixels else top.points
+    return _Measured(model.body_model(top, seen, aspect), points, texture, shown)
+
+
+def _skeleton(track: str, points: Floats, frame: int) -> Floats:
+    """Skeleton of one frame, in body lengths."""
+    from snakewalk.controller.animals.mesh.body_model import pose  # noqa: PLC0415
+
+    _check_frame(track, points, frame)
+    return pose(points[frame])
+
+
+def _texture(image: Path, shown: tuple[Image, Floats, Floats], pixels: bool) -> Image:
+    """Strip of the skin from a picture, the skeleton in it and its radii."""
+    from snakewalk.controller.animals.mesh.skin_texture import unroll  # noqa: PLC0415
+
+    picture, points, radius = shown
+    if not pixels:
+        raise InputError(f"{image}: the track holds no places in pictures (points_px, skeletons)")
+    rows, columns = picture.shape[:2]
+    x, y = points.T
+    if x.min() < -1.0 or y.min() < -1.0 or x.max() > columns or y.max() > rows:
+        raise InputError(
+            f"{image}: the skeleton does not lie in this picture of {columns} x {rows} pixels; say "
+            "which --frame of the track it shows"
+        )
+    return unroll(picture, points, radius)
+
+
+def _read_picture(image: Path) -> Image:
+    """Grey or colour, whatever the file holds."""
+    import numpy as np  # noqa: PLC0415
+    from PIL import Image as Pillow  # noqa: PLC0415
+    from PIL import UnidentifiedImageError  # noqa: PLC0415
+
+    try:
+        with Pillow.open(image) as picture:
+            return np.asarray(picture.convert("RGB"))
+    except FileNotFoundError:
+        raise InputError(f"{image}: no such file") from None
+    except Pillow.DecompressionBombError as error:
+        raise InputError(f"{image}: {error}") from None
+    except (UnidentifiedImageError, OSError, SyntaxError):
+        raise InputError(f"{image}: is no picture that can be read") from None
+
+
+def _check_frame(name: str, points: Floats, frame: int) -> None:
+    import numpy as np  # noqa: PLC0415
+
+    if not 0 <= frame < len(points):
+        raise InputError(f"{name}: frame {frame} is not in 0..{len(points) - 1}")
+    if not np.isfinite(points[frame]).all():
+        raise InputError(f"{name}: frame {frame} holds no whole skeleton")

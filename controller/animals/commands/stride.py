@@ -1,0 +1,78 @@
+"""``snakewalk stride``: from a tracked animal with legs to an animal's file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import (
+    Force,
+    Individual,
+    Json,
+    MinScore,
+    Plane,
+    Rate,
+    show,
+)
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+
+
+def stride(
+    keypoints: Annotated[
+        Path, typer.Argument(help="SLEAP, DeepLabCut, QTM or C3D, seen from above")
+    ],
+    spine: Annotated[str, typer.Option(help="A,B,C: keypoints along the spine, head first")],
+    girdles: Annotated[
+        str, typer.Option(help="F,H: those of the spine at the front and the hind legs")
+    ],
+    feet: Annotated[
+        str, typer.Option(help="keypoints: front left,front right,hind left,hind right")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the animal's file")] = Path(
+        "animal.toml"
+    ),
+    animal: Annotated[
+        str,
+        typer.Option(
+            help="whose heights, knees and skin are taken", autocompletion=completion.ANIMALS
+        ),
+    ] = "lizard",
+    length_m: Annotated[
+        float | None, typer.Option(help="of the spine; default: by the file's scale")
+    ] = None,
+    rate: Rate = None,
+    min_score: MinScore = None,
+    individual: Individual = None,
+    plane: Plane = None,
+    picture: Annotated[Path | None, typer.Option(help="the fit of each foot")] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends."""
+    from snakewalk.controller.animals.legged.animal_stride import (  # noqa: PLC0415  heavy
+        Names,
+        measure_animal,
+    )
+    from snakewalk.controller.track.readers.keypoints import choice_of  # noqa: PLC0415
+    from snakewalk.controller.track.readers.load import load_keypoints  # noqa: PLC0415
+
+    names = Names.of(spine, girdles, feet)
+    written = [output] if picture is None else [output, picture]
+    refuse_to_overwrite(written, force)
+    if picture is not None:
+        check_picture(picture)
+    held = load_keypoints(keypoints, rate, min_score, choice_of(individual, None, plane))
+    made = measure_animal(held, names, animal, output.stem, length_m)
+    with atomic_write(output) as part:
+        part.write_text(made.text(), encoding="utf-8")
+    if picture is not None:
+        from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415
+
+        draw_stride(made.stride, picture, f"{keypoints.name}: {made.stride.cycles:.1f} cycles")
+    files = {"animal": str(output), "picture": None if picture is None else str(picture)}
+    show(made.facts() | files, as_json)

@@ -1,0 +1,161 @@
+"""``snakewalk synthesise``: a motion without a robot."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import (
+    DEFAULT_RUN,
+    Force,
+    Json,
+    Robot,
+    RunName,
+    Seed,
+    Set,
+    TrackFile,
+    World,
+    key_values,
+    show,
+)
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+
+if TYPE_CHECKING:
+    from snakewalk.controller.run.walk_run import WalkRun
+
+_SYNTHESISED = ("walk", "walk-printed", "kp")
+_ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
+"""Of the files, by what is in them."""
+
+
+def synthesise(
+    run: RunName = DEFAULT_RUN,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="NAME: writes NAME.npz, NAME.png, ...; default: the run"
+        ),
+    ] = None,
+    robot: Robot = None,
+    world: World = None,
+    track: TrackFile = None,
+    seed: Seed = None,
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            help="walk; walk-printed: aimed as [PT] prints it; kp: the older state graph of [KP]"
+        ),
+    ] = None,
+    animal: Annotated[
+        str | None,
+        typer.Option(
+            help="with legs, in place of a snake: lizard, goat, or a .toml ([KP])",
+            autocompletion=completion.ANIMALS,
+        ),
+    ] = None,
+    set_: Set = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(min=2, max=100_000, help="exactly so many; default: to the last waypoint"),
+    ] = None,
+    film: Annotated[bool, typer.Option("--film", help="NAME.mp4: the skin on the ground")] = False,
+    glb: Annotated[bool, typer.Option("--glb", help="NAME.glb: the skin as animated glTF")] = False,
+    look: Annotated[
+        str, typer.Option(help="of both: animal, or a BODY as of `snakewalk body`")
+    ] = "animal",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP])."""
+    from snakewalk.controller.run.factory import prepare_walk  # noqa: PLC0415
+
+    prepared = prepare_walk(
+        run, keys=key_values("--set", set_), on_paper=True, seed=seed, motion=motion, robot=robot,
+        world=world, track=track,
+    )  # fmt: skip
+    if prepared.run.motion not in _SYNTHESISED:
+        raise InputError(f"--motion {prepared.run.motion}: {', '.join(_SYNTHESISED)}")
+    name = Path(prepared.run.name) if output is None else output
+    left_out = {"film": not film, "skin": not glb}
+    files = {
+        what: name.with_name(f"{name.name}{ending}")
+        for what, ending in _ENDINGS.items()
+        if not left_out.get(what)
+    }
+    refuse_to_overwrite(list(files.values()), force)
+    check_picture(files["picture"])
+    if animal is None:
+        facts, complete = _snake(prepared, frames, look, files)
+    else:
+        kept = {"--motion": motion, "--track": track, "--look": None if look == "animal" else look}
+        wrong = [option for option, value in kept.items() if value is not None]
+        if wrong:
+            raise InputError(
+                f"{wrong[0]}: is for snakes; --animal {animal} has its own motion and skin"
+            )
+        facts, complete = _with_legs(prepared, frames, animal, files)
+    show(facts | {what: str(files[what]) if what in files else None for what in _ENDINGS}, as_json)
+    if frames is None and not complete:
+        raise SystemExit(1)
+
+
+def _snake(
+    prepared: "WalkRun", frames: int | None, look: str, files: Mapping[str, Path]
+) -> tuple[dict[str, object], bool]:
+    """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
+    from snakewalk.controller.animals.mesh.body_look import ANIMAL  # noqa: PLC0415  heavy
+    from snakewalk.controller.animals.plots.snake_synthesis import draw_walk  # noqa: PLC0415
+    from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis  # noqa: PLC0415
+
+    worn = None
+    if "skin" in files or "film" in files:
+        from snakewalk.controller.animals.synthesis.synthesis_skin import SynthesisSkin  # noqa: PLC0415
+
+        worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
+    elif look != ANIMAL:
+        raise InputError(f"--look {look}: is for --film and --glb")
+    made = SnakeSynthesis(prepared).synthesise(frames)
+    with atomic_write(files["track"]) as part:
+        made.save(part, files["track"].stem, f"snakewalk synthesise of {prepared.run.track}")
+    draw_walk(
+        made, prepared.ground, files["picture"], f"{prepared.run.name}: {prepared.world.name}"
+    )
+    if worn is not None and "skin" in files:
+        worn.write(made, files["skin"])
+    if worn is not None and "film" in files:
+        worn.film(made, prepared, files["film"])
+    return made.facts(), made.complete
+
+
+def _with_legs(
+    prepared: "WalkRun", frames: int | None, name: str, files: Mapping[str, Path]
+) -> tuple[dict[str, object], bool]:
+    """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
+    from snakewalk.controller.animals.legged.animal_synthesis import (  # noqa: PLC0415  heavy
+        read_animal,
+        synthesise_animal,
+    )
+    from snakewalk.controller.animals.plots.animal_synthesis import draw_animal  # noqa: PLC0415
+
+    config = read_animal(name)
+    body = None
+    if "skin" in files or "film" in files:
+        from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415
+
+        body = AnimalBody.of(config)
+    made = synthesise_animal(prepared, config, frames)
+    with atomic_write(files["track"]) as part:
+        made.save(part, files["track"].stem)
+    draw_animal(made, files["picture"], f"{config.name} on {prepared.world.name}")
+    if body is not None and "skin" in files:
+        body.write(made, files["skin"])
+    if body is not None and "film" in files:
+        body.film(made, prepared, files["film"])
+    return made.facts(), made.complete

@@ -1,0 +1,148 @@
+"""A film of a fish whose every angle is known: frames, empty scenes and the truth in one folder."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.controller.animals.fish.model import FishModel, fish_model
+from snakewalk.controller.animals.fish.postures import Postures, postures_of_track, save_postures
+from snakewalk.controller.animals.fish.rendered_fish import FishScene
+from snakewalk.controller.animals.fish.swimmer import swim
+from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.track.readers.load import load_track
+
+
+def render(
+    folder: Path,
+    *,
+    motion: str | None = None,
+    build: str = "carp",
+    length_px: float = 120.0,
+    frames: int | None = None,
+    side: bool = False,
+    fins: float = 0.0,
+    seed: int = 0,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Postures:
+    """Write ``top/``, ``top-background.png``, with ``side`` the same from the side, ``truth.npz``.
+
+    Args:
+        folder: made if it is not there.
+        motion: a recording to render; a scripted fish without one.
+        build: carp or eel.
+        length_px: body length.
+        frames: at most so many.
+        side: also film from the side; a recording of midlines has no height and swims level.
+        fins: length of the pectoral fins, body lengths; 0: folded away.
+        seed: of patterns and noise.
+        on_progress: called with the frames done, and in all.
+
+    Returns:
+        The truth, body lengths as unit; (0, 0) is the middle of the frame.
+
+    """
+    truth, spine, height = _truth(motion, build, frames)
+    low, high = np.nanmin(spine, axis=(0, 1)), np.nanmax(spine, axis=(0, 1))
+    columns, rows = (int(np.ceil((high - low)[k] * length_px + 0.6 * length_px)) for k in (0, 1))
+    shift = np.array([columns, -rows]) / 2.0 - 0.5 * (low + high) * length_px
+    model = fish_model(build, length_px)
+    half_width = model.half_width * length_px
+    top = FishScene(rows, columns, seed)
+    (folder / "top").mkdir(parents=True, exist_ok=True)
+    _write(folder / "top-background.png", top.background())
+    side_rows = round(2.2 * length_px)
+    beside = FishScene(side_rows, columns, seed + 1)
+    if side:
+        (folder / "side").mkdir(exist_ok=True)
+        _write(folder / "side-background.png", beside.background())
+    for k, body in enumerate(spine):
+        body_px = body * length_px + shift
+        _write(folder / "top" / f"{k:05d}.png", top.top(body_px, half_width, fins * length_px))
+        if side:
+            height_px = height[k] * length_px - 0.5 * side_rows
+            _write(
+                folder / "side" / f"{k:05d}.png",
+                _side_view(beside, model, body, body_px[:, 0], height_px),
+            )
+        on_progress(k + 1, len(spine))
+    with atomic_write(folder / "truth.npz") as part:
+        save_postures(part, truth)
+    return truth
+
+
+def _side_view(
+    scene: FishScene, model: FishModel, body: Floats, x_px: Floats, height_px: Floats
+) -> Image:
+    """(H, W) the fish from the side.
+
+    Args:
+        scene: the side camera.
+        model: sections of the fish.
+        body: (P, 2) midline from above, body lengths: its direction says how wide sections look.
+        x_px: (P,) where it is along the view.
+        height_px: (P,) its heights, up.
+
+    """
+    step = np.gradient(body, axis=0)
+    across = np.abs(step[:, 1]) / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
+    at = np.linspace(0.0, 1.0, len(body))
+    stations = np.linspace(0.0, 1.0, len(model.half_width))
+    wide_px = np.interp(at, stations, model.half_width * model.length_px) * across
+    high_px = np.interp(at, stations, model.half_height * model.length_px)
+    return scene.side(np.column_stack([x_px, height_px]), wide_px, high_px)
+
+
+def _truth(motion: str | None, build: str, frames: int | None) -> tuple[Postures, Floats, Floats]:
+    """Postures, spines (T, P, 2) and heights (T, P), all in body lengths."""
+    model = fish_model(build)
+    if motion is not None:
+        track = load_track(motion)
+        whole = postures_of_track(track, model.joints_at)
+        known = whole.found
+        unit = whole.length
+        truth = replace(
+            whole,
+            base=whole.base[known][:frames] / unit,
+            head_rad=whole.head_rad[known][:frames],
+            angles_rad=whole.angles_rad[known][:frames],
+            length_m=None,
+        )
+        spine = track.points[:frames] / unit
+        return truth, spine, np.zeros(spine.shape[:2])
+    whole = swim(build=build)
+    truth = replace(
+        whole,
+        base=whole.base[:frames],
+        head_rad=whole.head_rad[:frames],
+        angles_rad=whole.angles_rad[:frames],
+        height=None if whole.height is None else whole.height[:frames],
+        pitch_rad=None if whole.pitch_rad is None else whole.pitch_rad[:frames],
+    )
+    zero = np.zeros(truth.frames)
+    height = zero if truth.height is None else truth.height
+    pitch = zero if truth.pitch_rad is None else truth.pitch_rad
+    solid = np.stack(
+        [
+            model.midline(
+                np.array([*truth.base[k], height[k]]), head, truth.angles_rad[k], pitch[k]
+            )
+            for k, head in enumerate(truth.head_rad)
+        ]
+    )
+    return truth, solid[..., :2], solid[..., 2]
+
+
+def _write(file: Path, image: Image) -> None:
+    """Write a picture whole.
+
+    Raises:
+        OSError: OpenCV cannot write it.
+
+    """
+    with atomic_write(file) as part:
+        if not cv2.imwrite(str(part), image):
+            raise OSError(5, "cannot write the picture", str(file))

@@ -1,0 +1,142 @@
+"""Postures from files: a film, two films, or midlines that were tracked already."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.controller.animals.fish.match_film import FilmMatch, match_film
+from snakewalk.controller.animals.fish.model import fish_model
+from snakewalk.controller.animals.fish.postures import Postures, postures_of_track
+from snakewalk.controller.animals.fish.silhouettes import open_film
+from snakewalk.controller.track.readers.load import load_track
+
+MIDLINES = (".csv", ".npz", ".npy", ".mat", ".wcon", ".h5", ".slp", ".json")
+"""Endings of tracked bodies; everything else is taken for images."""
+
+
+@dataclass(frozen=True, slots=True)
+class MatchFacts:
+    """Counts and ranges of the postures of a recording."""
+
+    frames: int
+    matched: int
+    rate_hz: float
+    largest_angles_deg: list[float]
+    length_px: float | None = None
+    """Of a film; None of midlines, and so are the next five."""
+    fins: float | None = None
+    """Length of the pectoral fins that were seen from above, body lengths; 0: none."""
+    rate_assumed: bool | None = None
+    background: str | None = None
+    """What the film's frames were compared with, in words."""
+    left_out: dict[str, int] | None = None
+    """Frames without a posture, by reason."""
+    value_v: float | None = None
+    left_over_deg: float | None = None
+    """Of midlines: what the spine angles do not explain, root mean square."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the facts that are known, for JSON."""
+        values = {name: getattr(self, name) for name in MatchFacts.__slots__}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class MatchedRecording:
+    """Postures, what is known of them, and the matched film they come from."""
+
+    postures: Postures
+    facts: MatchFacts
+    film: FilmMatch | None
+    """None of midlines."""
+
+
+def match_footage(
+    top: Path,
+    side: Path | None,
+    background: Path | None,
+    side_background: Path | None,
+    *,
+    build: str,
+    rate_hz: float | None,
+    length_m: float | None,
+    on_progress: Callable[[int, int], None],
+) -> MatchedRecording:
+    """Match a film, or two films of the same moments.
+
+    Args:
+        top: film from above.
+        side: film from the side.
+        background: picture of the scene without the fish, from above.
+        side_background: the same from the side.
+        build: carp or eel.
+        rate_hz: frames a second, instead of what the file says.
+        length_m: of the body; without it the unit is the body length.
+        on_progress: called with the frames done, and in all.
+
+    Raises:
+        InputError: a file that cannot be read, or no fish in it.
+
+    """
+    model = fish_model(build)
+    above = open_film(top, background, rate_hz)
+    beside = None if side is None else open_film(side, side_background, rate_hz)
+    total, done = above.footage.count, 0
+
+    def count() -> None:
+        nonlocal done
+        done += 1
+        on_progress(done, total)
+
+    film = match_film(
+        above.frames,
+        total,
+        model,
+        rate_hz=above.footage.rate_hz,
+        side=None if beside is None else beside.frames,
+        length_m=length_m,
+        name=top.name,
+        on_progress=count,
+    )
+    postures = film.postures
+    value = None if postures.value is None else round(float(np.nanmedian(postures.value)), 3)
+    facts = MatchFacts(
+        frames=postures.frames,
+        matched=int(postures.found.sum()),
+        rate_hz=round(postures.rate_hz, 3),
+        largest_angles_deg=_largest_angles_deg(postures),
+        length_px=round(film.model.length_px, 1),
+        fins=film.model.fin,
+        rate_assumed=above.footage.rate_assumed,
+        background=above.detector.background_source,
+        left_out=film.lost,
+        value_v=value,
+    )
+    return MatchedRecording(postures, facts, film)
+
+
+def read_midlines(file: Path, build: str, rate_hz: float | None) -> MatchedRecording:
+    """Postures of a recording that holds midlines.
+
+    Raises:
+        InputError: no recording that can be read.
+
+    """
+    track = load_track(str(file), rate_hz)
+    postures = postures_of_track(track, fish_model(build).joints_at)
+    rest = track.angles_rad - postures.tangents_rad()[postures.found]
+    facts = MatchFacts(
+        frames=postures.frames,
+        matched=int(postures.found.sum()),
+        rate_hz=round(postures.rate_hz, 3),
+        largest_angles_deg=_largest_angles_deg(postures),
+        left_over_deg=round(float(np.degrees(np.sqrt(np.mean(rest**2)))), 2),
+    )
+    return MatchedRecording(postures, facts, None)
+
+
+def _largest_angles_deg(postures: Postures) -> list[float]:
+    size = np.degrees(np.nanmax(np.abs(postures.angles_rad), axis=0))
+    return [float(angle) for angle in size.round(1)]

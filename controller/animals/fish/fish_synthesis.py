@@ -1,0 +1,169 @@
+"""From postures to a new motion: cut, ordered, composed, and retargeted to a robot."""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.animals.fish.piece_graph import PieceGraph, piece_graph
+from snakewalk.controller.animals.fish.postures import Postures
+from snakewalk.controller.animals.fish.segments import (
+    MotionSegment,
+    Segmentation,
+    commonest_posture,
+    segment_motion,
+)
+from snakewalk.controller.animals.fish.synthesis import (
+    PieceSequence,
+    compose,
+    joint_motion,
+    joint_pieces,
+    junctions,
+    random_sequence,
+    save_motion,
+    sequence_through,
+)
+from snakewalk.controller.kinematics.retarget import Retarget
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisOptions:
+    """The options of a synthesis; angles in degrees, as on the command line."""
+
+    through: list[tuple[float, ...]]
+    """X, Y or X, Y, Z; all alike."""
+    seconds: float = 20.0
+    seed: int = 0
+    radius: float = 0.5
+    """Body lengths."""
+    limit_s: float = 120.0
+    mirror: bool = False
+    within_deg: float = 4.0
+    merge_deg: float = 20.0
+    reference: str = "straight"
+    blend_s: float = 0.25
+    robot: str = "yaw16"
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisFacts:
+    """Counts of a synthesis, and the joint steps at its joins."""
+
+    segments: dict[str, int]
+    """By kind."""
+    beats_merged: int
+    pieces_used: int
+    seconds: float
+    joins_without_rule: int
+    reached_s: list[float]
+    robot: str
+    join_step_deg: float | None = None
+    """Largest joint step where one piece ends and the next begins; None with one piece."""
+    join_step_blended_deg: float | None = None
+    height_range: list[float] | None = None
+    """From where it starts, body lengths or m; None of a film without a side view."""
+    pitch_range_deg: list[float] | None = None
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the facts that are known, for JSON."""
+        values = {name: getattr(self, name) for name in SynthesisFacts.__slots__}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisedMotion:
+    """A motion and where it is from."""
+
+    source: Postures
+    segments: list[MotionSegment]
+    pieces: PieceGraph
+    sequence: PieceSequence
+    motion: Postures
+    joints_rad: Floats
+    """(T, joints) of the robot."""
+    facts: SynthesisFacts
+
+    def save(self, file: Path) -> None:
+        """Write it as a recording that a run can take."""
+        save_motion(file, self.motion, self.joints_rad, self.facts.robot, self.sequence)
+
+
+def synthesise_motion(source: Postures, options: SynthesisOptions) -> SynthesisedMotion:
+    """Cut, choose, compose, retarget.
+
+    Raises:
+        InputError: no segment, a control point out of reach, an unknown robot or reference.
+
+    """
+    robot = load_robot(options.robot)
+    segments = _segments(source, options)
+    pieces = piece_graph(source, segments, mirror=options.mirror)
+    if options.through:
+        points = np.array(options.through)
+        radius = options.radius * source.length
+        sequence = sequence_through(pieces, points, radius=radius, limit_s=options.limit_s)
+    else:
+        sequence = random_sequence(pieces, options.seconds, np.random.default_rng(options.seed))
+    motion = replace(
+        compose(pieces, sequence, options.blend_s),
+        name=f"{source.name}, put together anew",
+        source=source.source,
+        licence=source.licence,
+    )
+    retarget = Retarget(robot)
+    joints = joint_motion(pieces, sequence, retarget, options.blend_s)
+    kinds = Counter(str(segment.kind) for segment in segments)
+    facts = SynthesisFacts(
+        segments=dict(sorted(kinds.items())),
+        beats_merged=sum(segment.parts - 1 for segment in segments),
+        pieces_used=len(sequence.order),
+        seconds=round((motion.frames - 1) / motion.rate_hz, 2),
+        joins_without_rule=sequence.forced,
+        reached_s=[round(at, 2) for at in sequence.reached_s],
+        robot=robot.name,
+    )
+    if motion.height is not None and motion.pitch_rad is not None:
+        facts = replace(
+            facts, height_range=_range(motion.height), pitch_range_deg=_range(
+                np.degrees(motion.pitch_rad)
+            ),
+        )  # fmt: skip
+    steps = _steps(joint_pieces(pieces, sequence, retarget))
+    if len(steps):
+        after = np.abs(np.diff(joints, axis=0))[junctions(pieces, sequence)]
+        facts = replace(
+            facts,
+            join_step_deg=round(float(np.degrees(steps.max())), 2),
+            join_step_blended_deg=round(float(np.degrees(after.max())), 2),
+        )
+    return SynthesisedMotion(source, segments, pieces, sequence, motion, joints, facts)
+
+
+def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment]:
+    """Cut the motion at the basic posture that the options name."""
+    within = float(np.radians(options.within_deg))
+    reference = None
+    if options.reference == "commonest":
+        if not source.found.any():
+            raise InputError(f"{source.name}: holds no posture")
+        reference = commonest_posture(source.angles_rad, within)
+        if options.mirror:
+            raise InputError("--mirror needs the straight reference: a bent one has no mirror end")
+    elif options.reference != "straight":
+        raise InputError(f"--reference {options.reference}: straight or commonest")
+    segmentation = Segmentation(within_rad=within, merge_rad=float(np.radians(options.merge_deg)))
+    return segment_motion(source, segmentation, reference)
+
+
+def _steps(parts: list[Floats]) -> Floats:
+    """(joins,) largest joint step where one piece ends and the next begins, unblended."""
+    return np.array([np.abs(b[0] - a[-1]).max() for a, b in pairwise(parts)])
+
+
+def _range(values: Floats) -> list[float]:
+    return [round(float(end), 3) for end in (values.min(), values.max())]

@@ -1,0 +1,103 @@
+"""The first posture of a search: the silhouette's skeleton, with the head at either end.
+
+[TH] 3.3.1 takes the displacement of the silhouette's centre from the first frame to the second for
+the direction of the head. A fish at rest has no displacement, and one that backs has the wrong one,
+so the build decides: both orientations are matched, and the better one is kept.
+"""
+
+import cv2
+import numpy as np
+from skimage.morphology import skeletonize
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.controller.animals.fish.model import FishModel
+from snakewalk.controller.animals.fish.postures import midline_angles
+
+_AROUND = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+
+
+def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
+    """Longest path through the skeleton of a mask: (P, 2), x right, y up, ends at the body's rim.
+
+    None where the mask holds no body of 8 pixels length. The mask is reduced to ``size_px`` first.
+    """
+    rows, columns = np.nonzero(mask)
+    if len(rows) < 8:
+        return None
+    top, left = int(rows.min()), int(columns.min())
+    part = mask[top : rows.max() + 1, left : columns.max() + 1].astype(np.uint8) * 255
+    scale = min(1.0, size_px / max(part.shape))
+    shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
+    small = np.pad(cv2.resize(part, shape, interpolation=cv2.INTER_AREA) > 127, 2)
+    bones = np.asarray(
+        skeletonize(cv2.medianBlur(small.astype(np.uint8), 3) > 0),  # type: ignore[no-untyped-call]
+        dtype=np.bool_,
+    )
+    path = _longest_path(bones)
+    if path is None or len(path) < 8:
+        return None
+    depth = cv2.distanceTransform(small.astype(np.uint8), cv2.DIST_L2, 5)
+    points = np.column_stack([path[:, 1], -path[:, 0]]).astype(float)
+    soft = 3
+    smooth = np.stack(
+        [points[max(0, k - soft) : k + soft + 1].mean(axis=0) for k in range(len(points))]
+    )
+    ends = [_beyond(smooth, float(depth[tuple(path[0])])),
+            _beyond(smooth[::-1], float(depth[tuple(path[-1])]))]  # fmt: skip
+    whole = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
+    return np.asarray((whole + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
+
+
+def midline_starts(model: FishModel, midline: Floats) -> list[Floats]:
+    """Parameters (3 + J,) of a midline, base x, y, head, angles, with the head at either end."""
+    found = []
+    for points in (midline, midline[::-1]):
+        head, angles = midline_angles(points, model.joints_at)
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        at = model.joints_at[0] * chord[-1]
+        base = [np.interp(at, chord, points[:, k]) for k in range(2)]
+        found.append(np.array([*base, head, *angles]))
+    return found
+
+
+def _beyond(points: Floats, reach: float) -> Floats:
+    """Where the body ends before the first point."""
+    step = points[0] - points[min(4, len(points) - 1)]
+    return np.asarray(points[0] + step / max(float(np.hypot(*step)), 1e-9) * reach)
+
+
+def _longest_path(bones: Bools) -> Ints | None:
+    """Pixels (P, 2), row and column, of the longest shortest path in any part of the skeleton."""
+    pixels = {(int(r), int(c)) for r, c in np.argwhere(bones)}
+    best: list[tuple[int, int]] = []
+    while pixels:
+        first = next(iter(pixels))
+        reached = _walk(first, pixels)
+        end = reached[-1][0]
+        before = dict(_walk(end, pixels))
+        path: list[tuple[int, int]] = []
+        step: tuple[int, int] | None = list(before)[-1]
+        while step is not None:
+            path.append(step)
+            step = before[step]
+        best = max(best, path, key=len)
+        pixels -= set(before)
+    return np.array(best, dtype=np.int64) if best else None
+
+
+def _walk(
+    start: tuple[int, int], pixels: set[tuple[int, int]]
+) -> list[tuple[tuple[int, int], tuple[int, int] | None]]:
+    """Pixels in the order in which they are reached, each with the one before it."""
+    before: dict[tuple[int, int], tuple[int, int] | None] = {start: None}
+    ring = [start]
+    while ring:
+        further = []
+        for r, c in ring:
+            for dr, dc in _AROUND:
+                there = (r + dr, c + dc)
+                if there in pixels and there not in before:
+                    before[there] = (r, c)
+                    further.append(there)
+        ring = further
+    return list(before.items())

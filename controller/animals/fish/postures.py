@@ -1,0 +1,233 @@
+"""Postures of a fish over time: what matching finds and what segments are cut from."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.archive import read_arrays
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.fish.model import STATIONS, FishModel, pitched, turn_shares
+from snakewalk.controller.track.resample import SEGMENTS, equal_arc_length, tangent_angles
+from snakewalk.controller.track.track import Track
+
+
+@dataclass(frozen=True, slots=True)
+class Postures:
+    """One posture a frame; a frame without a match is NaN throughout."""
+
+    base: Floats
+    """(T, 2) base of the head, x right, y up; body lengths, or m where ``length_m`` is known."""
+    head_rad: Floats
+    """(T,) direction of the head, unwrapped over time."""
+    angles_rad: Floats
+    """(T, J) spine angles A0..; positive: the head side is turned left."""
+    joints_at: tuple[float, ...]
+    """(J,) where on the body they are, in body lengths from the snout."""
+    rate_hz: float
+    """Frames a second."""
+    length_m: float | None = None
+    """Body length; None where the recording has no scale."""
+    height: Floats | None = None
+    """(T,) height of the base, from a side view, in the unit of ``base``."""
+    pitch_rad: Floats | None = None
+    """(T,) how far the head is lifted, from a side view."""
+    value: Floats | None = None
+    """(T,) V of Eq. 3; at most 1 + W."""
+    model: FishModel | None = None
+    """The fish that was matched; None of tracked midlines."""
+    name: str = "fish"
+    source: str = "not stated"
+    licence: str = "not stated"
+
+    @property
+    def frames(self) -> int:
+        """Frames T."""
+        return len(self.head_rad)
+
+    @property
+    def found(self) -> Bools:
+        """(T,) whether there is a posture."""
+        return np.isfinite(self.head_rad)
+
+    @property
+    def length(self) -> float:
+        """Body length in the unit of ``base``."""
+        return 1.0 if self.length_m is None else self.length_m
+
+    def tangents_rad(self) -> Floats:
+        """(T, 100) tangent angles of the skeleton, head first."""
+        return tangents(self.head_rad, self.angles_rad, self.joints_at)
+
+    def points(self) -> Floats:
+        """(T, 101, 2) skeleton in the unit of ``base``."""
+        return skeleton(self.base, self.tangents_rad(), self.joints_at[0], self.length)
+
+    def points_in_space(self) -> Floats:
+        """(T, 101, 3) skeleton with height and pitch; level at 0 where they were not seen."""
+        level = np.zeros(self.frames)
+        pitch = level if self.pitch_rad is None else self.pitch_rad
+        height = level if self.height is None else self.height
+        base = np.column_stack([self.base, height])[:, None]
+        return pitched(self.points() - base[..., :2], self.head_rad, pitch) + base
+
+
+def tangents(head_rad: Floats, angles_rad: Floats, joints_at: tuple[float, ...]) -> Floats:
+    """(T, 100) tangent angles of heads (T,) and spine angles (T, J)."""
+    return np.asarray(head_rad[:, None] - angles_rad @ turn_shares(joints_at, SEGMENTS).T)
+
+
+def skeleton(base: Floats, tangents_rad: Floats, base_at: float, length: float) -> Floats:
+    """(T, 101, 2) points of bodies whose place ``base_at`` along them lies at ``base`` (T, 2)."""
+    step = np.stack([np.cos(tangents_rad), np.sin(tangents_rad)], axis=-1) * (length / SEGMENTS)
+    points = np.zeros((len(base), SEGMENTS + 1, 2))
+    points[:, 1:] = -np.cumsum(step, axis=1)
+    at = base_at * SEGMENTS
+    low = int(at)
+    origin = points[:, low] * (low + 1 - at) + points[:, low + 1] * (at - low)
+    return np.asarray(points + (base - origin)[:, None, :])
+
+
+def fit_angles(tangents_rad: Floats, joints_at: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Head direction (T,) and spine angles (T, J) nearest to tangent angles (T, N)."""
+    turns = turn_shares(joints_at, tangents_rad.shape[1])
+    basis = np.column_stack([np.ones(len(turns)), -turns])
+    found = np.linalg.lstsq(basis, tangents_rad.T, rcond=None)[0]
+    return np.asarray(found[0]), np.asarray(found[1:].T)
+
+
+def postures_of_track(track: Track, joints_at: tuple[float, ...]) -> Postures:
+    """Read postures off tracked midlines: no images needed; frames that are missing are NaN."""
+    head, angles = fit_angles(track.angles_rad, joints_at)
+    at = joints_at[0] * SEGMENTS
+    low = int(at)
+    even = np.stack([equal_arc_length(body) for body in track.points])
+    base = even[:, low] * (low + 1 - at) + even[:, low + 1] * (at - low)
+    frame = np.rint((track.time_s - track.time_s[0]) * track.rate_hz).astype(int)
+    total = int(frame[-1]) + 1
+
+    def spread(values: Floats) -> Floats:
+        out = np.full((total, *values.shape[1:]), np.nan)
+        out[frame] = values
+        return out
+
+    return Postures(
+        base=spread(base),
+        head_rad=spread(head),
+        angles_rad=spread(angles),
+        joints_at=joints_at,
+        rate_hz=track.rate_hz,
+        length_m=track.length_m,
+        name=track.name,
+        source=track.source,
+        licence=track.licence,
+    )
+
+
+def midline_angles(points: Floats, joints_at: tuple[float, ...]) -> tuple[float, Floats]:
+    """Head direction and spine angles (J,) of one midline (P, 2), snout first."""
+    head, angles = fit_angles(tangent_angles(equal_arc_length(points))[None], joints_at)
+    return float(head[0]), angles[0]
+
+
+_POSTURES = {"base", "head_rad", "angles_rad_spine", "joints_at", "rate_hz"}
+_SECTIONS = ("half_width", "half_height")
+
+
+def save_postures(path: Path, postures: Postures) -> None:
+    """Write postures with their skeletons, so that the file is a recording for a run as well."""
+    optional = {
+        key: values
+        for key in ("height", "pitch_rad", "value")
+        if (values := getattr(postures, key)) is not None
+    }
+    if postures.model is not None:
+        names = ("build", "length_px", "fin", *_SECTIONS)
+        optional |= {key: getattr(postures.model, key) for key in names}
+    with path.open("wb") as stream:  # a path would get .npz appended where it ends in .NPZ
+        np.savez_compressed(
+            stream,
+            points=postures.points(),
+            base=postures.base,
+            head_rad=postures.head_rad,
+            angles_rad_spine=postures.angles_rad,
+            joints_at=postures.joints_at,
+            rate_hz=postures.rate_hz,
+            length_m=np.nan if postures.length_m is None else postures.length_m,
+            name=postures.name,
+            source=postures.source,
+            licence=postures.licence,
+            **optional,
+        )
+
+
+def load_postures(path: Path) -> Postures:
+    """Read what ``save_postures`` wrote.
+
+    Raises:
+        InputError: no such file, or not one of ours.
+
+    """
+    try:
+        held, _ = read_arrays(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; snakewalk fish match writes one") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; postures are an .npz") from None
+    except (ValueError, OSError):
+        raise InputError(
+            f"{path}: holds no postures; snakewalk fish match writes them, as .npz"
+        ) from None
+    missing = _POSTURES - held.keys()
+    if missing:
+        raise InputError(
+            f"{path}: lacks {', '.join(sorted(missing))}; postures come from snakewalk fish match"
+        )
+    length_m = float(held.get("length_m", np.array(np.nan)))
+    joints_at = tuple(float(at) for at in held["joints_at"])
+    return Postures(
+        base=held["base"],
+        head_rad=held["head_rad"],
+        angles_rad=held["angles_rad_spine"],
+        joints_at=joints_at,
+        rate_hz=float(held["rate_hz"]),
+        length_m=length_m if np.isfinite(length_m) else None,
+        height=held.get("height"),
+        pitch_rad=held.get("pitch_rad"),
+        value=held.get("value"),
+        model=_model(path, held, joints_at),
+        name=str(held.get("name", path.stem)),
+        source=str(held.get("source", "not stated")),
+        licence=str(held.get("licence", "not stated")),
+    )
+
+
+def holds_postures(path: Path) -> bool:
+    """Whether a file is an .npz of postures, or of a motion made of them."""
+    return _names(path) >= _POSTURES
+
+
+def holds_fish(path: Path) -> bool:
+    """Whether it holds the fish that was matched as well."""
+    return holds_postures(path) and _names(path) >= {*_SECTIONS}
+
+
+def _names(path: Path) -> set[str]:
+    """Names of its arrays; none of what is no .npz."""
+    try:
+        return set() if path.suffix != ".npz" else set(read_arrays(path, ())[1])
+    except (ValueError, OSError):
+        return set()
+
+
+def _model(path: Path, held: dict[str, Any], joints_at: tuple[float, ...]) -> FishModel | None:
+    """The fish that was matched, where the file holds it."""
+    if not held.keys() >= {*_SECTIONS, "build", "length_px"}:
+        return None
+    wide, high = (np.asarray(held[key], float) for key in _SECTIONS)
+    if any(one.shape != (STATIONS,) or not np.isfinite(one).all() for one in (wide, high)):
+        raise InputError(f"{path}: {' and '.join(_SECTIONS)} must be {STATIONS} numbers each")
+    size, fin = float(held["length_px"]), float(held.get("fin", 0.0))
+    return FishModel(size, joints_at, wide, high, str(held["build"]), fin)

@@ -1,0 +1,116 @@
+"""The second camera: height and pitch from the side, given the posture from above, [TH] 3.3.4."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.fish.matching import LEAST_VALUE, SilhouetteFrame, Target
+from snakewalk.controller.animals.fish.model import FishModel
+from snakewalk.controller.animals.fish.pattern_search import pattern_search
+from snakewalk.controller.animals.fish.raster import Window, side_outline
+
+_LIMIT_RAD = 1.2
+
+
+@dataclass(frozen=True, slots=True)
+class SideCamera:
+    """Looks across the tank: its columns run along x of the top view, its rows down."""
+
+    scale: float
+    """Pixels of the side view per pixel of the top view."""
+    offset_px: float
+    """Column of the side view where the top view has column 0."""
+
+
+def align(
+    top: list[SilhouetteFrame], side: list[SilhouetteFrame], name: str = "side film"
+) -> SideCamera:
+    """Fit scale and offset to where the silhouettes begin and end along x in both views.
+
+    Raises:
+        InputError: fewer than two frames show the fish in both views, or it never moves along x
+            nor has a length there.
+
+    """
+    here, there = [], []
+    for above, beside in zip(top, side, strict=True):
+        wide = [np.flatnonzero(frame.mask.any(axis=0)) for frame in (above, beside)]
+        if all(len(columns) for columns in wide):
+            here += [wide[0][0], wide[0][-1]]
+            there += [wide[1][0], wide[1][-1]]
+    if len(here) < 4 or np.ptp(here) < 10:
+        raise InputError(f"{name}: the fish is not seen in both views at the same time")
+    scale, offset = np.polyfit(np.array(here, dtype=float), np.array(there, dtype=float), 1)
+    left = np.array(there, dtype=float) - (scale * np.array(here, dtype=float) + offset)
+    if not 0.05 < scale < 20.0 or float(np.std(left)) > 0.2 * float(np.ptp(there)):
+        raise InputError(
+            f"{name}: the two views do not show the same motion along x; are they of one moment, "
+            "and is the side camera upright?"
+        )
+    return SideCamera(float(scale), float(offset))
+
+
+class SideView:
+    """Searches height and pitch frame by frame, starting from the last ones."""
+
+    def __init__(self, model: FishModel, camera: SideCamera) -> None:
+        self._camera = camera
+        self._model = model.sized(model.length_px * camera.scale)
+        self.last: Floats | None = None
+        """Height and pitch (2,) from which the next search starts; None searches everywhere."""
+
+    def search(self, frame: SilhouetteFrame, parameters: Floats) -> tuple[Floats, float] | None:
+        """Height of the base (px of the side view, up) and pitch (rad), and their V.
+
+        Args:
+            frame: of the side camera.
+            parameters: (3 + J,) the posture from above.
+
+        Returns:
+            None where the side view shows nothing.
+
+        """
+        rows, columns = (np.flatnonzero(frame.mask.any(axis=k)) for k in (1, 0))
+        if len(rows) == 0:
+            self.last = None
+            return None
+        model = self._model
+        scale = min(1.0, 180.0 / model.length_px)
+        edge = max(8, round(0.15 * model.length_px))
+        left, top = max(int(columns[0]) - edge, 0), max(int(rows[0]) - edge, 0)
+        right = min(int(columns[-1]) + edge, frame.mask.shape[1])
+        bottom = min(int(rows[-1]) + edge, frame.mask.shape[0])
+        window = Window(left, top, right - left, bottom - top, scale)
+        target = Target(frame, window, 3)
+
+        def value(at: Floats) -> float:
+            if abs(at[1]) > _LIMIT_RAD:
+                return float("-inf")
+            return target.value_of_pieces(self.pieces(parameters, at))
+
+        middle = -0.5 * float(rows[0] + rows[-1])
+        fresh = [np.array([middle, pitch]) for pitch in (0.0, 0.3, -0.3)]
+        steps = np.array([0.04 * model.length_px, 0.1])
+
+        def best(starts: list[Floats]) -> tuple[Floats, float]:
+            ends = [
+                pattern_search(value, start, steps, halvings=5, evaluations=60) for start in starts
+            ]
+            return max(ends, key=lambda end: end[1])
+
+        found = best(fresh if self.last is None else [self.last])
+        if found[1] < LEAST_VALUE:
+            found = best(fresh)
+        self.last = found[0]
+        return found
+
+    def pieces(self, parameters: Floats, side: Floats) -> list[Floats]:
+        """Convex pieces in pixels of the side view, for a posture and (height, pitch)."""
+        base = np.array(
+            [parameters[0] * self._camera.scale + self._camera.offset_px, 0.0, float(side[0])]
+        )
+        head = float(parameters[2])
+        midline = self._model.midline(base, head, parameters[3:], float(side[1]))
+        return side_outline(self._model, midline, head)

@@ -1,0 +1,69 @@
+"""The body of an animal with legs in a film on the world's ground, and as animated glTF."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.animal import AnimalConfig, SkinConfig
+from snakewalk.config.arrays import Image
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load, locate
+from snakewalk.controller.animals.legged.animal_rig import animal_bones, animal_rig
+from snakewalk.controller.animals.legged.animal_synthesis import SynthesisedAnimal, as_long_robot
+from snakewalk.controller.animals.mesh.body_look import rig_look
+from snakewalk.controller.animals.mesh.body_skin import Cut, shipped_skin
+from snakewalk.controller.animals.mesh.rig import Rig
+from snakewalk.controller.animals.synthesis.synthesis_skin import film_over
+from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.run.walk_run import WalkRun
+
+
+@dataclass(frozen=True, slots=True)
+class AnimalBody:
+    """An animal's parts on its bones, and what they wear."""
+
+    rig: Rig
+    texture: Image | None
+
+    @classmethod
+    def of(cls, animal: AnimalConfig) -> "AnimalBody":
+        """Make the body.
+
+        Raises:
+            InputError: no such skin, or an extra is missing.
+
+        """
+        require_extra("a skin needs", "trimesh", "pygltflib")
+        config = load(locate("skins", animal.skin), SkinConfig)
+        worn = shipped_skin(config, Cut())
+        rig = animal_rig(animal, worn.skin.sized(animal.length_m), config.bands)
+        return cls(rig, worn.texture)
+
+    def write(self, made: SynthesisedAnimal, file: Path) -> None:
+        """Write the animated glTF, ``file`` ends in .glb."""
+        from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415  an extra
+
+        bones = animal_bones(made.animal, made.motion)
+        with atomic_write(file) as part:
+            write_skin(part, self.rig, bones, self.texture, made.animal.name)
+
+    def film(self, made: SynthesisedAnimal, prepared: WalkRun, file: Path) -> int:
+        """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
+
+        Raises:
+            InputError: the simulator or PyAV is not installed, or nothing draws here.
+
+        """
+        way = made.path
+        dots = way.position(np.linspace(0.0, way.length_m, max(2, round(way.length_m / 0.05))))
+        return film_over(
+            prepared,
+            file,
+            animal_bones(made.animal, made.motion),
+            rig_look(self.rig, self.texture),
+            robot=as_long_robot(prepared.robot, made.animal.length_m),
+            reached_s=made.reached_s(),
+            paths=[(0.0, dots)],
+            title=f"{made.animal.name}, {prepared.run.name}",
+        )

@@ -1,0 +1,162 @@
+"""The body of an animal with legs: its skin on the spine, tapered tubes as legs and ornaments.
+
+[KP] 4.1 builds a goat of eleven parts and a lizard of five, each of ellipses across it.
+"""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.animal import AnimalConfig, OrnamentConfig
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion
+from snakewalk.controller.animals.legged.prototype import SEGMENTS
+from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
+from snakewalk.controller.animals.mesh.mesh import Mesh, tube_faces, vertex_normals
+from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
+from snakewalk.controller.animals.mesh.skin import Skin, Weights
+from snakewalk.controller.gaits.wave import TURN
+
+_AROUND = 14
+"""Corners of a ring."""
+_KNEE, _FOOT = 0.75, 0.55
+"""Radii of a leg there over that at the hip."""
+_POINT = 0.15
+"""Radius of an ornament's tip over that of its root."""
+_PLAIN_UV = 0.3, 0.98
+"""A place of the texture beside its bands."""
+_DARK_V = 0.5
+
+
+def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
+    """Hang the parts of an animal on its bones, which are in the order of ``animal_bones``.
+
+    Args:
+        animal: its figures.
+        skin: of the body, of the animal's length.
+        bands: of the skin: dark ornaments wear their colour.
+
+    """
+    length_m = animal.length_m
+    base = spine_rig(skin, np.full(SEGMENTS, length_m / SEGMENTS))
+    parts, rest, parent = [(base.mesh, base.held)], list(base.rest_m), base.parent.tolist()
+
+    def hang(corners: Floats, carrier: int, uv: tuple[float, float]) -> None:
+        """Add a bone with its part."""
+        parts.append(_part(corners, len(rest), uv))
+        rest.append(np.zeros(3))
+        parent.append(carrier)
+
+    for pair in animal.leg_pairs:
+        hip_m, knee_m, foot_m = (length_m * pair.thick * share for share in (1.0, _KNEE, _FOOT))
+        for _ in range(2):
+            upper, lower = length_m * pair.upper, length_m * pair.lower
+            hang(_tube(upper, hip_m, knee_m), _carrier(pair.at), _PLAIN_UV)
+            hang(_tube(lower, knee_m, foot_m), len(rest) - 1, _PLAIN_UV)
+    dark = (1.0 / bands if bands else 0.5), _DARK_V
+    for one in animal.all_ornaments:
+        thick_m = length_m * one.thick
+        cone = _tube(_length_m(one, length_m), thick_m, _POINT * thick_m)
+        uv = dark if one.dark else _PLAIN_UV
+        if one.swing_rad > 0.0:
+            hang(cone, _carrier(one.at), uv)
+        else:
+            root = length_m * np.array(one.root) + [-one.at * length_m, 0.0, skin.axis_m]
+            parts.append(_part(cone @ _turned(one).T + root, _carrier(one.at), uv))
+    return Rig(*_joined(parts), np.array(rest), np.array(parent, dtype=np.int64))
+
+
+def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
+    """Bones over time: those of the spine, two of each leg, one of each ornament that swings."""
+    length_m = animal.length_m
+    front = [motion.spine_m[:, k] for k in range(SEGMENTS)]
+    turns = [
+        _facing(motion.spine_m[:, k] - motion.spine_m[:, k + 1], motion.up) for k in range(SEGMENTS)
+    ]
+    long_m = [length_m / SEGMENTS] * SEGMENTS
+    for k in range(4):
+        pair = animal.leg_pairs[k // 2]
+        hip, knee, end = motion.hip_m[:, k], motion.knee_m[:, k], motion.end_m[:, k]
+        ahead = motion.spine_m[:, 0] - motion.spine_m[:, -1]
+        front += [hip, knee]
+        turns += [_facing(hip - knee, ahead), _facing(knee - end, ahead)]
+        long_m += [length_m * pair.upper, length_m * pair.lower]
+    steps = 2.0 * TURN * motion.time_s / animal.cycle_s
+    for one in animal.all_ornaments:
+        if one.swing_rad > 0.0:
+            k = _carrier(one.at)
+            x, y, z = one.root
+            off = length_m * np.array([x + k / SEGMENTS - one.at, y, z])
+            front.append(front[k] + np.einsum("tij,j->ti", turns[k], off))
+            swing = Rotation.from_euler("y", one.swing_rad * np.sin(steps)[:, None]).as_matrix()
+            turns.append(turns[k] @ swing @ _turned(one))
+            long_m.append(_length_m(one, length_m))
+    return BoneMotion(
+        motion.time_s, np.stack(front, axis=1), np.stack(turns, axis=1), np.array(long_m)
+    )
+
+
+def _length_m(one: OrnamentConfig, body_m: float) -> float:
+    return body_m * float(np.linalg.norm(np.subtract(one.tip, one.root)))
+
+
+def _turned(one: OrnamentConfig) -> Floats:
+    """(3, 3) turn of an ornament in the bone that carries it: its -x is from root to tip."""
+    back = np.subtract(one.root, one.tip)[None]
+    beside = np.array([[0.0, 0.0, 1.0] if abs(back[0, 0]) >= abs(back[0, 2]) else [1.0, 0.0, 0.0]])
+    return np.asarray(_facing(back, beside)[0])
+
+
+def _facing(forward: Floats, up: Floats) -> Floats:
+    """(T, 3, 3) turns whose x is along ``forward`` and whose z is as near to ``up`` as may be."""
+    x = forward / np.linalg.norm(forward, axis=1, keepdims=True)
+    y = np.cross(np.broadcast_to(up, x.shape), x)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def _carrier(at: float) -> int:
+    """Index of the spine's bone at a place along the body."""
+    return min(int(at * SEGMENTS), SEGMENTS - 1)
+
+
+def _tube(long_m: float, thick_m: float, end_m: float) -> Floats:
+    """(V, 3) rings of a tapered tube along -x from 0, round at both ends, then its two tips."""
+    cap = np.array([1.0, 2.0]) * np.pi / 6.0
+    x = [*(thick_m * np.cos(cap)), 0.0, -0.5 * long_m, -long_m, *(-long_m - end_m * np.sin(cap))]
+    middle_m = 0.5 * (thick_m + end_m)
+    radius = [*(thick_m * np.sin(cap)), thick_m, middle_m, end_m, *(end_m * np.cos(cap))]
+    turn = np.arange(_AROUND) * TURN / _AROUND
+    y, z = np.outer(radius, np.cos(turn)), np.outer(radius, np.sin(turn))
+    rings = np.stack([np.repeat(x, _AROUND), y.ravel(), z.ravel()], axis=-1)
+    return np.vstack([rings, [thick_m, 0.0, 0.0], [-long_m - end_m, 0.0, 0.0]])
+
+
+def _part(corners: Floats, bone: int, uv: tuple[float, float]) -> tuple[Mesh, Weights]:
+    count = len(corners)
+    faces = tube_faces((count - 2) // _AROUND, _AROUND)
+    mesh = Mesh(
+        vertices=corners,
+        normals=vertex_normals(corners, faces),
+        uv=np.tile(np.array(uv), (count, 1)),
+        faces=faces,
+    )
+    shares = np.tile([0.0, 1.0, 0.0], (count, 1))
+    return mesh, Weights(np.full((count, 3), bone, dtype=np.int64), shares)
+
+
+def _joined(parts: list[tuple[Mesh, Weights]]) -> tuple[Mesh, Weights]:
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in parts)])
+    faces: list[Ints] = [mesh.faces + at for (mesh, _), at in zip(parts, starts[:-1], strict=True)]
+    meshes, held = zip(*parts, strict=True)
+    return (
+        Mesh(
+            vertices=np.concatenate([mesh.vertices for mesh in meshes]),
+            normals=np.concatenate([mesh.normals for mesh in meshes]),
+            uv=np.concatenate([mesh.uv for mesh in meshes]),
+            faces=np.concatenate(faces),
+        ),
+        Weights(
+            np.concatenate([one.bones for one in held]),
+            np.concatenate([one.shares for one in held]),
+        ),
+    )

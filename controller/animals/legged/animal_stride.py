@@ -1,0 +1,147 @@
+"""A tracked animal with legs, from a file of named keypoints to a file of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.animal import AnimalConfig
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.template import template
+from snakewalk.controller.animals.legged.animal_synthesis import read_animal
+from snakewalk.controller.animals.legged.prototype import LEGS
+from snakewalk.controller.animals.legged.stride import Foot, Stride, measure_stride
+from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypoints
+
+_FEWEST_POINTS = 3
+_HEAD = """An animal by the stride of a tracked one; height, knees and skin are those of {like}.
+  snakewalk synthesise jacksboro-traverse --animal {name}.toml --film
+A line behind # shows a key with its default."""
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Which keypoints are what."""
+
+    spine: tuple[str, ...]
+    """Head first."""
+    girdles: tuple[str, ...]
+    """The two of the spine at the front and the hind legs."""
+    feet: tuple[str, ...]
+    """In the order of ``LEGS``."""
+
+    @classmethod
+    def of(cls, spine: str, girdles: str, feet: str) -> "Names":
+        """Take the words of the command line, A,B,C each.
+
+        Raises:
+            InputError: too few, or girdles that are no points of the spine.
+
+        """
+        parts = [tuple(one.strip() for one in text.split(",")) for text in (spine, girdles, feet)]
+        names = cls(*parts)
+        if len(names.spine) < _FEWEST_POINTS or len(set(names.spine)) < len(names.spine):
+            raise InputError(
+                f"--spine {spine}: expected three names or more, head first, each once"
+            )
+        if len(names.girdles) != 2 or not set(names.girdles) <= set(names.spine):
+            raise InputError(f"--girdles {girdles}: expected two names of the spine: front,hind")
+        if names.spine.index(names.girdles[0]) >= names.spine.index(names.girdles[1]):
+            raise InputError(f"--girdles {girdles}: the front one comes first")
+        if len(names.feet) != len(LEGS) or len({*names.feet, *names.spine}) < 4 + len(names.spine):
+            raise InputError(f"--feet {feet}: expected four other names: {', '.join(LEGS)}")
+        return names
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredAnimal:
+    """A stride, and the animal that moves so."""
+
+    stride: Stride
+    animal: AnimalConfig
+    like: str
+    rate_hz: float
+    rate_assumed: bool
+
+    def text(self) -> str:
+        """Its file."""
+        head = _HEAD.format(like=self.like, name=self.animal.name)
+        return template(self.animal, head)
+
+    def facts(self) -> dict[str, object]:
+        """Plain numbers, for the table and JSON."""
+        found, animal = self.stride, self.animal
+        return {
+            "rate_hz": self.rate_hz,
+            "rate_assumed": self.rate_assumed,
+            "cycles": round(found.cycles, 2),
+            "cycle_s": round(found.cycle_s, 4),
+            "stride_body_lengths": round(found.stride, 4),
+            "speed_m_s": round(animal.speed_m_s, 4),
+            "duty": {leg: round(foot.duty, 3) for leg, foot in self._feet()},
+            "duty_sd": {leg: _rounded(foot.duty_sd) for leg, foot in self._feet()},
+            "comes_down_cycles": {leg: round(foot.down, 3) for leg, foot in self._feet()},
+            "fit_rms_body_lengths": {leg: round(foot.residual, 4) for leg, foot in self._feet()},
+            "girdle_turn_rad": [round(turn, 3) for turn in found.turn_rad],
+        }
+
+    def _feet(self) -> "zip[tuple[str, Foot]]":
+        return zip(LEGS, self.stride.feet, strict=True)
+
+
+def measure_animal(
+    keypoints: Keypoints, names: Names, like: str, name: str, length_m: float | None
+) -> MeasuredAnimal:
+    """Measure the stride of a tracked animal.
+
+    Args:
+        keypoints: all of one animal's, seen from above.
+        names: which of them are what.
+        like: animal whose other figures are taken.
+        name: of the new one.
+        length_m: of the spine; None: by the file's scale, else as long as the other one.
+
+    Raises:
+        InputError: no such keypoint, or no stride can be measured.
+
+    """
+    other = read_animal(like)
+    if length_m is not None and not (np.isfinite(length_m) and length_m > 0.0):
+        raise InputError(f"--length-m {length_m:g}: must be a positive number of metres")
+    order = [_index(keypoints, one) for one in (*names.spine, *names.feet)]
+    places = _even(keypoints, keypoints.sure(order))
+    rate_hz = KEYPOINT_RATE_HZ if keypoints.rate_hz is None else keypoints.rate_hz
+    girdles = names.spine.index(names.girdles[0]), names.spine.index(names.girdles[1])
+    count = len(names.spine)
+    try:
+        found = measure_stride(places[:, :count], places[:, count:], girdles, rate_hz)
+    except InputError as error:
+        raise InputError(f"{keypoints.file}: {error}") from None
+    if length_m is None:
+        scale_m = keypoints.scale_m
+        length_m = other.length_m if scale_m is None else scale_m * found.length
+    source = f"stride: {keypoints.file.name}, {found.cycles:.1f} cycles; the rest: {other.source}"
+    animal = found.of(other, name, source, length_m)
+    return MeasuredAnimal(found, animal, like, rate_hz, keypoints.rate_hz is None)
+
+
+def _index(keypoints: Keypoints, name: str) -> int:
+    nodes: Sequence[str] = keypoints.nodes
+    if name not in nodes:
+        raise InputError(f"{keypoints.file}: it has no {name}; it has {', '.join(nodes)}")
+    return list(nodes).index(name)
+
+
+def _even(keypoints: Keypoints, places: Floats) -> Floats:
+    """Places of every frame from the first to the last, NaN where the file has none."""
+    if keypoints.frame is None:
+        return places
+    at = keypoints.frame - keypoints.frame[0]
+    whole = np.full((int(at[-1]) + 1, *places.shape[1:]), np.nan)
+    whole[at] = places
+    return whole
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, 3) if np.isfinite(value) else None

@@ -1,0 +1,171 @@
+"""The motion of an animal with legs over a world: plan, prototype, transformation ([KP] 4)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.animal import AnimalConfig
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import load, locate, shipped
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion, transformed
+from snakewalk.controller.animals.legged.prototype import LEGS, prototype
+from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.terrain.path import SplinePath
+
+ANIMALS = shipped("animals")
+"""Names of the shipped animals with legs."""
+CYCLE_FRAMES = 24
+"""Least frames of a cycle ([GC] 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisedAnimal:
+    """An animal's motion over a world, and how it came about."""
+
+    animal: AnimalConfig
+    motion: AnimalMotion
+    path: SplinePath
+    rate_hz: float
+    waypoints_m: Floats
+    """(W, 2)"""
+    waypoint_radius_m: float
+    ground: HeightField | None
+
+    def reached_s(self) -> list[float]:
+        """When the middle of the trunk was within the waypoints' radius, in their order."""
+        at, middle = 0, self.middle_m
+        found = []
+        for point in self.waypoints_m:
+            near = np.hypot(*(middle[at:] - point).T) <= self.waypoint_radius_m
+            if not near.any():
+                break
+            at += int(np.argmax(near))
+            found.append(float(self.motion.time_s[at]))
+        return found
+
+    @property
+    def middle_m(self) -> Floats:
+        """(T, 2) of the trunk in plan."""
+        return np.asarray(self.motion.hip_m[..., :2].mean(axis=1))
+
+    @property
+    def complete(self) -> bool:
+        """Whether every waypoint was reached."""
+        return len(self.reached_s()) == len(self.waypoints_m)
+
+    @property
+    def slip_m(self) -> float:
+        """Furthest way of a foot while it stood on the ground."""
+        foot, on = self.motion.foot_m, self.motion.on_ground
+        stays = on[1:] & on[:-1]
+        return float(np.linalg.norm(np.diff(foot, axis=0), axis=-1)[stays].max(initial=0.0))
+
+    def facts(self) -> dict[str, object]:
+        """Plain numbers, for the table and JSON."""
+        animal, motion = self.animal, self.motion
+        spine = motion.spine_m
+        stretch = np.linalg.norm(np.diff(spine, axis=1), axis=-1).sum(axis=1) / animal.length_m
+        low = spine[..., 2]
+        if self.ground is not None:
+            low = low - self.ground.elevation_m(spine[..., 0], spine[..., 1])
+        return {
+            "frames": len(motion.time_s),
+            "seconds": round(float(motion.time_s[-1]), 2),
+            "waypoints": len(self.waypoints_m),
+            "waypoints_reached": len(self.reached_s()),
+            "path_m": round(self.path.length_m, 3),
+            "cycles": round(float(motion.time_s[-1]) / animal.cycle_s, 1),
+            "stride_m": round(animal.stride * animal.length_m, 4),
+            "speed_m_s": round(animal.speed_m_s, 4),
+            "speed_body_lengths_s": round(animal.stride / animal.cycle_s, 4),
+            "steepest_deg": round(float(np.degrees(np.arccos(motion.up[:, 2].min()))), 1),
+            "slip_most_m": round(self.slip_m, 9),
+            "leg_short_most_m": round(
+                float(np.linalg.norm(motion.end_m - motion.foot_m, axis=-1).max()), 6
+            ),
+            "spine_stretch_most": round(float(np.abs(stretch - 1.0).max()), 4),
+            "axis_over_ground_least_m": round(float(low.min()), 4),
+        }
+
+    def save(self, file: Path, name: str) -> None:
+        """Write a track of the spine, and the legs beside it.
+
+        ``points`` (T, S + 1, 2) and ``height_m`` (T, S + 1) are the spine, head first; ``hip_m``,
+        ``knee_m`` and ``foot_m`` (T, 4, 3), in the order of ``legs``; ``on_ground`` (T, 4).
+        """
+        motion = self.motion
+        np.savez_compressed(
+            file,
+            points=motion.spine_m[..., :2],
+            rate_hz=self.rate_hz,
+            length_m=self.animal.length_m,
+            name=name,
+            source=f"snakewalk synthesise of {self.animal.name}: {self.animal.source}",
+            licence="made by snakewalk synthesise",
+            height_m=motion.spine_m[..., 2],
+            legs=np.array(LEGS),
+            hip_m=motion.hip_m,
+            knee_m=motion.knee_m,
+            foot_m=motion.end_m,
+            on_ground=motion.on_ground,
+        )
+
+
+def read_animal(name: str) -> AnimalConfig:
+    """Read a shipped animal, or a file of one's own.
+
+    Raises:
+        InputError: no such animal, or a fault in its file.
+
+    """
+    if name not in ANIMALS and not name.endswith(".toml"):
+        raise InputError(
+            f"--animal {name}: no such animal; shipped are {', '.join(ANIMALS)}; "
+            "a file of your own ends in .toml"
+        )
+    file = locate("animals", name)
+    animal = load(file, AnimalConfig)
+    if animal.skin.endswith(".toml"):
+        beside = str(locate("skins", animal.skin, file.parent))
+        return animal.model_copy(update={"skin": beside})
+    return animal
+
+
+def synthesise_animal(
+    prepared: WalkRun, animal: AnimalConfig, frames: int | None = None
+) -> SynthesisedAnimal:
+    """Lead an animal along a run's path until its trunk is at the end, or exactly so many frames.
+
+    Raises:
+        InputError: the path bends more sharply than the animal is wide.
+
+    """
+    run, path = prepared.run, prepared.path
+    rate_hz = max(run.synthesis.rate_hz, CYCLE_FRAMES / animal.cycle_s)
+    if frames is None:
+        front, hind = (pair.at for pair in animal.leg_pairs)
+        way_m = path.length_m + 0.5 * animal.length_m * (front + hind)
+        frames = 1 + int(np.ceil(min(way_m / animal.speed_m_s, run.time_limit_s) * rate_hz))
+    made = prototype(animal, np.arange(frames) / rate_hz)
+    motion = transformed(made, animal, path, prepared.ground)
+    return SynthesisedAnimal(
+        animal,
+        motion,
+        path,
+        rate_hz,
+        np.array(run.waypoints_m),
+        run.waypoint_radius_m,
+        prepared.ground,
+    )
+
+
+def as_long_robot(robot: RobotConfig, length_m: float) -> RobotConfig:
+    """Size a robot for a film, whose camera and shade look at a length and a thickness."""
+    link_m = length_m / robot.link_count
+    plain = {"joints": (), "links": (), "limbs": (), "body_profile": None}
+    thick_m = robot.body_radius_m * length_m / robot.length_m
+    return robot.model_copy(update=plain | {"link_length_m": link_m, "body_radius_m": thick_m})

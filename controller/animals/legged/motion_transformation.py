@@ -1,0 +1,163 @@
+"""The prototype bent along a path and stood on the ground ([KP] 4.4).
+
+What the prototype has at x along its line stands on the path's normal at arc length x, as far to
+the left as it stood there. A foot on the ground so stays where it is on any path. The body is then
+turned to stand upright on the plane that fits the ground below it; the feet stand on the ground
+itself, where the paper leaves them on that plane, and the legs reach for them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.animal import AnimalConfig
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.animals.legged.leg import knees_m
+from snakewalk.controller.animals.legged.prototype import Prototype
+from snakewalk.controller.terrain.path import SplinePath
+
+_KNOT_M = 0.03
+"""Between the knots of the smooth curve: a path is tabulated every centimetre."""
+
+
+@dataclass(frozen=True, slots=True)
+class AnimalMotion:
+    """An animal on the ground of a world: T frames, m."""
+
+    time_s: Floats
+    """(T,)"""
+    spine_m: Floats
+    """(T, S + 1, 3) head first."""
+    hip_m: Floats
+    """(T, 4, 3) front left, front right, hind left, hind right."""
+    knee_m: Floats
+    """(T, 4, 3)"""
+    foot_m: Floats
+    """(T, 4, 3) where the feet should be."""
+    end_m: Floats
+    """(T, 4, 3) where the legs end: at the feet, if they reach."""
+    up: Floats
+    """(T, 3) normal of the local ground plane."""
+    on_ground: Bools
+    """(T, 4)"""
+
+
+class PathNormals:
+    """A path as a smooth curve with normals; before and after its ends it goes on straight."""
+
+    def __init__(self, path: SplinePath) -> None:
+        self.length_m = path.length_m
+        knots = np.linspace(0.0, path.length_m, max(4, round(path.length_m / _KNOT_M) + 1))
+        self._curve = CubicSpline(knots, path.position(knots))
+        self._slope, self._bend = self._curve.derivative(), self._curve.derivative(2)
+
+    def bent(self, points: Floats) -> Floats:
+        """Points (..., 3) of a line on the path: (..., 3), z as it was.
+
+        Raises:
+            InputError: a point is further beside the path than the path's centre of curvature.
+
+        """
+        s, beside = points[..., 0], points[..., 1]
+        on = np.clip(s, 0.0, self.length_m)
+        slope, bend = self._slope(on), self._bend(on)
+        speed = np.hypot(slope[..., 0], slope[..., 1])
+        forward = slope / speed[..., None]
+        curvature = (slope[..., 0] * bend[..., 1] - slope[..., 1] * bend[..., 0]) / speed**3
+        inside = (on == s) & (beside * curvature >= 1.0)
+        if inside.any():
+            worst = int(np.argmax(np.where(inside, beside * curvature, 0.0)))
+            raise InputError(
+                f"the path bends by a radius of {1.0 / abs(curvature.ravel()[worst]):.3f} m after "
+                f"{on.ravel()[worst]:.2f} m, and a foot stands {abs(beside.ravel()[worst]):.3f} m "
+                "beside it: take a smaller animal (length_m), or move the waypoints"
+            )
+        left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
+        plan = self._curve(on) + (s - on)[..., None] * forward + beside[..., None] * left
+        return np.concatenate([plan, points[..., 2:]], axis=-1)
+
+
+def transformed(
+    made: Prototype, animal: AnimalConfig, path: SplinePath, ground: HeightField | None
+) -> AnimalMotion:
+    """Bend a prototype along a path and stand it on the ground; None is a level floor.
+
+    Raises:
+        InputError: the path bends more sharply than the animal is wide.
+
+    """
+    normals = PathNormals(path)
+    spine, hip, foot = (normals.bent(p) for p in (made.spine_m, made.hip_m, made.foot_m))
+    foot[..., 2] += _elevation_m(ground, foot)
+    below = np.concatenate([spine[..., :2], foot[..., :2]], axis=1)
+    middle, height_m, up = local_planes(below, _elevation_m(ground, below))
+    turn = _upright(up)
+    centre = np.concatenate([middle, np.zeros((len(middle), 1))], axis=-1)
+    base = np.concatenate([middle, height_m[:, None]], axis=-1)
+
+    def stood(points: Floats) -> Floats:
+        turned = np.einsum("tij,tkj->tki", turn, points - centre[:, None])
+        return np.asarray(turned + base[:, None])
+
+    spine, hip = stood(spine), stood(hip)
+    length_m = animal.length_m
+    pairs = [pair for pair in animal.leg_pairs for _ in range(2)]
+    upper, lower = (
+        np.array([length_m * part for part in parts])
+        for parts in zip(*((pair.upper, pair.lower) for pair in pairs), strict=True)
+    )
+    forward = spine[:, 0] - spine[:, -1]
+    knee, end = knees_m(hip, foot, upper, lower, _towards(animal, hip, forward, up))
+    return AnimalMotion(made.time_s, spine, hip, knee, foot, end, up, made.on_ground)
+
+
+def local_planes(plan_m: Floats, height_m: Floats) -> tuple[Floats, Floats, Floats]:
+    """Least-squares planes under bodies.
+
+    Args:
+        plan_m: (T, K, 2) places.
+        height_m: (T, K) of the ground there.
+
+    Returns:
+        middles (T, 2) of the places, heights (T,) of the planes there, upward normals (T, 3).
+
+    """
+    middle, level = plan_m.mean(axis=1), height_m.mean(axis=1)
+    off, rise = plan_m - middle[:, None], height_m - level[:, None]
+    xx, xy, yy = ((off[..., a] * off[..., b]).sum(axis=1) for a, b in ((0, 0), (0, 1), (1, 1)))
+    zx, zy = ((off[..., a] * rise).sum(axis=1) for a in (0, 1))
+    determinant = xx * yy - xy * xy
+    gx, gy = (zx * yy - zy * xy) / determinant, (zy * xx - zx * xy) / determinant
+    normal = np.stack([-gx, -gy, np.ones_like(gx)], axis=-1)
+    return middle, level, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def _upright(up: Floats) -> Floats:
+    """(T, 3, 3) least turns that take z to unit vectors (T, 3)."""
+    axis = np.stack([-up[:, 1], up[:, 0], np.zeros(len(up))], axis=-1)
+    sine = np.linalg.norm(axis, axis=1, keepdims=True)
+    angle = np.arctan2(sine, up[:, 2:])
+    return Rotation.from_rotvec(axis * (angle / np.maximum(sine, 1e-12))).as_matrix()
+
+
+def _towards(animal: AnimalConfig, hip_m: Floats, forward: Floats, up: Floats) -> Floats:
+    """(T, 4, 3) where knees point."""
+    left = np.cross(up, forward)
+    left /= np.linalg.norm(left, axis=-1, keepdims=True)
+    ahead = np.cross(left, up)
+    found = np.empty_like(hip_m)
+    for k in range(4):
+        side = 1.0 if k % 2 == 0 else -1.0
+        ways = {"out": up + side * left, "ahead": ahead, "behind": -ahead}
+        found[:, k] = ways[animal.leg_pairs[k // 2].knee]
+    return found
+
+
+def _elevation_m(ground: HeightField | None, points_m: Floats) -> Floats:
+    if ground is None:
+        return np.zeros(points_m.shape[:-1])
+    return ground.elevation_m(points_m[..., 0], points_m[..., 1])

@@ -1,0 +1,100 @@
+"""The body in a film by name: servos, the captured animal, or any skin of ``snakewalk body``."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Image
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.world import Water
+from snakewalk.controller.runlog.record import Header
+
+if TYPE_CHECKING:
+    from snakewalk.controller.animals.mesh.rig import Rig
+    from snakewalk.sim.rendering.looks import SkinLook
+
+SERVOS: Final = "servos"
+ANIMAL: Final = "animal"
+_PLAIN = "snake"
+"""The animal of a run whose recording holds no widths."""
+
+
+def check_look(look: str) -> None:
+    """Refuse a look that cannot be made, before a run.
+
+    Raises:
+        InputError: no such skin, or an extra is missing.
+
+    """
+    if look == SERVOS:
+        return
+    require_extra("a skin needs", "trimesh")
+    if look != ANIMAL:
+        from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415  an extra
+
+        body_skin(look)
+
+
+def skin_look(look: str, header: Header) -> "SkinLook | None":
+    """Make the skin of a run's film; None is a capsule a link.
+
+    Args:
+        look: ``servos``; ``animal``, which is the run's own recording where it holds widths, else a
+            plain snake; or what ``body_skin`` takes.
+        header: of the run.
+
+    Raises:
+        InputError: no such skin, or an extra is missing.
+
+    """
+    if look == SERVOS:
+        return None
+    require_extra("a skin needs", "trimesh", "mujoco")
+    from snakewalk.controller.animals.mesh.body_motion import robot_skin  # noqa: PLC0415  an extra
+    from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415
+    from snakewalk.controller.animals.mesh.rig import spine_rig  # noqa: PLC0415
+
+    dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
+    robot = header.robot
+    skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, Water))
+    rig = spine_rig(skin, np.array(robot.link_lengths_m))
+    origins = rig.rest_m.copy()  # a body begins at its joint, the head's amidst
+    origins[0, 0] -= 0.5 * robot.link_lengths_m[0]
+    return rig_look(replace(rig, rest_m=origins), dressed.texture, free=False)
+
+
+def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLook":
+    """Make the look of a rig.
+
+    Args:
+        rig: its size is the motion's.
+        texture: what it wears; None is one colour.
+        free: whether its bones float, for a motion that no robot makes.
+
+    """
+    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415  an extra
+
+    return SkinLook(
+        vertices_m=rig.mesh.vertices,
+        uv=rig.mesh.uv,
+        faces=rig.mesh.faces,
+        link=rig.held.bones,
+        share=rig.held.shares,
+        rest_m=rig.rest_m,
+        texture=texture,
+        free=free,
+    )
+
+
+def animal(track: str) -> str:
+    """Name of the body that a motion was captured from: the recording's, or a plain snake."""
+    from snakewalk.controller.animals.mesh.body_model import read_silhouettes  # noqa: PLC0415
+
+    try:
+        read_silhouettes(Path(track))
+    except InputError:
+        return _PLAIN
+    return track

@@ -1,0 +1,38 @@
+"""The rig: a mesh, the bones that carry its corners, and where they are at rest."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
+from snakewalk.controller.animals.mesh.mesh import Mesh
+from snakewalk.controller.animals.mesh.skin import Skin, Weights, rest_fronts_m, weights
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """K bones; at rest each lies along -x from its front, turned by nothing."""
+
+    mesh: Mesh
+    held: Weights
+    """Of its corners."""
+    rest_m: Floats
+    """(K, 3) fronts of the bones at rest."""
+    parent: Ints
+    """(K,) the bone that carries each one, before it in order; -1 none."""
+
+
+def spine_rig(skin: Skin, bone_m: Floats) -> Rig:
+    """Hang a skin on a spine's bones of lengths (K,), each carried by the one before."""
+    rest_m = rest_fronts_m(bone_m, skin.axis_m)
+    return Rig(skin.mesh, weights(skin, bone_m), rest_m, np.arange(len(bone_m)) - 1)
+
+
+def posed_m(rig: Rig, motion: BoneMotion, frame: int) -> Floats:
+    """(V, 3) corners in one frame of a motion of the same bones."""
+    held = rig.held
+    local = rig.mesh.vertices[:, None] - rig.rest_m[held.bones]
+    turned = np.einsum("vkij,vkj->vki", motion.rotation[frame][held.bones], local)
+    placed = turned + motion.front_m[frame][held.bones]
+    return np.asarray((held.shares[..., None] * placed).sum(axis=1))

@@ -1,0 +1,84 @@
+"""The skin's picture: the body in an image, unrolled to a strip along the skeleton ([PT] 2.2)."""
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.controller.track.resample import SEGMENTS, equal_arc_length
+
+ALONG, ACROSS = 512, 64
+"""Pixels of the strip."""
+_EYE_RGB = (0.05, 0.05, 0.05)
+_MIXED_PX = 0.75  # at the boundary pixels are partly background
+
+
+def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
+    """Sample an image (H, W) or (H, W, 3) across the body.
+
+    Args:
+        image: grey or colour.
+        points_px: (P, 2) skeleton in it, x and y with rows downwards, head first; whole numbers are
+            centres of pixels.
+        radius_px: (P,) distances to the boundary.
+
+    Returns:
+        (64, 512, 3): head at the left, the body's left side in the first row.
+
+    Raises:
+        ValueError: fewer than 4 distinct points.
+
+    """
+    colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
+    chord = np.hypot(*np.diff(points_px, axis=0).T)
+    arc = np.concatenate([[0.0], np.cumsum(chord)])
+    even = equal_arc_length(points_px, SEGMENTS)
+    at = np.linspace(0.0, 1.0, ALONG)
+    along = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    centre = np.stack([np.interp(at, along, even[:, k]) for k in range(2)], axis=-1)
+    radius = np.interp(at, arc / arc[-1], radius_px)
+    radius = np.maximum(radius - _MIXED_PX, 0.5 * radius)
+    forward = -np.gradient(centre, axis=0)
+    forward /= np.hypot(*forward.T)[:, None]
+    left = np.stack([forward[:, 1], -forward[:, 0]], axis=-1)  # rows count down
+    side = np.linspace(1.0, -1.0, ACROSS)
+    place = centre[None] + (side[:, None] * radius)[..., None] * left[None]
+    at_px = [place[..., 1], place[..., 0]]
+    channels = [
+        map_coordinates(colour[..., k].astype(float), at_px, order=1, mode="nearest")
+        for k in range(3)
+    ]
+    return np.asarray(np.clip(np.rint(np.stack(channels, axis=-1)), 0, 255), dtype=np.uint8)
+
+
+def painted(
+    back_rgb: tuple[float, float, float],
+    band_rgb: tuple[float, float, float],
+    bands: int,
+    eye_at: float,
+    eye_radius: tuple[float, float],
+) -> Image:
+    """Paint a strip for a body of which there is no picture: bands across, and an eye a side.
+
+    Args:
+        back_rgb: colour, 0 to 1.
+        band_rgb: of the bands, which are broadest over the back.
+        bands: how many from head to tail.
+        eye_at: place of the eyes along the body, 0 to 1.
+        eye_radius: of an eye, over the body's length and over the half height of the body there.
+
+    Returns:
+        (256, 1024, 3), laid out as that of ``unroll``; finer, for the eyes.
+
+    """
+    u = (np.arange(2 * ALONG) + 0.5) / (2 * ALONG)
+    across = np.linspace(1.0, -1.0, 4 * ACROSS)[
+        :, None
+    ]  # cosine of the angle around: 1 is the left
+    wave = np.cos(2.0 * np.pi * bands * u) - 0.3 - 0.9 * across**2
+    share = np.clip(0.5 + 2.0 * wave, 0.0, 1.0)[..., None] if bands else np.zeros((1, 1, 1))
+    strip = (1.0 - share) * np.array(back_rgb) + share * np.array(band_rgb)
+    strip = np.broadcast_to(strip, (len(across), len(u), 3)).copy()
+    height = np.sqrt(1.0 - across**2)
+    eye = ((u - eye_at) / eye_radius[0]) ** 2 + (height / eye_radius[1]) ** 2 <= 1.0
+    strip[eye] = _EYE_RGB
+    return np.asarray(np.rint(255.0 * strip), dtype=np.uint8)

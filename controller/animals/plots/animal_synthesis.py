@@ -1,0 +1,119 @@
+"""A synthesised animal with legs: its way and footfalls, contacts over a few cycles, its height."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.animals.legged.animal_synthesis import SynthesisedAnimal
+from snakewalk.controller.animals.legged.prototype import LEGS
+from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.figures.path import draw_ground
+from snakewalk.controller.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    PURPLE,
+    SKY,
+    WIDTH_IN,
+    legend_above,
+    save_picture,
+    style,
+)
+
+_MARGIN_M = 0.3
+_CYCLES = 4
+_BODIES = 9
+_LEG_COLOURS = BLUE, SKY, PURPLE, AMBER
+
+
+def draw_animal(made: SynthesisedAnimal, file: Path, title: str) -> None:
+    """Draw the motion to ``file``.
+
+    Raises:
+        InputError: an ending that is no picture's.
+
+    """
+    check_picture(file)
+    plan = np.concatenate([made.motion.spine_m[..., :2].reshape(-1, 2), made.waypoints_m])
+    low, high = plan.min(axis=0) - _MARGIN_M, plan.max(axis=0) + _MARGIN_M
+    map_in = float(np.clip(0.9 * WIDTH_IN * (high - low)[1] / (high - low)[0], 2.6, 6.0))
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, map_in + 4.0), layout="constrained", dpi=80)
+        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 4.0])[:, 0]
+        axes = upper.subplots(1, 1)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        _map(axes, made, title)
+        chart, height = lower.subplots(2, 1, height_ratios=[1.0, 1.3])
+        _contacts(chart, made)
+        _heights(height, made)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        save_picture(figure, file)
+
+
+def _map(axes: Axes, made: SynthesisedAnimal, title: str) -> None:
+    """Path, bodies, and where each foot came down."""
+    if made.ground is not None:
+        draw_ground(axes, made.ground)
+    axes.set_aspect("equal")
+    way = made.path.position(np.linspace(0.0, made.path.length_m, 400))
+    axes.plot(*way.T, color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="planned path")
+    motion = made.motion
+    for k, (leg, colour) in enumerate(zip(LEGS, _LEG_COLOURS, strict=True)):
+        down = np.flatnonzero(np.diff(motion.on_ground[:, k].astype(int)) == 1) + 1
+        axes.plot(
+            *motion.foot_m[down, k, :2].T, ".", color=colour, markersize=4.0, label=f"{leg} foot"
+        )
+    for frame in np.linspace(0, len(motion.time_s) - 1, _BODIES).astype(int):
+        _body(axes, made, int(frame))
+    for number, point in enumerate(made.waypoints_m, start=1):
+        axes.add_patch(Circle(tuple(point), made.waypoint_radius_m, fill=False, color=GREEN))
+        axes.annotate(str(number), tuple(point), color=GREEN, fontweight="bold")
+    axes.set_title(title, pad=24.0)
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    legend_above(axes, 5)
+
+
+def _body(axes: Axes, made: SynthesisedAnimal, frame: int) -> None:
+    motion = made.motion
+    axes.plot(*motion.spine_m[frame, :, :2].T, color=INK, linewidth=2.0)
+    for k in range(len(LEGS)):
+        leg = np.stack([motion.hip_m[frame, k], motion.knee_m[frame, k], motion.end_m[frame, k]])
+        axes.plot(*leg[:, :2].T, color=INK, linewidth=1.0)
+
+
+def _contacts(axes: Axes, made: SynthesisedAnimal) -> None:
+    """[KP] Fig. 13 (b): which feet are on the ground."""
+    motion, cycle_s = made.motion, made.animal.cycle_s
+    shown = motion.time_s <= _CYCLES * cycle_s
+    cycles = motion.time_s[shown] / cycle_s
+    for k, colour in enumerate(_LEG_COLOURS):
+        row = np.where(motion.on_ground[shown, k], float(k), np.nan)
+        axes.plot(cycles, row, color=colour, linewidth=7.0, solid_capstyle="butt")
+    axes.set_yticks(range(len(LEGS)), LEGS)
+    axes.set_ylim(len(LEGS) - 0.4, -0.6)
+    axes.set_title("on the ground")
+    axes.set_xlabel("cycles")
+
+
+def _heights(axes: Axes, made: SynthesisedAnimal) -> None:
+    """Ground and body along the way."""
+    motion = made.motion
+    middle = made.middle_m
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))])
+    ground: Floats = np.zeros(len(middle))
+    if made.ground is not None:
+        ground = made.ground.elevation_m(*middle.T)
+    axes.fill_between(along, ground, ground.min() - 0.02, color=GREY, alpha=0.35, linewidth=0)
+    axes.plot(along, motion.hip_m[..., 2].mean(axis=1), color=BLUE, label="hips, mean")
+    axes.plot(along, ground, color=INK, linewidth=1.0, label="ground below them")
+    axes.set_xlabel("way of the trunk (m)")
+    axes.set_ylabel("height (m)")
+    legend_above(axes, 2)

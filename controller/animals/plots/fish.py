@@ -1,0 +1,100 @@
+"""What matching found: the model over frames of the film, and the spine angles over time."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from snakewalk.controller.animals.fish.match_film import FilmMatch
+from snakewalk.controller.animals.fish.postures import Postures
+from snakewalk.controller.animals.fish.silhouettes import grey
+from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    INK,
+    PURPLE,
+    RED,
+    SKY,
+    save_picture,
+    style,
+)
+from snakewalk.controller.images.video import open_footage
+
+_SHOWN = 6
+_LINES = (BLUE, AMBER, GREEN, RED, PURPLE, SKY, INK, "#999933")
+
+
+def draw_match(
+    file: Path,
+    found: Postures,
+    known: Postures | None,
+    matched: FilmMatch | None,
+    footage: Path,
+) -> None:
+    """Draw frames with the model's outline (of a film), and spine angles, dotted where known.
+
+    Raises:
+        InputError: an ending that is no picture's.
+
+    """
+    check_picture(file)
+    with style():
+        tall = 1.2 + (1.15 if found.angles_rad.shape[1] < 6 else 0.8) * found.angles_rad.shape[1]
+        figure = Figure(
+            figsize=(9.6, tall + (2.9 if matched else 0.0)), layout="constrained", dpi=96
+        )
+        if matched is None:
+            bottom = figure
+        else:
+            top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=[2.9, tall])[:, 0]
+            panels = top.subplots(2, _SHOWN // 2, squeeze=False).ravel()
+            _frames(list(panels), matched, footage)
+        rows = bottom.subplots(
+            found.angles_rad.shape[1], 1, sharex=True, sharey=True, squeeze=False
+        )
+        _angles(list(rows[:, 0]), found, known)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        save_picture(figure, file)
+
+
+def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
+    """Crop frames to the fish; outline, spine, base of the head."""
+    known = np.flatnonzero(np.isfinite(matched.parameters[:, 2]))
+    shown = known[np.linspace(0, len(known) - 1, min(len(panels), len(known))).astype(int)]
+    model, wanted = matched.model, set(shown.tolist())
+    reach = 0.7 * model.length_px
+    images = ((k, image) for k, image in enumerate(open_footage(footage).shown()) if k in wanted)
+    for axes, (k, image) in zip(panels, images, strict=False):
+        at = matched.parameters[k]
+        spine = model.midline(at[:2], float(at[2]), at[3:])
+        outline = model.outline(spine)
+        middle = spine[:, :2].mean(axis=0)
+        axes.imshow(grey(image), cmap="gray", vmin=0, vmax=255)
+        axes.fill(outline[:, 0], -outline[:, 1], fill=False, edgecolor=AMBER, linewidth=1.1)
+        axes.plot(spine[:, 0], -spine[:, 1], color=SKY, linewidth=1.0)
+        axes.plot(at[0], -at[1], "o", color=RED, markersize=3.5)
+        axes.set_xlim(middle[0] - reach, middle[0] + reach)
+        axes.set_ylim(-middle[1] + 0.5 * reach, -middle[1] - 0.5 * reach)
+        axes.set_title(f"frame {k}")
+        axes.set_axis_off()
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
+
+
+def _angles(rows: list[Axes], found: Postures, known: Postures | None) -> None:
+    time = np.arange(found.frames) / found.rate_hz
+    for k, axes in enumerate(rows):
+        if known is not None:
+            axes.plot(
+                time, np.degrees(known.angles_rad[:, k]), color=INK, linewidth=2.6, alpha=0.28
+            )
+        colour = _LINES[k % len(_LINES)]
+        axes.plot(time, np.degrees(found.angles_rad[:, k]), color=colour, linewidth=1.2)
+        axes.set_ylabel(f"A{k} (deg)")
+    rows[0].set_title(
+        "spine angles" + (": matched (line) over known (grey band)" if known is not None else "")
+    )
+    rows[-1].set_xlabel("time (s)")

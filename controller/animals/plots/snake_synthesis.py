@@ -1,0 +1,157 @@
+"""A synthesised motion as [PT] shows it: trajectory, distance to the target, speed, states."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk
+from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.figures.path import draw_ground
+from snakewalk.controller.figures.style import (
+    AMBER,
+    ANGLES,
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    PURPLE,
+    RED,
+    SKY,
+    WIDTH_IN,
+    legend_above,
+    save_picture,
+    style,
+)
+
+_BODY_SPACING = 1.15
+"""Body lengths between the bodies drawn."""
+_MARGIN_M = 0.4
+
+
+def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, title: str) -> None:
+    """Draw a synthesis ([PT] Fig. 10 and 11) to ``file``.
+
+    Raises:
+        InputError: an ending that is no picture's.
+
+    """
+    check_picture(file)
+    low, high = _extent(made)
+    wide, tall = high - low
+    map_in = float(np.clip(0.9 * WIDTH_IN * tall / wide, 2.6, 6.0))
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, map_in + 5.6), layout="constrained", dpi=80)
+        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 5.6])[:, 0]
+        axes = upper.subplots(1, 1)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        _map(axes, made, ground, title)
+        _over_time(lower.subplots(3, 2, sharex=True).T.ravel(), made)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        save_picture(figure, file)
+
+
+def _extent(made: SynthesisedWalk) -> tuple[Floats, Floats]:
+    """Corners (2,) of what is drawn in plan."""
+    ends = made.path.position(np.linspace(0.0, made.path.length_m, 400))
+    points = np.concatenate([made.skeleton.points_m[..., :2].reshape(-1, 2), ends])
+    return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
+
+
+def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: str) -> None:
+    """Path, targets, sampled skeletons and the track of the mass centre."""
+    points = made.skeleton.points_m[..., :2]
+    centre = points.mean(axis=1)
+    targets = made.targets
+    way = made.path.position(np.linspace(0.0, made.path.length_m, 400))
+    axes.plot(*way.T, color=INK, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
+    axes.plot(*centre.T, color=BLUE, linewidth=1.6, label="mass centre")
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centre, axis=0).T))])
+    length_m = float(np.hypot(*np.diff(points[0], axis=0).T).sum())
+    marks = np.arange(0.0, along[-1], _BODY_SPACING * length_m)
+    some = np.unique(np.append(np.searchsorted(along, marks), len(points) - 1))
+    bodies = LineCollection(
+        list(points[some]), cmap="viridis_r", linewidths=2.6, capstyle="round", zorder=3
+    )
+    bodies.set_array(some / made.rate_hz)
+    axes.add_collection(bodies)
+    axes.plot(*points[some, 0].T, "o", color=INK, markersize=3.5, zorder=4)
+    between = targets.points_m[~targets.required]
+    axes.plot(*between.T, ".", color=GREY, markersize=5, label="targets between")
+    number = np.cumsum(targets.required)
+    for k in np.flatnonzero(targets.required):
+        colour = GREEN if k < targets.index else RED
+        x, y = targets.points_m[k]
+        ring = Circle((x, y), targets.radius_m, fill=False, edgecolor=colour, linewidth=1.6)
+        axes.add_patch(ring)
+        axes.text(x, y, str(number[k]), color=colour, ha="center", va="center", weight="bold")
+    if ground is not None:
+        x, y = axes.get_xlim(), axes.get_ylim()
+        draw_ground(axes, ground)
+        axes.set_xlim(x)
+        axes.set_ylim(y)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m); bodies darker with time, dots are heads")
+    axes.set_ylabel("y (m)")
+    legend_above(axes)
+    axes.set_title(title)
+
+
+def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
+    """Distance, speed and bends, states; angles, behaviour, tongue."""
+    distance, speed, states, angles, behaviour, tongue = panels
+    time, targets = made.time_s, made.targets
+    end = len(targets.distance_m)
+    current = np.minimum(targets.current, targets.count - 1)
+    passed = np.flatnonzero(np.diff(current, prepend=current[0]))
+    for axes in (distance, speed, states):
+        for k in passed:
+            if targets.required[max(current[k] - 1, 0)]:
+                axes.axvline(time[k], color=GREEN, linewidth=0.8, alpha=0.6)
+    distance.plot(time[:end], targets.distance_m, color=INK)
+    distance.axhline(targets.radius_m, color=GREY, linewidth=0.8, linestyle="--")
+    distance.set_ylim(bottom=0.0)
+    distance.set_title("mass centre to target, m (dashed: reached)")
+    speed.plot(time, made.plan.speed_m_s, color=BLUE)
+    speed.set_ylim(bottom=0.0)
+    speed.set_title("speed, m/s; bends K, rad (dotted)")
+    bends = speed.twinx()
+    bends.plot(time, made.plan.angles_rad.std(axis=1), color=AMBER, linestyle=":")
+    bends.set_ylim(bottom=0.0)
+    bends.grid(visible=False)
+    at, state = np.array(made.states).T
+    shown = np.append(state, state[-1])
+    states.step(np.append(time[at], time[-1]), shown, color=PURPLE, where="post", linewidth=1.0)
+    states.plot(time[at], state, "o", color=PURPLE, markersize=3)
+    states.set_title(f"state, {len(set(state))} of {len(made.library.shapes_rad)} taken")
+    states.set_xlabel("s")
+    swing = made.plan.angles_rad - made.plan.angles_rad.mean(axis=1, keepdims=True)
+    most = float(np.abs(swing).max())
+    angles.imshow(
+        swing[:: max(1, len(time) // 600)].T, aspect="auto", cmap=ANGLES, vmin=-most, vmax=most,
+        extent=(0.0, float(time[-1]), 1.0, 0.0),
+    )  # fmt: skip
+    angles.grid(visible=False)
+    angles.set_yticks([0.0, 1.0], ["head", "tail"])
+    angles.set_title(f"angles about the mean heading, to {most:.1f} rad")
+    behaviour.plot(time, made.sliding.mean(axis=1), color=RED, label="sliding")
+    behaviour.plot(time, made.head_held, color=GREEN, linestyle="--", label="head held")
+    behaviour.plot(time, made.calm_tail, color=SKY, linestyle="-.", label="calm tail")
+    behaviour.set_ylim(-0.05, 1.3)
+    behaviour.set_yticks([0.0, 0.5, 1.0])
+    behaviour.set_title("behaviour; pulse g, m/s (dotted, right)")
+    behaviour.legend(fontsize=7.5, ncols=3, loc="upper right")
+    pulse = behaviour.twinx()
+    pulse.plot(time, made.pulse_m_s.mean(axis=1), color=INK, linestyle=":")
+    pulse.grid(visible=False)
+    tongue.plot(time, made.tongue, color=RED, linewidth=0.8)
+    tongue.set_title("tongue: 0 drawn in, 1 out")
+    tongue.set_xlabel("s")
+    tongue.set_xlim(0.0, time[-1])

@@ -1,0 +1,53 @@
+"""The stride of a tracked animal: the way of each foot over the cycle, and when it stands."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from snakewalk.controller.animals.legged.prototype import LEGS
+from snakewalk.controller.animals.legged.stride import Stride, model_ahead
+from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    WIDTH_IN,
+    save_picture,
+    style,
+)
+
+
+def draw_stride(found: Stride, file: Path, title: str) -> None:
+    """Draw the fit of each foot to ``file``.
+
+    Raises:
+        InputError: an ending that is no picture's.
+
+    """
+    check_picture(file)
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained", dpi=80)
+        panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
+        for k, axes in enumerate(panels):
+            _foot(axes, found, k)
+        for axes in panels[2:]:
+            axes.set_xlabel("cycles since the front left foot came down")
+        for axes in panels[::2]:
+            axes.set_ylabel("ahead of the girdle (body lengths)")
+        figure.suptitle(title)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        save_picture(figure, file)
+
+
+def _foot(axes: Axes, found: Stride, k: int) -> None:
+    """Every cycle as dots, the model as a line, grey where the foot is on the ground."""
+    foot = found.feet[k]
+    cycle = np.linspace(0.0, 1.0, 401)
+    on = (cycle - foot.down) % 1.0 < foot.duty
+    low, high = np.nanmin(found.ahead), np.nanmax(found.ahead)
+    axes.fill_between(cycle, low, high, where=on, color=GREY, alpha=0.25, linewidth=0)
+    axes.plot(found.phase % 1.0, found.ahead[:, k], ".", color=BLUE, markersize=3.0)
+    axes.plot(cycle, model_ahead(found, k, cycle), color=INK, linewidth=1.2)
+    axes.set_title(f"{LEGS[k]}: {100.0 * foot.duty:.0f} % on the ground, down at {foot.down:.2f}")

@@ -1,0 +1,111 @@
+"""Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
+
+States are joined by distance, a walk by ``deg / 2^v`` takes them in turn, and coefficients between
+two are interpolated linearly: the angles ``A_c``. On land the angles of the head are handed down
+the body by a point a frame, ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``
+with m from 1 at the head to 0 behind.
+Correction: the text wants m "close to 1" at the head. It must be 1 there, as nothing is in front of
+the head that the rest of it could come from.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from snakewalk.config.arrays import Complexes, Floats
+from snakewalk.controller.animals.synthesis.synthesis import Locomotion, Until, chain
+from snakewalk.controller.kinematics import smoothstep
+from snakewalk.controller.shape.graphs import threshold_graph
+from snakewalk.controller.shape.states import to_angles
+from snakewalk.controller.shape.walks import walk
+from snakewalk.controller.terrain.path import SplinePath
+
+HEAD_SHARE = 0.5
+"""Of the body, behind which m is 0 (ours). States next to each other on the graph differ little at
+the head: handed down from the first tenth alone they make a body that is nearly straight."""
+
+
+def leading(points: int) -> Floats:
+    """m(s_k) of Eq. 9, (points,): 1 at the head, 0 from ``HEAD_SHARE`` on."""
+    along = np.arange(points) / (HEAD_SHARE * points)
+    return np.asarray(1.0 - smoothstep.cubic(np.clip(along, 0.0, 1.0)))
+
+
+def handed_down(wanted_rad: Floats, before_rad: Floats, m: Floats) -> Floats:
+    """One frame of Eq. 9: (N,) from A_c of now, A_f of the frame before, and m.
+
+    Raises:
+        ValueError: m is not 1 at the head.
+
+    """
+    if m[0] != 1.0:
+        raise ValueError(f"m is {m[0]:g} at the head: there is nothing ahead of it to take from")
+    ahead = np.concatenate([wanted_rad[:1], before_rad[:-1]])
+    return np.asarray(m * wanted_rad + (1.0 - m) * ahead)
+
+
+def graph_angles(
+    states: Complexes, frames_between: int, points: int, rng: np.random.Generator
+) -> Iterator[tuple[int, Floats]]:
+    """Give the state that is left, and A_c (points,), frame by frame and without end.
+
+    The graph has the smallest threshold that joins all states (S, n).
+    """
+    graph = threshold_graph(states, None)
+    state = 0
+    while True:
+        for after in walk(graph, "degree", state, rng).path.tolist()[1:]:
+            share = np.arange(frames_between)[:, None] / frames_between
+            between = states[state] + share * (states[after] - states[state])
+            yield from ((state, angles) for angles in to_angles(between, points))
+            state = after
+
+
+def graph_motion(
+    shapes: Iterator[tuple[int, Floats]],
+    path: SplinePath,
+    frames: int,
+    segment_m: float,
+    dt_s: float,
+    until: Until,
+    on_state: Callable[[int, int], object],
+) -> Locomotion:
+    """Lay at most ``frames`` frames along a path: mass centre on it, mean heading along it.
+
+    The centre advances by what a point of the body moves along the path where nothing slips: a
+    segment a frame, times the mean cosine of the angles about their mean (ours; the text leaves
+    the speed open).
+
+    Args:
+        shapes: of ``graph_angles``.
+        path: through the waypoints.
+        frames: the most of them.
+        segment_m: r, the body's length over N.
+        dt_s: time between frames.
+        until: ends the motion early.
+        on_state: told (frame, state) whenever another state is left.
+
+    """
+    state, body = next(shapes)
+    on_state(0, state)
+    m, at_m = leading(len(body)), 0.0
+    angles, points, speed = [], [], []
+    for t in range(frames):
+        if t > 0:
+            now, wanted = next(shapes)
+            body = handed_down(wanted, body, m)
+            if now != state:
+                state = now
+                on_state(t, state)
+        swing = body - body.mean()
+        heading = path.heading_rad(min(at_m, path.length_m))
+        angles.append(swing + heading)
+        shape = chain(angles[-1], segment_m)
+        points.append(shape - shape.mean(axis=0) + path.position(min(at_m, path.length_m)))
+        advance_m = segment_m * float(np.cos(swing).mean())
+        speed.append(advance_m / dt_s)
+        at_m += advance_m
+        if until(t, points[-1]):
+            break
+    place = np.arange(len(angles))[:, None] + np.arange(len(body))[::-1].astype(float)
+    return Locomotion(np.array(angles), np.array(points), np.array(speed), place)

@@ -1,0 +1,330 @@
+"""A snake's motion without a robot: library, path, walk, speed, skeleton, ground ([PT] 2.6)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
+from snakewalk.controller.animals.mesh.bone_motion import BoneMotion, from_points
+from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, graph_motion
+from snakewalk.controller.animals.synthesis.synthesis import (
+    Behaviour,
+    Locomotion,
+    Targets,
+    synthesise,
+    varied_pulse,
+)
+from snakewalk.controller.animals.synthesis.tongue import HeightChain, Tongue, flicks
+from snakewalk.controller.mechanics.ground_step import (
+    GroundedSkeleton,
+    GroundStep,
+    half_heights_m,
+)
+from snakewalk.controller.mechanics.speed_law import SpeedLaw
+from snakewalk.controller.run.walk_run import POINTS, WalkRun
+from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
+from snakewalk.controller.shape.states import to_states
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.track.readers.load import load_track
+from snakewalk.controller.walk.angle_track import AngleTrack
+
+FRAMES_MAX = 300_000
+"""That a motion may have room for: 240 s at 1000 Hz are fewer (ours)."""
+_ANIMAL = ("turn", "self-contact")
+"""Tests of a shape that no robot needs to make."""
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisedWalk:
+    """A motion over a world, and how it came about."""
+
+    plan: Locomotion
+    """In the plane: [PT]'s prototype."""
+    skeleton: GroundedSkeleton
+    """On the ground."""
+    half_height_m: Floats
+    """(N + 1,) of the body at the skeleton's points."""
+    rate_hz: float
+    path: SplinePath
+    targets: Targets
+    states: list[tuple[int, int]]
+    """(frame, state) of each decision."""
+    library: StateLibrary
+    sliding: Floats
+    """(T, N) w_d."""
+    pulse_m_s: Floats
+    """(T, N) g."""
+    head_held: Floats
+    """(T,)"""
+    calm_tail: Floats
+    """(T,)"""
+    tongue: Floats
+    """(T,) heights, 0 drawn in, 1 out."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the last target was reached."""
+        return self.targets.index == self.targets.count
+
+    @property
+    def time_s(self) -> Floats:
+        """(T,) of the frames."""
+        return np.arange(len(self.plan.speed_m_s)) / self.rate_hz
+
+    def bones(self, segments: int = 1) -> BoneMotion:
+        """Bones on the ground; each is ``segments`` of the skeleton's, a divisor of their number.
+
+        Raises:
+            InputError: the motion stands upright somewhere.
+
+        """
+        return from_points(self.skeleton.points_m[:, ::segments], self.time_s)
+
+    def reached_s(self) -> list[float]:
+        """When each of the waypoints that were reached was reached."""
+        current = np.array(self.targets.current)
+        ends = np.flatnonzero(self.targets.required) + 1
+        at = [np.flatnonzero(current >= end) for end in ends]
+        return [float(self.time_s[frames[0]]) for frames in at if len(frames)]
+
+    def facts(self) -> dict[str, object]:
+        """Plain numbers, for the table and JSON."""
+        plan, targets = self.plan, self.targets
+        length_m = float(np.hypot(*np.diff(plan.points_m[0], axis=0).T).sum())
+        return {
+            "frames": len(plan.speed_m_s),
+            "seconds": round(float(self.time_s[-1]), 2),
+            "waypoints": int(targets.required.sum()),
+            "waypoints_reached": int(targets.required[: targets.index].sum()),
+            "passed_by": targets.missed,
+            "path_m": round(self.path.length_m, 3),
+            "states": len(self.library.shapes_rad),
+            "states_taken": len(self.states),
+            "states_distinct": len({state for _, state in self.states}),
+            "speed_mean_m_s": round(float(plan.speed_m_s.mean()), 4),
+            "speed_mean_body_lengths_s": round(float(plan.speed_m_s.mean()) / length_m, 4),
+            "bend_k_rad": round(float(np.median(plan.angles_rad.std(axis=1))), 3),
+            "steepest_deg": round(float(np.degrees(self.skeleton.steepest_rad)), 1),
+            "ground_gap_most_m": round(float(np.abs(self.skeleton.gap_m).max()), 9),
+        }
+
+    def save(self, file: Path, name: str, source: str) -> None:
+        """Write a track: what every command reads that takes a recording, and more beside it.
+
+        ``points`` (T, N + 1, 2) are the skeleton in the ground's plane and ``height_m`` (T, N + 1)
+        its height; ``radius_m`` (N + 1,) is half the body's thickness, ``tongue`` (T,) and
+        ``state`` (T,) the state last taken.
+        """
+        points = self.skeleton.points_m
+        frames = np.arange(len(points))
+        at, state = np.array(self.states).T
+        np.savez_compressed(
+            file,
+            points=points[..., :2],
+            rate_hz=self.rate_hz,
+            length_m=float(np.hypot(*np.diff(self.plan.points_m[0], axis=0).T).sum()),
+            name=name,
+            source=source,
+            licence="made by snakewalk synthesise",
+            height_m=points[..., 2],
+            radius_m=self.half_height_m,
+            speed_m_s=self.plan.speed_m_s,
+            tongue=self.tongue,
+            state=state[np.searchsorted(at, frames, side="right") - 1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Curves:
+    """The behaviour at every frame."""
+
+    sliding: Floats
+    pulse_m_s: Floats
+    head_held: Floats
+    calm_tail: Floats
+
+
+class SnakeSynthesis:
+    """The motion of one run's configuration; each step is made at its first use."""
+
+    def __init__(self, prepared: WalkRun) -> None:
+        self.prepared = prepared
+        self.run = prepared.run
+        self.how: SynthesisConfig = prepared.run.synthesis
+        self.dt_s = 1.0 / self.how.rate_hz
+        self.segment_m = prepared.robot.length_m / POINTS
+
+    @cached_property
+    def shape_filters(self) -> dict[str, ShapeFilter]:
+        """Tests of a state."""
+        tests = self.prepared.shape_filters
+        return tests if self.how.for_robot else {name: tests[name] for name in _ANIMAL}
+
+    @cached_property
+    def library(self) -> StateLibrary:
+        """States with the waves that the behaviour asks for."""
+        return build_library(
+            load_track(self.run.track).angles_rad,
+            self.shape_filters,
+            coefficients=self.how.coefficients,
+            random_count=self.run.states.random_count,
+            curvature=self.run.behaviour.curvature,
+            rng=np.random.default_rng(self.run.seed),
+            waves=self.how.waves,
+        )
+
+    @cached_property
+    def path(self) -> SplinePath:
+        """Over safe ground through the waypoints."""
+        return self.prepared.path
+
+    @cached_property
+    def ground_step(self) -> GroundStep:
+        """Places skeletons on the world's ground."""
+        return GroundStep(self.prepared.ground)
+
+    def synthesise(self, frames: int | None = None) -> SynthesisedWalk:
+        """Synthesise a motion until the last target, or exactly so many frames.
+
+        Raises:
+            InputError: the run's time limit leaves room for more than ``FRAMES_MAX``.
+
+        """
+        run, how, robot = self.run, self.how, self.prepared.robot
+        if frames is None and run.time_limit_s * how.rate_hz > FRAMES_MAX:
+            raise InputError(
+                f"run {run.name}: time_limit_s: {run.time_limit_s:g} s at {how.rate_hz:g} Hz are "
+                f"over {FRAMES_MAX} frames, the most of a motion; shorten it"
+            )
+        most = round(run.time_limit_s * how.rate_hz) if frames is None else frames
+        targets = Targets(
+            self.path,
+            np.array(run.waypoints_m),
+            run.waypoint_radius_m,
+            how.target_spacing_m,
+            run.walk.carrot_m,
+            self.prepared.planner,
+        )
+        curves = _Curves(
+            self._over(how.sliding, how.sliding_along, most),
+            self._over(how.pulse_m_s, how.pulse_along, most) + self._varied(most),
+            curve_at(how.head_held, np.arange(most) * self.dt_s),
+            curve_at(how.calm_tail, np.arange(most) * self.dt_s),
+        )
+
+        def until(points_m: Floats) -> bool:
+            return targets.observe(points_m) and frames is None
+
+        if run.motion == "kp":
+            plan, states = self._on_graph(most, until)
+        else:
+            plan, states = self._on_star(most, targets, curves, until)
+        made = len(plan.speed_m_s)
+        half_m = half_heights_m(robot, POINTS)
+        return SynthesisedWalk(
+            plan,
+            self.ground_step.place(plan.angles_rad, plan.points_m[:, -1], self.segment_m, half_m),
+            half_m,
+            how.rate_hz,
+            self.path,
+            targets,
+            states,
+            self.library,
+            curves.sliding[:made],
+            curves.pulse_m_s[:made],
+            curves.head_held[:made],
+            curves.calm_tail[:made],
+            self._tongue(made),
+        )
+
+    def _on_star(
+        self, most: int, targets: Targets, curves: "_Curves", until: Callable[[Floats], bool]
+    ) -> tuple[Locomotion, list[tuple[int, int]]]:
+        """[PT] 2.6: a star of states around the present one, aimed at the targets."""
+        run = self.run
+        printed = run.motion == "walk-printed"
+        walker = self.prepared.walker(self.library, self.shape_filters)
+        heading_rad = self.prepared.start_heading_rad
+        states, at = [(0, 0)], [0]
+
+        def observe(frame: int, points_m: Floats) -> bool:
+            at[0] = frame + 1
+            return until(points_m)
+
+        def grow(_: AngleTrack, points_m: Floats) -> None:
+            mean_rad = heading_rad + float(walker.track.body_rad(walker.track.end).mean())
+            aim_rad = (
+                targets.printed_aim_rad(points_m)
+                if printed
+                else targets.aim_rad(points_m, mean_rad)
+            )
+            states.append((at[0], walker.decide(heading_rad, aim_rad).state))
+
+        plan = synthesise(
+            walker.track,
+            self.law,
+            most,
+            self.dt_s,
+            self.segment_m,
+            grow,
+            Behaviour(
+                sliding=lambda t: curves.sliding[t],
+                pulse_m_s=lambda t: curves.pulse_m_s[t],
+                head_held=lambda t: curves.head_held[t],
+                calm_tail=lambda t: curves.calm_tail[t],
+            ),
+            head_m=run.start_m,
+            heading_rad=heading_rad,
+            until=observe,
+        )
+        return plan, states
+
+    def _on_graph(
+        self, most: int, until: Callable[[Floats], bool]
+    ) -> tuple[Locomotion, list[tuple[int, int]]]:
+        """[KP] 4.2.1: a walk on the fixed graph, the mass centre on the path."""
+        run = self.run
+        states: list[tuple[int, int]] = []
+        between = max(1, round(run.walk.decision_fraction * POINTS))
+        coefficients = to_states(self.library.shapes_rad, self.how.coefficients)
+        shapes = graph_angles(coefficients, between, POINTS, np.random.default_rng(run.seed))
+        plan = graph_motion(
+            shapes,
+            self.path,
+            most,
+            self.segment_m,
+            self.dt_s,
+            lambda _, points_m: until(points_m),
+            lambda frame, state: states.append((frame, state)),
+        )
+        return plan, states
+
+    @property
+    def law(self) -> SpeedLaw:
+        """The speed law in metres."""
+        how, unit_m = self.how, self.how.length_unit_m
+        return SpeedLaw(how.viscous, how.coulomb * unit_m, how.bend * unit_m, how.turn * unit_m)
+
+    def _over(self, curve: Curve, along: Along, frames: int) -> Floats:
+        """(frames, N) values of a curve over time and along the body."""
+        return curve_at(curve, np.arange(frames) * self.dt_s)[:, None] * along_body(along, POINTS)
+
+    def _varied(self, frames: int) -> Floats | float:
+        how = self.how
+        if how.pulse_spread_m_s == 0.0:
+            return 0.0
+        rng = np.random.default_rng([self.run.seed, 1])
+        return varied_pulse(
+            POINTS, frames, how.pulse_parts, how.pulse_spread_m_s, how.pulse_step_m_s, rng
+        )
+
+    def _tongue(self, frames: int) -> Floats:
+        """Heights at the frames: the chain plays b_st times as fast."""
+        speed = curve_at(self.how.tongue_speed, np.arange(frames) * self.dt_s)
+        tongue = Tongue(HeightChain(flicks()), self.run.seed)
+        return np.array([tongue.height(t) for t in np.cumsum(speed) * self.dt_s])

@@ -1,0 +1,123 @@
+"""The skin of a synthesised motion: as an animated glTF, and in a film on the world's ground."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.extras import require_extra
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.animals.mesh.body_look import ANIMAL, animal, rig_look
+from snakewalk.controller.animals.mesh.body_motion import robot_skin
+from snakewalk.controller.animals.mesh.body_skin import BodySkin, body_skin
+from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
+from snakewalk.controller.animals.mesh.rig import spine_rig
+from snakewalk.controller.animals.mesh.skin import Skin
+from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.report.film import film_motion
+from snakewalk.controller.run.walk_run import WalkRun
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import SkinLook
+
+FILM_SEGMENTS = 5
+"""Segments of the skeleton that are one bone in the film; the file has a bone a segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class SynthesisSkin:
+    """A skin of the robot's size, and what it wears."""
+
+    dressed: BodySkin
+    skin: Skin
+
+    @classmethod
+    def of(cls, look: str, track: str, robot: RobotConfig) -> "SynthesisSkin":
+        """Take ``animal``, which is the recording's own body or a plain snake, or a BODY.
+
+        Raises:
+            InputError: no such body, or an extra is missing.
+
+        """
+        require_extra("a skin needs", "trimesh", "pygltflib")
+        dressed = body_skin(animal(track) if look == ANIMAL else look)
+        return cls(dressed, robot_skin(dressed.skin, robot))
+
+    def write(self, made: SynthesisedWalk, file: Path) -> None:
+        """Write the animated glTF, ``file`` ends in .glb."""
+        from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415  an extra
+
+        worn, bones = self.dressed, made.bones()
+        rig = spine_rig(self.skin, bones.bone_m)
+        with atomic_write(file) as part:
+            write_skin(part, rig, bones, worn.texture, worn.name, both_sides=worn.both_sides)
+
+    def film(self, made: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
+        """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
+
+        Raises:
+            InputError: the simulator or PyAV is not installed, or nothing draws here.
+
+        """
+        bones = made.bones(FILM_SEGMENTS)
+        return film_over(
+            prepared,
+            file,
+            bones,
+            rig_look(spine_rig(self.skin, bones.bone_m), self.dressed.texture),
+            robot=prepared.robot,
+            reached_s=made.reached_s(),
+            paths=made.targets.paths(made.rate_hz),
+            title=prepared.run.name,
+        )
+
+
+def film_over(
+    prepared: WalkRun,
+    file: Path,
+    bones: BoneMotion,
+    look: "SkinLook",
+    *,
+    robot: RobotConfig,
+    reached_s: Sequence[float],
+    paths: Sequence[tuple[float, Floats]],
+    title: str,
+) -> int:
+    """Draw a skin that moves over a run's world; shows progress on standard error.
+
+    Args:
+        prepared: the run: its ground and waypoints.
+        file: the film, ends in .mp4.
+        bones: the motion.
+        look: the skin.
+        robot: what the camera frames: a body of the skin's length.
+        reached_s: when each waypoint was reached.
+        paths: paths (P, 2) from a time on.
+        title: in the picture.
+
+    Returns:
+        How many frames were drawn.
+
+    Raises:
+        InputError: the simulator or PyAV is not installed, or nothing draws here.
+
+    """
+    run = prepared.run
+    with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
+        return film_motion(
+            bones,
+            part,
+            look=look,
+            robot=robot,
+            world=prepared.world,
+            ground=prepared.ground,
+            waypoints_m=run.waypoints_m,
+            waypoint_radius_m=run.waypoint_radius_m,
+            reached_s=reached_s,
+            paths=paths,
+            title=title,
+            on_progress=bar.update,
+        )

@@ -1,1 +1,0 @@
-"""The command line: ``main`` registers the commands, ``options`` is what they share."""

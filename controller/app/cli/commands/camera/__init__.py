@@ -1,1 +1,0 @@
-"""Commands of the camera above the robot: what to print, its lens, its markers, its check."""

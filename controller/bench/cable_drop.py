@@ -1,0 +1,322 @@
+"""What the cables along a chain take of the voltage, and where another lead of the supply helps.
+
+The voltages that the servos measure under load tell the resistance of each cable between them; a
+ladder of such cables tells what another place to inject power would change.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import PowerConfig, RobotConfig
+from snakewalk.controller.console.finding import Finding
+from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, VOLTAGE_UNIT_V
+from snakewalk.sim.servo.motor import MOTORS
+from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling
+
+CHECK: Final = "cables"
+CONTACT_LIMIT_A: Final = 3.0
+"""Of a contact of the JST EH connector of the X series with AWG 22 (JST's data sheet)."""
+DROP_SHARE: Final = 0.04
+"""Share of the supply that cables may take along the chain (ours): 0.5 V of 12 V."""
+_BLOCKS: Final = 8
+"""Parts of a measurement whose scatter is the error of the whole."""
+_SIDES: Final = 2.4
+"""Half an interval in standard errors: Student's t for 8 blocks, 95 %."""
+_BAD_TIMES: Final = 3.0
+"""A cable is bad that has so many times what the others have and a new one may have (ours)."""
+_BAD_DROP_V: Final = 0.1
+"""... and takes so much more than they do: two servos may measure differently by less (ours)."""
+_BAD_ERRORS: Final = 3.0
+"""... which is so many standard errors (ours)."""
+_LINE: Final = 5
+"""Cables between two leads from which on it is asked how those share the current (ours)."""
+_LEAST_A: Final = 1e-3
+"""Less current than this tells nothing of a cable."""
+
+
+@dataclass(frozen=True, slots=True)
+class CableEstimate:
+    """Resistance of the cables of a chain of S servos, with 95 % intervals, ohm."""
+
+    cable_ohm: Floats
+    """(S - 1,) of each; NaN where no current has told."""
+    low_ohm: Floats
+    high_ohm: Floats
+    usual_ohm: float
+    """That most of them have."""
+    usual_low_ohm: float
+    usual_high_ohm: float
+    bad: tuple[int, ...]
+    """Cables that have far more."""
+
+    def cabling(self, leads: Cabling) -> Cabling:
+        """Cables as estimated, all but the bad ones as usual; leads as given."""
+        cables_ohm = np.full(len(self.cable_ohm), max(self.usual_ohm, 1e-4))
+        cables_ohm[list(self.bad)] = self.cable_ohm[list(self.bad)]
+        return replace(leads, cable_ohm=cables_ohm)
+
+
+@dataclass(frozen=True, slots=True)
+class Injection:
+    """Places of leads beside those that there are, and the lowest voltage of a servo with them."""
+
+    servo_ids: tuple[int, ...]
+    lowest_v: float
+
+
+def estimate_cables(voltage_v: Floats, drawn_a: Floats, leads: Cabling) -> CableEstimate:
+    """Estimate the cables from T readings of S servos under load.
+
+    The mean step of the voltage over a cable is the mean current in it times its resistance. The
+    current follows from what the servos draw (Kirchhoff). A bad cable is told by the median of all,
+    which it does not move; what the others have is their mean, weighted by the current.
+
+    Args:
+        voltage_v: (T, S) in steps of 0.1 V.
+        drawn_a: (T, S) from the supply.
+        leads: where power comes in; of its cables nothing is used.
+
+    """
+    step_v = -np.diff(voltage_v, axis=1)
+    errors_v = np.hypot(_block_error(step_v), np.hypot(*_rounding_errors(voltage_v)))
+    mean_v = step_v.mean(axis=0)
+    flow_a, error_a = _flow(mean_v, errors_v, drawn_a.mean(axis=0), np.isfinite(leads.lead_ohm))
+    size_a = np.maximum(np.abs(flow_a), _LEAST_A)
+    ohm = mean_v * np.sign(flow_a) / size_a
+    error_ohm = np.hypot(errors_v, ohm * error_a) / size_a
+    middle_ohm = max(_weighted_median(ohm, size_a), 0.0)
+    surely_ohm = ohm - _SIDES * error_ohm
+    limit_ohm = _BAD_TIMES * max(middle_ohm, PowerConfig().cable_ohm)
+    extra_v = (ohm - middle_ohm) * size_a
+    surely_v = np.maximum(_BAD_DROP_V, _BAD_ERRORS * np.hypot(errors_v, middle_ohm * error_a))
+    bad = tuple(
+        int(k)
+        for k in np.flatnonzero((ohm > limit_ohm) & (extra_v > surely_v))
+        if _step_stays(mean_v * np.sign(flow_a), int(k))
+    )
+    alike = surely_ohm <= 2.0 * middle_ohm  # a doubtful one is neither named nor counted
+    weight = size_a * alike
+    usual_ohm = float(weight @ ohm / weight.sum())
+    # errors of neighbours cancel, those of a current between two leads do not
+    spread_ohm = np.linalg.norm(weight * errors_v / size_a) / weight.sum()
+    spread_ohm = np.hypot(spread_ohm, weight @ np.abs(ohm * error_a / size_a) / weight.sum())
+    reach_ohm = _SIDES * float(spread_ohm)
+    return CableEstimate(
+        ohm,
+        np.maximum(surely_ohm, 0.0),
+        ohm + _SIDES * error_ohm,
+        max(usual_ohm, 0.0),
+        max(usual_ohm - reach_ohm, 0.0),
+        usual_ohm + reach_ohm,
+        bad,
+    )
+
+
+def _flow(
+    step_v: Floats, error_v: Floats, drawn_a: Floats, fed: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Current in each cable, positive away from the first servo, and its standard error, (S - 1,).
+
+    Outside the leads it is what the servos beyond draw. How two leads share what is between them,
+    their cables decide: if most are alike, the step falls from cable to cable by what the servo
+    between them draws times their resistance, and where it is 0 no current flows. Line and slope
+    are medians (Theil, Sen), so that a bad cable does not move them.
+    """
+    passed_a = np.cumsum(drawn_a)[:-1]  # of all servos up to the cable
+    rows = np.flatnonzero(fed)
+    flow_a, error_a = -passed_a, np.zeros(len(step_v))
+    flow_a[rows[-1] :] = drawn_a.sum() - passed_a[rows[-1] :]
+    for front, back in pairwise(rows):
+        between = slice(front, back)
+        inner_a = passed_a[between] - passed_a[front]
+        share_a = float(np.median(inner_a))  # evenly, as cables do that are all alike
+        if back - front >= _LINE:
+            first, second = np.triu_indices(int(back - front), 1)
+            run_a = inner_a[second] - inner_a[first]
+            fall_v = step_v[between][first] - step_v[between][second]
+            slope_ohm = max(_weighted_median(fall_v / run_a, run_a), 1e-3)
+            share_a = float(np.median(step_v[between] / slope_ohm + inner_a))
+            error = float(np.median(error_v[between])) / slope_ohm / np.sqrt(back - front)
+            error_a[between] = 1.25 * error  # of a median
+        flow_a[between] = share_a - inner_a
+    return flow_a, error_a
+
+
+def best_injection(
+    cabling: Cabling,
+    servo_ids: Sequence[int],
+    source_v: float,
+    drawn_a: Floats,
+    count: int = 1,
+) -> Injection:
+    """Place ``count`` more leads so that the lowest voltage is the highest that they can make it.
+
+    Args:
+        cabling: cables, and the leads that there are.
+        servo_ids: (S,) in the order of the chain.
+        source_v: of the supply without load.
+        drawn_a: (S,) that the servos go on drawing.
+        count: of leads, each as thick as those that there are.
+
+    """
+    new_ohm = float(cabling.lead_ohm.min())
+    free = np.flatnonzero(np.isinf(cabling.lead_ohm)).tolist()
+    best = Injection((), -np.inf)
+    for rows in combinations(free, min(count, len(free))):
+        lead_ohms = cabling.lead_ohm.copy()
+        lead_ohms[list(rows)] = new_ohm
+        servo_v = replace(cabling, lead_ohm=lead_ohms).servo_v(source_v, SOURCE_OHM, drawn_a)
+        if servo_v.min() > best.lowest_v + 1e-9:
+            best = Injection(tuple(servo_ids[row] for row in rows), float(servo_v.min()))
+    return best
+
+
+class Drop(NamedTuple):
+    """A chain of S servos under a load."""
+
+    servo_v: Floats
+    """(S,)"""
+    drawn_a: Floats
+    """(S,) from the supply."""
+    cable_a: Floats
+    """(S - 1,) in each cable, positive away from the first servo."""
+
+
+def drop_along(robot: RobotConfig, power: PowerConfig, current_a: float) -> Drop:
+    """Voltages where each servo takes ``current_a`` from the supply, beside its electronics."""
+    cabling = Cabling.of(robot, power)
+    load_a = current_a + _standby_a(robot)
+    servo_v = cabling.servo_v(robot.servo.supply_v, SOURCE_OHM, load_a)
+    return Drop(servo_v, load_a, cabling.cable_a(servo_v))
+
+
+def leads_of(robot: RobotConfig, voltage_v: Floats) -> tuple[Cabling, str]:
+    """Where power comes in: as the robot's file says, else at the end that has more volts.
+
+    Args:
+        robot: with or without a table ``[power]``.
+        voltage_v: (S,) under load.
+
+    Returns:
+        Cables as the file has them, or as new ones; a note where the file does not say it.
+
+    """
+    if robot.power is not None:
+        return Cabling.of(robot, robot.power), ""
+    end = robot.servo_ids[0] if voltage_v[0] >= voltage_v[-1] else robot.servo_ids[-1]
+    power = PowerConfig(inject_ids=(end,))
+    return Cabling.of(robot, power), f"; taken for granted: power comes in at ID {end}"
+
+
+def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Finding:
+    """Judge the voltage along the chain under load.
+
+    Args:
+        robot: its IDs, and where its file says that power comes in.
+        voltage_v: (T, S) measured, T of 1 or more.
+        drawn_a: (T, S) from the supply, measured at the same times; NaN where nobody measures it.
+
+    """
+    ids, supply_v = robot.servo_ids, robot.servo.supply_v
+    worst = np.argsort(voltage_v.min(axis=1))[: max(len(voltage_v) // 10, 1)]
+    loaded_v = voltage_v[worst].mean(axis=0)
+    high, low = int(np.argmax(loaded_v)), int(np.argmin(loaded_v))
+    fall_v = float(loaded_v[high] - loaded_v[low])
+    shown = f"{loaded_v[high]:.1f} V at ID {ids[high]} to {loaded_v[low]:.1f} V at ID {ids[low]}"
+    if len(ids) < 2 or not np.isfinite(drawn_a).all() or len(voltage_v) < _BLOCKS:
+        found = f"voltage from {shown} under load"
+        if fall_v > DROP_SHARE * supply_v:
+            return Finding(CHECK, "warn", found, "feed the chain at both ends")
+        return Finding(CHECK, "ok", found)
+    leads, note = leads_of(robot, voltage_v.mean(axis=0))
+    estimate = estimate_cables(voltage_v, drawn_a, leads)
+    cabling, load_a = estimate.cabling(leads), drawn_a[worst].mean(axis=0)
+    bad = [
+        f"the one between servos {ids[k]} and {ids[k + 1]} has {estimate.cable_ohm[k]:.2f} ohm "
+        f"({estimate.low_ohm[k]:.2f} to {estimate.high_ohm[k]:.2f})"
+        for k in estimate.bad
+    ]
+    cables = (
+        f"cables of {estimate.usual_ohm:.3f} ohm "
+        f"({estimate.usual_low_ohm:.3f} to {estimate.usual_high_ohm:.3f}){note}"
+    )
+    if bad:
+        found = f"{'; '.join(bad)}; the others: {cables}; {shown} under load"
+        return Finding(CHECK, "fail", found, "reseat its plugs, or exchange it; then run it again")
+    if fall_v <= DROP_SHARE * supply_v:
+        return Finding(CHECK, "ok", f"at most {fall_v:.1f} V between two servos under load")
+    # the source that makes what was measured, through the same cables
+    source_v = float((loaded_v - cabling.servo_v(0.0, SOURCE_OHM, load_a)).mean())
+    found = f"voltage falls from {shown} under load; {cables}"
+    return Finding(CHECK, "warn", found, advice(cabling, ids, source_v, load_a))
+
+
+def advice(cabling: Cabling, servo_ids: Sequence[int], source_v: float, drawn_a: Floats) -> str:
+    """Where to inject power: ``inject power at ID 9: 11.2 V at the lowest; at IDs 6, 13: ...``."""
+    one, two = (best_injection(cabling, servo_ids, source_v, drawn_a, count) for count in (1, 2))
+    if not one.servo_ids:
+        return "each servo has a lead of its own: shorter or thicker ones; a stronger supply"
+    text = f"inject power at ID {one.servo_ids[0]}: {one.lowest_v:.1f} V at the lowest"
+    if two.lowest_v > one.lowest_v + VOLTAGE_UNIT_V:
+        shown = " and ".join(map(str, two.servo_ids))
+        text += f"; at IDs {shown}: {two.lowest_v:.1f} V"
+    return text
+
+
+def drawn_a(robot: RobotConfig, duty: Floats, current_a: Floats) -> Floats:
+    """What servos take from the supply, A: the bridges' share, and what the electronics need.
+
+    Args:
+        robot: its models.
+        duty: (..., S) output of the bridges, -1 to 1.
+        current_a: (..., S) in the windings.
+
+    Returns:
+        (..., S); NaN of servos without a current sensor.
+
+    """
+    measured = [model in CURRENT_UNIT_A for model in robot.servo_models]
+    return np.asarray(np.where(measured, np.abs(duty * current_a), np.nan) + _standby_a(robot))
+
+
+def _standby_a(robot: RobotConfig) -> Floats:
+    """(S,) what the electronics of the servos draw (e-manual, "Standby Current")."""
+    return np.array([MOTORS[model].standby_a for model in robot.servo_models])
+
+
+def _step_stays(step_v: Floats, cable: int) -> bool:
+    """Whether the voltage stays down behind a cable: one servo that measures too little does not.
+
+    A servo whose own reading is off makes one step down and the next one up.
+    """
+    beside = [step_v[k] for k in (cable - 1, cable + 1) if 0 <= k < len(step_v)]
+    return all(each > -0.5 * step_v[cable] for each in beside)
+
+
+def _block_error(values: Floats) -> Floats:
+    """Standard errors of the means of columns, from the scatter of the means of blocks."""
+    means = np.stack([block.mean(axis=0) for block in np.array_split(values, _BLOCKS)])
+    return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS))
+
+
+def _rounding_errors(voltage_v: Floats) -> tuple[Floats, Floats]:
+    """Errors of the means before and behind each cable that the rounding to 0.1 V leaves.
+
+    A reading that changes often rounds up as often as down; one that stands still may be off by the
+    whole rounding.
+    """
+    changes = (np.diff(voltage_v, axis=0) != 0.0).sum(axis=0)
+    error_v = VOLTAGE_UNIT_V / np.sqrt(12.0) / np.sqrt(1.0 + changes)
+    return error_v[:-1], error_v[1:]
+
+
+def _weighted_median(values: Floats, weights: Floats) -> float:
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order]) >= 0.5 * weights.sum()
+    return float(values[order][np.argmax(reached)])

@@ -1,0 +1,1 @@
+"""Commands for servos on a bus, one command per file."""

@@ -1,0 +1,200 @@
+"""``snakewalk calibrate``: find out which servo is which joint, and write the robot's file."""
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import Force, Json, Port, console, show
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
+    from snakewalk.controller.bench.chain_calibration import SeenBend
+    from snakewalk.controller.bench.homing_offset import HomingOffset
+
+
+def calibrate(
+    out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
+    robot: Annotated[
+        str,
+        typer.Option(
+            help="shipped robot, or a TOML file, with the same axes and links",
+            autocompletion=completion.ROBOTS,
+        ),
+    ] = "alternating16",
+    port: Port = None,
+    baud: Annotated[int | None, typer.Option(help="default: as the robot says")] = None,
+    current: Annotated[float, typer.Option(help="A, the most that a servo may use")] = 0.3,
+    sweep: Annotated[
+        bool, typer.Option("--sweep/--no-sweep", help="look for the ends of each joint's range")
+    ] = True,
+    homing_offset: Annotated[
+        bool,
+        typer.Option(
+            "--homing-offset",
+            help="zeros into the servos' EEPROM, Homing Offset(20), after a question, not the file",
+        ),
+    ] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="with --homing-offset: write without asking")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Wiggle one servo at a time, weakly, ask which joint moved, and write the robot's file.
+
+    Hang the robot up, or hold it: joints should carry no weight. Then lay it straight when asked.
+    """
+    from snakewalk.config.errors import InputError  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.loader import load_robot  # noqa: PLC0415
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415
+    from snakewalk.controller.bench import chain_calibration  # noqa: PLC0415
+    from snakewalk.controller.bench.eeprom_backup import back_up, backup_text  # noqa: PLC0415
+    from snakewalk.controller.bench.homing_offset import (  # noqa: PLC0415
+        homing_written,
+        plan_homing,
+        without_zeros,
+    )
+    from snakewalk.controller.bench.scan import pick_port  # noqa: PLC0415
+    from snakewalk.controller.console.result_files import refuse_to_overwrite  # noqa: PLC0415
+    from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus  # noqa: PLC0415
+    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
+    from snakewalk.drivers.safety.stop_button import StopButton  # noqa: PLC0415
+
+    if out.suffix != ".toml":
+        raise InputError(f"{out}: a robot's file ends in .toml")
+    if not 0.0 < current <= 2.0:
+        raise InputError(f"--current {current:g}: over 0 and at most 2 A")
+    if homing_offset and not yes and not sys.stdin.isatty():
+        raise InputError("--homing-offset: asks before it writes, and nobody is there: say --yes")
+    if yes and not homing_offset:
+        raise InputError("--yes: goes with --homing-offset; the robot's file is always written")
+    backup = out.with_name(f"{out.stem}-eeprom.json") if homing_offset else None
+    refuse_to_overwrite([out, backup], force)
+    like = load_robot(robot)
+    if like.limbs:
+        raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
+    device = pick_port(port)
+    heading = f"Found by snakewalk calibrate, like {like.name}."
+    facts: dict[str, object] = {"robot": str(out)}
+    with (
+        open_port(device, baud or like.servo.baud) as line,
+        StopButton(out.stem, device) as button,
+    ):
+        if backup is not None:  # before anything is written: what a chain needs is EEPROM, too
+            chain_calibration.find_servos(line, line.latency_s)
+            _write(backup, backup_text(back_up(line, line.latency_s)))
+        found = chain_calibration.calibrate(
+            line,
+            like,
+            _Person(like.joint_axes),
+            name=out.stem,
+            latency_s=line.latency_s,
+            current_a=current,
+            sweep=sweep,
+            stop_requested=button.pressed,
+            on_progress=lambda step: typer.echo(step, err=True),
+        )
+        described = found.robot
+        if baud is not None:
+            servo = described.servo.model_copy(update={"baud": baud})
+            described = described.model_copy(update={"servo": servo})
+        _write(out, robot_toml(described, heading))
+        if backup is not None:
+            bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
+            offsets = plan_homing(bus, described)
+            written = yes or _confirmed(offsets, backup)
+            if written:
+                described = without_zeros(described)
+                there = "The zeros are in the servos, in Homing Offset(20)."
+                with homing_written(bus, offsets):
+                    _write(out, robot_toml(described, f"{heading}\n{there}"))
+            facts |= {
+                "backup": str(backup),
+                "homing_offsets": {str(each.servo_id): each.after for each in offsets},
+                "homing_written": written,
+            }
+    _show(described, found.notes, facts, as_json)
+
+
+def _write(out: Path, text: str) -> None:
+    from snakewalk.controller.console.result_files import atomic_write  # noqa: PLC0415
+
+    with atomic_write(out) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def _confirmed(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
+    """Show the servos' registers as they would be, and ask."""
+    for each in offsets:
+        typer.echo(f"ID {each.servo_id}: Homing Offset {each.before} -> {each.after}", err=True)
+    question = f"write this into the servos? what they hold now is in {backup}"
+    return typer.confirm(question, default=False, err=True)
+
+
+class _Person:
+    """Asks at the terminal."""
+
+    def __init__(self, axes: str) -> None:
+        self._axes = axes
+
+    def which(
+        self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
+    ) -> "SeenBend":
+        """Wiggle until the answers make sense."""
+        from snakewalk.controller.bench.chain_calibration import SeenBend  # noqa: PLC0415
+
+        while True:
+            wiggle()
+            answer = _ask(f"ID {servo_id}: which joint moved? 1 is next to the head, a = again: ")
+            if not answer.isdigit() or not 1 <= int(answer) <= len(self._axes):
+                continue
+            joint = int(answer) - 1
+            if joint in known:
+                typer.echo(f"joint {answer} is ID {known[joint]} already", err=True)
+                continue
+            yaw = self._axes[joint] == "y"
+            asked = "to the left or right (l, r)" if yaw else "up or down (u, d)"
+            side = _ask(f"joint {answer}: the head side went first {asked}, a = again: ").lower()
+            if side[:1] in ("l", "r") if yaw else side[:1] in ("u", "d"):
+                return SeenBend(joint, 1 if side[0] in "lu" else -1)
+
+    def straighten(self) -> None:
+        """Wait until the body is straight."""
+        _ask("torque is off: lay the body straight and level, then press Enter: ")
+
+
+def _ask(question: str) -> str:
+    from snakewalk.config.errors import InputError  # noqa: PLC0415
+
+    typer.echo(question, nl=False, err=True)
+    try:
+        return input().strip()
+    except EOFError:
+        raise InputError("calibrate asks what has moved: answers came to an end") from None
+
+
+def _show(
+    robot: "RobotConfig", notes: "Sequence[str]", facts: dict[str, object], as_json: bool
+) -> None:
+    if not as_json:
+        rows = zip(robot.servo_ids, robot.signs, robot.zeros_rad, robot.limit_rad, strict=True)
+        for joint, (servo_id, sign, zero, limit) in enumerate(rows, 1):
+            console.print(
+                f"joint {joint}: ID {servo_id}, sign {sign:+d}, zero {zero:+.3f} rad, "
+                f"limit {limit:g} rad"
+            )
+        for note in notes:
+            console.print(f"look at {note}")
+    else:
+        facts |= {
+            "ids": list(robot.servo_ids),
+            "signs": list(robot.signs),
+            "zeros_rad": list(robot.zeros_rad),
+            "limits_rad": list(robot.limit_rad),
+            "notes": list(notes),
+        }
+    show(facts, as_json)

@@ -1,0 +1,67 @@
+"""``snakewalk scan``: who is on the bus."""
+
+import json
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.controller.console.messages import LOGGER, stderr_console
+from snakewalk.controller.console.options import ChainPort, Json, console
+
+
+def scan(
+    port: ChainPort = None,
+    baud: Annotated[
+        list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the servos on a bus, at every baud rate; changes nothing."""
+    from snakewalk.controller.bench import scan as scanning  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
+
+    scanning.check_bauds(baud or ())
+    found = []
+    noise: dict[str, dict[int, int]] = {}
+    with (
+        open_lines(port, baud[0] if baud else 1_000_000) as lines,
+        stderr_console().status("") as status,
+    ):
+        for line, _ in lines.lines:
+
+            def show_step(step: str, name: str = line.name) -> None:
+                status.update(f"{name}: {step}")
+
+            report = scanning.scan(line, baud or (), show_step)
+            found += [(line.name, each) for each in report.servos]
+            if report.bad_line is not None:
+                LOGGER.warning("%s: %s", line.name, report.bad_line)
+            if report.noise_bytes:
+                noise[line.name] = dict(report.noise_bytes)
+    for note in lines.misplaced((name, servo.servo_id) for name, servo in found):
+        LOGGER.warning("%s", note)
+    if as_json:
+        servos = [servo.to_dict() | {"port": name} for name, servo in found]
+        print(json.dumps({"port": lines.port, "servos": servos, "noise_bytes": noise}))
+    elif found:
+        heads = ("ID", "model", "firmware", "baud")
+        table = Table(*heads, *(["port"] if lines.several else []), box=None)
+        for name, servo in found:
+            shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
+            table.add_row(*map(str, shown), *([name] if lines.several else []))
+        console.print(table)
+        for _, servo in found:
+            if servo.secondary_id is not None:
+                console.print(
+                    f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
+                    "Secondary ID(12); a run sets it to 255"
+                )
+    elif noise:
+        console.print(f"{lines.port}: no reply came whole: cables, plugs, termination, ground?")
+    else:
+        console.print(
+            f"{lines.port}: nobody answers at any baud rate: power? cable? adapter's switch?"
+        )
+    if not found:
+        raise SystemExit(1)

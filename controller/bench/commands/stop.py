@@ -1,0 +1,81 @@
+"""``snakewalk stop``: stop a run from another terminal, or switch torque off on a free port."""
+
+import json
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.messages import stderr_console
+from snakewalk.controller.console.options import Json, console
+
+if TYPE_CHECKING:
+    from snakewalk.controller.bench.emergency_stop import StopOutcome
+
+
+def stop(
+    run: Annotated[
+        str | None,
+        typer.Argument(
+            help="name, folder or process of a run; default: every run of yours on this machine "
+            "that holds a port, else the newest in simulation",
+            show_default=False,
+        ),
+    ] = None,
+    port: Annotated[
+        str | None, typer.Option(help="what holds this serial port (or URL), or the servos on it")
+    ] = None,
+    baud: Annotated[
+        list[int] | None,
+        typer.Option(help="of a port that no program holds, may be given again; default: all"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Stop a run at once: torque off, latched. Where no run holds the port: torque off to all."""
+    from snakewalk.controller.bench import emergency_stop  # noqa: PLC0415  --help stays quick
+
+    if run is not None and port is not None:
+        raise InputError("stop takes a run or --port, not both")
+    who = f"snakewalk stop (process {os.getpid()})"
+    outcomes = emergency_stop.stop_runs(emergency_stop.runs_of(port, run), who)
+    if run is not None and not outcomes:
+        raise InputError(f"{run}: no such run is under way")
+    devices = _free_ports(port) if not outcomes else []
+    # a run that was killed leaves its servos holding
+    devices += [port for each in outcomes if not each.safe for port in each.ports]
+    if devices:
+        outcomes += _torque_off(devices, baud or ())
+    stopped = {name for each in outcomes if each.safe for name in each.names}
+    safe = all(name in stopped for each in outcomes for name in each.names)
+    if as_json:
+        print(json.dumps({"safe": safe, "stopped": [each.to_dict() for each in outcomes]}))
+    else:
+        for each in outcomes:
+            after = "" if each.after_s is None else f" after {each.after_s * 1e3:.0f} ms"
+            console.print(f"{each.what}: {each.how}{after}: {each.text}")
+    if not safe:
+        raise SystemExit(1)
+
+
+def _free_ports(port: str | None) -> list[str]:
+    from snakewalk.controller.bench.scan import pick_port  # noqa: PLC0415  heavy: the bus
+    from snakewalk.drivers.errors import PortError  # noqa: PLC0415
+    from snakewalk.drivers.port.port_map import is_port_map, ports_in  # noqa: PLC0415
+
+    if port is not None and is_port_map(port):
+        return ports_in(port)
+    try:
+        return [pick_port(port)]
+    except PortError as fault:
+        raise PortError(f"nothing to stop: no run is under way; {fault}") from None
+
+
+def _torque_off(devices: Sequence[str], bauds: Sequence[int]) -> "list[StopOutcome]":
+    from snakewalk.controller.bench.scan import check_bauds  # noqa: PLC0415  heavy: the bus
+    from snakewalk.controller.bench.torque_off import torque_off  # noqa: PLC0415
+
+    check_bauds(bauds)
+    with stderr_console().status("") as status:
+        return [torque_off(device, bauds, status.update) for device in devices]

@@ -1,0 +1,262 @@
+"""Reads a bus and puts the checks in order; writes nothing to a servo unless the joints wiggle."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.controller.bench import adapter, line_checks
+from snakewalk.controller.bench import servo_checks as servos
+from snakewalk.controller.bench.imu_check import imu_finding
+from snakewalk.controller.bench.register_checks import read_registers, register_findings
+from snakewalk.controller.bench.scan import scan
+from snakewalk.controller.bench.supply_check import supply_under_load
+from snakewalk.controller.console.finding import Finding, worst
+from snakewalk.drivers.bus.budget import robot_budget
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.probe import Probe, overhear
+from snakewalk.drivers.bus.segmented_bus import SegmentedBus
+from snakewalk.drivers.chain.joint_codec import JointUnits
+from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
+from snakewalk.drivers.errors import BusError, FaultCause, ServoError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.port.network_port import NetworkPort
+from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.protocol.registers import BAUDS, ServoUnits
+
+_MEASURED = ("Realtime Tick", "Present Temperature")
+"""Registers that differ between two servos, however alike they are."""
+_PINGED = 6
+"""So many missing servos are pinged at each baud rate; for more a broadcast is quicker (ours)."""
+_NOISE_TRIES = 10
+"""How often a request is made on a noisy line (ours)."""
+
+
+def examine(
+    port: BytePort,
+    robot: RobotConfig,
+    safety: SafetyConfig,
+    rate_hz: float,
+    *,
+    latency_s: float,
+    latency_timer_ms: int | None,
+    wiggle: bool = False,
+    on_it: Sequence[int] | None = None,
+    on_progress: Callable[[str], None] = lambda step: None,
+) -> list[Finding]:
+    """Findings about the bus, worst causes first.
+
+    With ``wiggle``, where nothing has failed: the chain is set up as in a run, and all joints move
+    by 0.15 rad for 2 s, to measure the supply under load. ``on_it`` are the servos, and the IMU,
+    that this port is to have; default: all of the robot's.
+
+    Raises:
+        PortError: the port vanished.
+
+    """
+    bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
+    findings = [adapter.latency_timer(latency_timer_ms, port.name)]
+    on_progress("who else talks")
+    port.drain_until_quiet(latency_s)  # what an earlier program has asked for
+    overheard = overhear(port, line_checks.OVERHEAR_S)
+    findings.append(line_checks.second_master(overheard))
+    expected, baud = robot.servo_ids, port.getBaudRate()
+    imu = robot.imu
+    if on_it is not None:
+        expected = tuple(each for each in expected if each in on_it)
+        imu = imu if imu is not None and imu.id in on_it else None
+    on_progress("who answers")
+    pinged = bus.find(expected)
+    on_progress("duplicate IDs")
+    pings = [bus.probe(i) for i in expected]
+    found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
+    reads = [bus.probe(i, _MEASURED) for i in found]
+    noise = line_checks.noise(pings, reads, overheard)
+    if noise is not None:
+        bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s, tries=_NOISE_TRIES)
+    missing = [i for i in expected if i not in found]
+    elsewhere = _at_other_bauds(port, robot.models_by_id, missing, latency_s, on_progress)
+    here = servos.presence(expected, found, elsewhere, baud, port.name)
+    findings += here if noise is None else [*here, noise]
+    on_progress("who else is there")
+    known = (*expected, *(() if imu is None else (imu.id,)))
+    findings += [f for f in [servos.unexpected_ids(known, list(bus.scan()))] if f is not None]
+    if imu is not None:
+        findings.append(imu_finding(bus, imu))
+    if not found:
+        return findings
+    if findings[1].grade != "fail":  # else their replies are taken for a second servo's
+        findings.append(servos.duplicates(pings, reads, noisy=noise is not None))
+    findings += line_checks.response([late for p in pings for late in p.late_s], latency_s)
+    on_progress("registers")
+    readable = _readable(bus, pings, reads, noise, findings)
+    reports = _reports(bus, robot, readable, findings, noise) if readable else ()
+    if reports:
+        findings += [
+            servos.firmware(reports),
+            servos.return_delay(reports),
+            servos.alarms(reports),
+            servos.torque(reports),
+            servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
+            servos.heat(reports, safety.temperature_limit_c),
+            *_settings(bus, robot, reports, noise),
+        ]
+        on_progress("group reads")
+        fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
+        port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to what was asked so far
+        patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
+        cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
+        findings.append(line_checks.line_quality(port, cycle, latency_s))
+    fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
+    findings.append(adapter.wire(robot_budget(robot, baud, fast=fast), rate_hz))
+    if wiggle and worst(findings) != "fail":
+        on_progress("supply under load")
+        findings += supply_under_load(bus, robot, safety)
+    return findings
+
+
+def examine_segments(
+    segments: Sequence[tuple[SerialPort | NetworkPort, Sequence[int]]],
+    robot: RobotConfig,
+    safety: SafetyConfig,
+    rate_hz: float,
+    *,
+    wiggle: bool = False,
+    on_progress: Callable[[str], None] = lambda step: None,
+) -> list[Finding]:
+    """Findings about the ports of a chain's segments, each with its port's name; as ``examine``.
+
+    Args:
+        segments: port and IDs of each; the ports share a clock.
+        robot: with a table ``[[ports]]`` of them.
+        safety: as of a run.
+        rate_hz: of its control cycle.
+        wiggle: all joints at once.
+        on_progress: takes the port and the step.
+
+    """
+    findings: list[Finding] = []
+    for line, ids in segments:
+        name = line.name
+
+        def show_step(step: str, name: str = name) -> None:
+            on_progress(f"{name}: {step}")
+
+        on_this = examine(
+            line,
+            robot,
+            safety,
+            rate_hz,
+            latency_s=line.latency_s,
+            latency_timer_ms=line.latency_timer_ms,
+            on_it=ids,
+            on_progress=show_step,
+        )
+        findings = [
+            each for each in findings if each.check != adapter.WIRE_CHECK
+        ]  # of the busiest port
+        findings += [
+            each
+            if each.check == adapter.WIRE_CHECK
+            else replace(each, found=f"{name}: {each.found}")
+            for each in on_this
+        ]
+    if wiggle and worst(findings) != "fail":
+        on_progress("supply under load")
+        parts = [
+            (DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s), ids)
+            for line, ids in segments
+        ]
+        findings += supply_under_load(SegmentedBus(parts), robot, safety)
+    return findings
+
+
+def _readable(
+    bus: DynamixelBus,
+    pings: Sequence[Probe],
+    reads: Sequence[Probe],
+    noise: Finding | None,
+    findings: list[Finding],
+) -> list[int]:
+    """Who replies to reads, alone under its ID; adds a finding of those who do not reply."""
+    probes = (*pings, *reads)
+    shared = {p.servo_id for p in probes if p.doubled}
+    if noise is None:
+        shared |= {p.servo_id for p in probes if p.damaged == p.requests}
+    alone = [p for p in reads if p.servo_id not in shared]
+    silent = [p.servo_id for p in alone if not p.answered and not p.damaged]
+    unread = [servo_id for servo_id in silent if not _replies_to_reads(bus, servo_id)]
+    findings += [f for f in [servos.silent_to_reads(unread)] if f is not None]
+    return [p.servo_id for p in alone if p.servo_id not in unread]
+
+
+def _replies_to_reads(bus: DynamixelBus, servo_id: int) -> bool:
+    try:
+        bus.read(servo_id, "Firmware Version")
+    except ServoError:
+        return True  # a refusal is a reply
+    except BusError:
+        return False
+    return True
+
+
+def _reports(
+    bus: DynamixelBus,
+    robot: RobotConfig,
+    servo_ids: Sequence[int],
+    findings: list[Finding],
+    noise: Finding | None,
+) -> Sequence[ServoReport]:
+    try:
+        inspection = inspect(bus, robot, servo_ids)
+    except BusError as error:
+        findings.append(_unreadable(error, noise))
+        return ()
+    wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
+    findings.append(
+        servos.models(inspection.servos, wrong, ", ".join(dict.fromkeys(robot.servo_models)))
+    )
+    return inspection.servos
+
+
+def _settings(
+    bus: DynamixelBus, robot: RobotConfig, reports: Sequence[ServoReport], noise: Finding | None
+) -> list[Finding]:
+    try:
+        registers = [read_registers(bus, robot, report.servo_id) for report in reports]
+    except BusError as error:
+        return [_unreadable(error, noise)]
+    scales = [ServoUnits.of(bus.table_of(servo_id)) for servo_id in robot.servo_ids]
+    return register_findings(registers, robot, JointUnits.of(robot, scales))
+
+
+def _unreadable(error: BusError, noise: Finding | None) -> Finding:
+    remedy = "run it again; then the cables" if noise is None else "the noise first"
+    return Finding("registers", "fail", str(error), remedy)
+
+
+def _at_other_bauds(
+    port: BytePort,
+    models: Mapping[int, str],
+    missing: Sequence[int],
+    latency_s: float,
+    on_progress: Callable[[str], None],
+) -> dict[int, int]:
+    """Which of the missing servos answer at another baud rate, and at which."""
+    if not missing:
+        return {}
+    before = port.getBaudRate()
+    others = [baud for baud in BAUDS if baud != before]
+    if len(missing) > _PINGED:
+        answering = scan(port, others, on_progress=on_progress)
+        return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
+    found: dict[int, int] = {}
+    bus = DynamixelBus(port, models, latency_s=latency_s)
+    try:
+        for baud in others:
+            on_progress(f"{baud} baud")
+            if port.setBaudRate(baud):
+                found |= dict.fromkeys(bus.find(i for i in missing if i not in found), baud)
+    finally:
+        port.setBaudRate(before)
+    return found

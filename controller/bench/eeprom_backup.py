@@ -1,0 +1,148 @@
+"""What outlives the power of servos, as a file: read from a bus, compared, written back.
+
+ID, baud rate and protocol stay as they are: with them a servo is found, and a servo that takes
+another's place has been given its ID before.
+"""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from pydantic import Field
+
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
+from snakewalk.config.base import Strict
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.loader import checked
+from snakewalk.controller.bench.port_lines import PortLines
+from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.errors import ChainError, ServoError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.registers import EEPROM_END
+
+_IDENTITY = (
+    *("Model Number", "Model Information", "Firmware Version"),
+    *("ID", "Baud Rate", "Protocol Type"),
+)
+
+
+class ServoBackup(Strict):
+    """One servo."""
+
+    id: int = Field(ge=0, le=252)
+    model: str
+    registers: dict[str, int]
+    """Raw values of the EEPROM, by the SDK's names."""
+
+
+class BackupFile(Strict):
+    """All servos of a bus."""
+
+    servos: tuple[ServoBackup, ...] = Field(min_length=1)
+
+
+def back_up(
+    port: BytePort, latency_s: float, on_progress: Callable[[str], None] = lambda step: None
+) -> BackupFile:
+    """Read every servo on the bus; writes nothing.
+
+    Raises:
+        ChainError: nobody is there.
+        ControlTableError: a servo is of a model that is not known.
+        BusError: a servo stops answering.
+
+    """
+    found = DynamixelBus(port, latency_s=latency_s).scan()
+    if not found:
+        raise ChainError(f"{port.name}: no servo answers at {port.getBaudRate()} baud")
+    servos = []
+    for servo_id in found:
+        on_progress(f"ID {servo_id}")
+        bus = open_servo(port, servo_id, latency_s)
+        servos.append(
+            ServoBackup(id=servo_id, model=bus.table.model, registers=_eeprom(bus, servo_id))
+        )
+    return BackupFile(servos=tuple(servos))
+
+
+def back_up_all(
+    lines: PortLines, on_progress: Callable[[str], None] = lambda step: None
+) -> BackupFile:
+    """Read every servo on every line; raises as ``back_up``.
+
+    Raises:
+        ChainError: (too) servos on two ports share an ID.
+
+    """
+    found: dict[int, tuple[str, ServoBackup]] = {}
+    for line, _ in lines.lines:
+        for servo in back_up(line, line.latency_s, on_progress).servos:
+            if servo.id in found:
+                raise ChainError(
+                    f"ID {servo.id} answers on {found[servo.id][0]} and on {line.name}: one of "
+                    "them needs another (snakewalk bus set)"
+                )
+            found[servo.id] = line.name, servo
+    return BackupFile(servos=tuple(found[servo_id][1] for servo_id in sorted(found)))
+
+
+def backup_text(backup: BackupFile) -> str:
+    """Text of the file."""
+    return json.dumps(backup.model_dump(), indent=1) + "\n"
+
+
+def load_backup(path: Path) -> BackupFile:
+    """Read a file of ``backup_text``.
+
+    Raises:
+        ConfigError: it is none.
+        OSError: it cannot be read.
+
+    """
+    try:
+        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
+    except ValueError as error:
+        raise ConfigError(f"{path}: not JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise ConfigError(f"{path}: no backup of servos: it holds no table")
+    return checked(BackupFile, data, str(path))
+
+
+def plan_restore(bus: DynamixelBus, backup: ServoBackup) -> tuple[SettingChange, ...]:
+    """Registers that differ from the backup, in the order of their addresses; reads only.
+
+    Raises:
+        ChainError: the servo is of another model, or the backup has a register that it lacks.
+        BusError: the servo does not answer.
+
+    """
+    if bus.table.model != backup.model:
+        raise ChainError(
+            f"ID {backup.id}: is a {bus.table.model}, the backup's is a {backup.model}"
+        )
+    now = _eeprom(bus, backup.id)
+    strange = sorted(set(backup.registers) - set(now))
+    if strange:
+        raise ChainError(f"ID {backup.id}: has no {', '.join(strange)} to restore")
+    changes = [
+        SettingChange(name, now[name], backup.registers[name], "")
+        for name in now
+        if name in backup.registers and now[name] != backup.registers[name]
+    ]
+    if changes and bus.read(backup.id, "Torque Enable"):
+        changes.insert(0, SettingChange("Torque Enable", 1, 0, "the EEPROM is locked while on"))
+    return tuple(changes)
+
+
+def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
+    """Raw values of what a person or a program may have set, by address."""
+    registers = sorted((bus.table[name] for name in bus.table), key=lambda each: each.address)
+    values = {}
+    for register in registers:
+        if register.address < EEPROM_END and register.name not in _IDENTITY:
+            try:
+                values[register.name] = bus.read(servo_id, register.name)
+            except ServoError:
+                continue  # the firmware is older than the table
+    return values

@@ -1,0 +1,115 @@
+"""Inventory of a bus: each servo with its state, and a robot's file to begin with."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+from snakewalk.config.loader import checked
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.template import robot_toml
+from snakewalk.controller.bench.scan import ScanResult, scan
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.start_up import ServoReport, read_report
+from snakewalk.drivers.errors import BusError, ControlTableError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.registers import alarm_names
+
+
+@dataclass(frozen=True, slots=True)
+class InventoryEntry:
+    """One servo on the wire."""
+
+    found: ScanResult
+    report: ServoReport | None
+    """None where it answers a ping and no read, or the SDK does not know its model."""
+
+    def to_dict(self) -> dict[str, object]:
+        """For JSON."""
+        report = self.report
+        return self.found.to_dict() | {"state": asdict(report) if report is not None else None}
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with it, in words; empty: nothing."""
+        if self.report is None:
+            return "answers pings, but its registers cannot be read"
+        alarm = alarm_names(self.report.hardware_error)
+        return f"alarm: {alarm}" if alarm else ""
+
+
+def take_inventory(
+    port: BytePort,
+    latency_s: float,
+    bauds: Sequence[int] = (),
+    on_progress: Callable[[str], None] = lambda step: None,
+) -> list[InventoryEntry]:
+    """Look for servos at each baud rate and read their state; changes nothing in them.
+
+    Raises:
+        PortError: the port vanished.
+
+    """
+    before = port.getBaudRate()
+    entries = []
+    try:
+        report = scan(port, bauds, on_progress)
+        if report.bad_line is not None:
+            on_progress(report.bad_line)
+        for found in report.servos:
+            port.setBaudRate(found.baud)
+            entries.append(InventoryEntry(found, _state(port, latency_s, found)))
+    finally:
+        port.setBaudRate(before)
+    return entries
+
+
+def _state(port: BytePort, latency_s: float, found: ScanResult) -> ServoReport | None:
+    try:
+        bus = DynamixelBus(port, found.model, latency_s=latency_s)
+        return read_report(bus, found.servo_id, found.model)
+    except (BusError, ControlTableError):
+        return None
+
+
+def robot_skeleton(
+    name: str,
+    entries: Sequence[InventoryEntry],
+    segments: Sequence[tuple[str, Sequence[int]]] = (),
+) -> str:
+    """A robot's file of the servos found, in the order of their IDs; axes are for a person to say.
+
+    Args:
+        name: of the robot.
+        entries: at one baud rate, that of most servos.
+        segments: port and IDs of each segment, where there are several.
+
+    Raises:
+        ConfigError: these servos make no robot, such as one of Protocol 1.0.
+
+    """
+    baud = Counter(entry.found.baud for entry in entries).most_common(1)[0][0]
+    chain = [entry for entry in entries if entry.found.baud == baud]
+    model = Counter(entry.found.model for entry in chain).most_common(1)[0][0]
+    volts = sorted(entry.report.voltage_v for entry in chain if entry.report is not None)
+    servo: dict[str, object] = {"model": model, "baud": baud}
+    if volts:
+        servo["supply_v"] = volts[len(volts) // 2]
+    joints: list[dict[str, object]] = []
+    for entry in chain:
+        own = {} if entry.found.model == model else {"model": entry.found.model}
+        joints.append({"axis": "y", "id": entry.found.servo_id, **own})
+    chosen = {entry.found.servo_id for entry in chain}
+    ports = [
+        {"port": port, "ids": ids}
+        for port, there in segments
+        if (ids := [each for each in there if each in chosen])
+    ]
+    described = {"name": name, "servo": servo, "joints": joints}
+    robot = checked(RobotConfig, described | ({"ports": ports} if len(ports) > 1 else {}), name)
+    return robot_toml(
+        robot,
+        f"{len(chain)} servos as snakewalk bus identify found them. Not known, and assumed:\n"
+        "- the order: by ID from the head; snakewalk calibrate finds it out, and signs and zeros;\n"
+        '- axes: "y" = yaw everywhere; write axis = "p" for joints that lift;\n'
+        "- links: link_length_m, link_mass_kg, body_radius_m, or [[links]]; as by default.",
+    )

@@ -1,0 +1,101 @@
+"""The lines that a service command has opened: one port, or one for each segment of the chain."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import SIMULATED
+from snakewalk.controller.bench.scan import pick_port
+from snakewalk.controller.bench.servo_settings import open_servo
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.port import network_port
+from snakewalk.drivers.port.port_map import is_port_map, parse_port_map
+from snakewalk.drivers.port.serial_port import SerialPort
+
+Line = SerialPort | network_port.NetworkPort
+
+
+@dataclass(frozen=True, slots=True)
+class PortLines:
+    """Opened lines, and which servo is on which."""
+
+    port: str
+    """As it was asked for."""
+    lines: tuple[tuple[Line, tuple[int, ...] | None], ...]
+    """Each with the IDs that are on it; None: whoever answers."""
+
+    @property
+    def several(self) -> bool:
+        """Whether a servo is to be told with its port."""
+        return len(self.lines) > 1
+
+    def open_servo(self, servo_id: int) -> DynamixelBus:
+        """Bus with the control table of the servo that answers to ``servo_id``.
+
+        Raises:
+            InputError: the port map does not have it.
+            ControlTableError: its model is not known.
+            BusError: it does not answer.
+
+        """
+        for line, ids in self.lines:
+            if ids is None or servo_id in ids:
+                return open_servo(line, servo_id, line.latency_s)
+        raise InputError(f"--port {self.port}: has no ID {servo_id}; say which port it is on")
+
+    def misplaced(self, found: Iterable[tuple[str, int]]) -> list[str]:
+        """Servos that answer where ``--port`` does not have them, in words.
+
+        Args:
+            found: port and ID of each servo that answered.
+
+        """
+        there = {line.name: ids for line, ids in self.lines}
+        return [
+            f"{name}: servo {servo_id} answers here; --port does not say so"
+            for name, servo_id in found
+            if (ids := there[name]) is not None and servo_id not in ids
+        ]
+
+
+@contextmanager
+def open_lines(port: str | None, baud: int) -> Iterator[PortLines]:
+    """Open the port of ``--port``, or all of ``1-8=PORT,9-16=PORT``; they close at the end.
+
+    Raises:
+        PortError: one is not there, or cannot be opened; none was named, and there is not just one.
+        InputError: what cannot be read, or a port or an ID that is named twice.
+
+    """
+    if port is None or not is_port_map(port):
+        name = pick_port(port)
+        with network_port.open_port(name, baud) as line:
+            yield PortLines(name, ((line, None),))
+        return
+    segments = parse_port_map(port)
+    _check_segments(port, segments)
+    clock, lines = WallClock(), []
+    with ExitStack() as opened:
+        for name, ids in segments:
+            line = network_port.open_port(name, baud, clock)
+            opened.callback(line.closePort)
+            lines.append((line, ids))
+        yield PortLines(port, tuple(lines))
+
+
+def _check_segments(port: str, segments: Sequence[tuple[str, tuple[int, ...]]]) -> None:
+    names = [name for name, _ in segments]
+    ids = [each for _, some in segments for each in some]
+    faults = [
+        f"--port {port}: {name} is named twice" for name in {n for n in names if names.count(n) > 1}
+    ]
+    faults += [
+        f"--port {port}: ID {each} is on more than one port"
+        for each in sorted({i for i in ids if ids.count(i) > 1})
+    ]
+    if SIMULATED in names:
+        faults.append(f"--port {port}: {SIMULATED} is of runs: there is nobody to serve")
+    if faults:
+        raise InputError(faults)

@@ -1,0 +1,289 @@
+"""What other programs have left in the servos' registers, against what a run expects.
+
+A value that a factory or a run sets is no finding. Most others a run sets by itself, and says so;
+the doctor names them for whoever uses the bus with another program.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.console.finding import Finding, Grade, shown_subject
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.joint_codec import JointUnits
+from snakewalk.drivers.chain.start_up import (
+    ALL_REPLY,
+    IDENTITY,
+    ChainSetting,
+    chain_settings,
+    identity_fault,
+    pose_faults,
+)
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.protocol.registers import (
+    CURRENT_POSITION_MODE,
+    POSITION_MODE,
+    PWM_FULL,
+    REVERSE,
+    SECONDARY_ID_LIMIT,
+    SHUTDOWN_ALARMS,
+    TIME_PROFILE,
+    TORQUE_ON_BY_GOAL,
+    WATCHDOG_TRIPPED,
+)
+from snakewalk.sim.servo.register_rules import registers_of
+
+_GAINS = (
+    *("Position P Gain", "Position I Gain", "Position D Gain"),
+    *("Feedforward 1st Gain", "Feedforward 2nd Gain"),
+)
+_PROFILE = ("Profile Acceleration", "Profile Velocity")
+_READ = (
+    *("Status Return Level", "Secondary(Shadow) ID", "Homing Offset", "Drive Mode"),
+    *("Operating Mode", "Startup Configuration", "Shutdown", "PWM Limit", "Current Limit"),
+    *("Goal PWM", *_GAINS, *_PROFILE, IDENTITY, "Bus Watchdog", "Present Position"),
+)
+_BY_A_RUN = "a run sets it; other programs are affected"
+
+
+@dataclass(frozen=True, slots=True)
+class ServoRegisters:
+    """Registers of one servo of the robot, by name; those that its firmware lacks are missing."""
+
+    servo_id: int
+    joint: int
+    values: Mapping[str, int]
+
+
+def read_registers(bus: DynamixelBus, robot: RobotConfig, servo_id: int) -> ServoRegisters:
+    """Read what the checks need.
+
+    Raises:
+        NoAnswerError: nobody answered.
+        PortError: the port is gone.
+
+    """
+    names = [name for name in _READ if name in bus.table_of(servo_id)]
+    values = bus.read_each(servo_id, names, names)
+    return ServoRegisters(servo_id, robot.servo_ids.index(servo_id), values)
+
+
+def register_findings(
+    servos: Sequence[ServoRegisters], robot: RobotConfig, units: JointUnits
+) -> list[Finding]:
+    """Every register that is not as a factory or a run leaves it; one line if all are."""
+    checks = _Checks(servos, robot, units)
+    findings = [finding for finding in checks.all() if finding is not None]
+    if not any(finding.check != "pose" for finding in findings):
+        findings.append(Finding("settings", "ok", "as a factory or a run leaves them"))
+    return findings
+
+
+class _Checks:
+    """The checks of the registers of a chain."""
+
+    def __init__(
+        self, servos: Sequence[ServoRegisters], robot: RobotConfig, units: JointUnits
+    ) -> None:
+        self._servos, self._robot, self._units = servos, robot, units
+        self._factory = [_factory_values(model) for model in robot.servo_models]
+
+    def all(self) -> list[Finding | None]:
+        """Findings in the order of their weight; None where all is well."""
+        return [
+            self._pose(),
+            self._exchanged(),
+            self._secondary(),
+            self._current_limit(),
+            self._bad(
+                "status return level",
+                "warn",
+                lambda servo: servo.values.get("Status Return Level", ALL_REPLY) != ALL_REPLY,
+                "to writes",
+                verb="do not reply",
+                remedy="a run sets Status Return Level(68) to 2; other programs wait in vain",
+            ),
+            self._homing(),
+            self._bits(
+                "drive mode", "Drive Mode", REVERSE, "turn the other way round", "as meant?"
+            ),
+            self._bits(
+                "drive mode", "Drive Mode", TORQUE_ON_BY_GOAL, "switch torque on at any goal"
+            ),
+            self._bits("drive mode", "Drive Mode", TIME_PROFILE, "have time-based profiles"),
+            self._bits(
+                "startup configuration",
+                "Startup Configuration",
+                0xFF,
+                "have torque or old RAM values again as soon as there is power",
+            ),
+            self._bad(
+                "shutdown",
+                "warn",
+                lambda servo: (
+                    servo.values.get("Shutdown", SHUTDOWN_ALARMS) & SHUTDOWN_ALARMS
+                    != SHUTDOWN_ALARMS
+                ),
+                "on, overloaded or overheated: Shutdown(63) is masked",
+                verb="stay",
+            ),
+            self._bad(
+                "PWM limit",
+                "fail",
+                lambda servo: servo.values.get("PWM Limit") == 0,
+                "move: PWM Limit(36) is 0",
+                verb="cannot",
+                remedy=f"set it to {PWM_FULL}",
+            ),
+            self._bad(
+                "PWM limit",
+                "warn",
+                lambda servo: 0 < servo.values.get("PWM Limit", PWM_FULL) < PWM_FULL,
+                f"a PWM Limit(36) below {PWM_FULL}: weak and slow",
+                remedy=f"set it to {PWM_FULL}, unless it is meant",
+            ),
+            self._bad(
+                "goal PWM",
+                "warn",
+                lambda servo: (
+                    servo.values.get("Goal PWM", PWM_FULL) < servo.values.get("PWM Limit", PWM_FULL)
+                ),
+                "a Goal PWM(100) below its limit: weak or without power",
+            ),
+            self._unusual("operating mode", ("Operating Mode",)),
+            self._unusual("gains", _GAINS),
+            self._unusual("profile", _PROFILE),
+            self._bad(
+                "watchdog",
+                "warn",
+                lambda servo: servo.values.get("Bus Watchdog") == WATCHDOG_TRIPPED,
+                "been stopped by the bus watchdog: goals are refused",
+                remedy="a run clears it: Bus Watchdog(98) = 0",
+            ),
+            self._bad(
+                "watchdog",
+                "warn",
+                lambda servo: 0 < servo.values.get("Bus Watchdog", 0) < WATCHDOG_TRIPPED,
+                "an armed bus watchdog: another program runs, or was killed",
+                remedy="end it; a run clears Bus Watchdog(98)",
+            ),
+        ]
+
+    def _bad(
+        self,
+        check: str,
+        grade: Grade,
+        is_bad: Callable[[ServoRegisters], bool],
+        what: str,
+        *,
+        verb: str = "have",
+        remedy: str = _BY_A_RUN,
+    ) -> Finding | None:
+        """Finding on the servos for which ``is_bad``; None if there are none."""
+        bad = [servo.servo_id for servo in self._servos if is_bad(servo)]
+        if not bad:
+            return None
+        return Finding(check, grade, f"{shown_subject(bad, verb)} {what}", remedy)
+
+    def _bits(
+        self, check: str, register: str, bits: int, verb: str, remedy: str = _BY_A_RUN
+    ) -> Finding | None:
+        first, _, rest = verb.partition(" ")
+        return self._bad(
+            check,
+            "warn",
+            lambda servo: bool(servo.values.get(register, 0) & bits),
+            f"{rest}: {register} is not 0",
+            verb=first,
+            remedy=remedy,
+        )
+
+    def _pose(self) -> Finding | None:
+        angles = np.zeros(self._robot.joint_count)
+        for servo in self._servos:
+            raw = servo.values["Present Position"]
+            angles[servo.joint] = self._units.position_rad(servo.joint, raw)
+        faults = pose_faults(self._robot, angles)
+        if faults:
+            found = "; ".join(fault.partition(": bend")[0] for fault in faults)
+            return Finding("pose", "fail", found, faults[0].partition("limit of ")[2])
+        return Finding("pose", "ok", "every joint stands within its limits")
+
+    def _exchanged(self) -> Finding | None:
+        """Servos that were other joints in the last run, as far as they have had power since."""
+        robot = self._robot
+        others = [
+            f"servo {servo.servo_id} was {robot.joint_name(servo.values[IDENTITY] - 1)}"
+            for servo in self._servos
+            if identity_fault(robot, servo.joint, servo.values.get(IDENTITY, 0)) is not None
+        ]
+        if not others:
+            return None
+        remedy = "have IDs been exchanged since? snakewalk bus set; else a run sets it"
+        return Finding("joint order", "warn", f"in the last run {', '.join(others)}", remedy)
+
+    def _secondary(self) -> Finding | None:
+        shadows = [
+            f"servo {servo.servo_id} obeys ID {servo.values['Secondary(Shadow) ID']} as well"
+            for servo in self._servos
+            if servo.values.get("Secondary(Shadow) ID", 255) <= SECONDARY_ID_LIMIT
+        ]
+        if not shadows:
+            return None
+        remedy = "a run sets Secondary ID(12) to 255; until then it moves with the other's goals"
+        return Finding("secondary ID", "fail", "; ".join(shadows), remedy)
+
+    def _current_limit(self) -> Finding | None:
+        robot, units = self._robot, self._units
+        return self._bad(
+            "current limit",
+            "fail",
+            lambda servo: (
+                robot.all_axes[servo.joint] == "p"
+                and servo.values.get("Current Limit", math.inf)
+                < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
+            ),
+            "a Current Limit(38) below the robot's current limit",
+            remedy="snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+        )
+
+    def _homing(self) -> Finding | None:
+        step_rad = self._units.rad_per_position
+        moved = [
+            f"servo {servo.servo_id} by {offset * step_rad[servo.joint]:+.2f} rad"
+            for servo in self._servos
+            if (offset := servo.values.get("Homing Offset", 0))
+        ]
+        if not moved:
+            return None
+        remedy = "a run leaves it: is each joint straight at 0? if not, Homing Offset(20) = 0"
+        return Finding("homing offset", "warn", f"the zero is moved: {', '.join(moved)}", remedy)
+
+    def _unusual(self, check: str, registers: Sequence[str]) -> Finding | None:
+        """Registers that are neither the factory's nor the run's."""
+        found = []
+        for servo in self._servos:
+            run = {s.register: s for s in self._settings(servo)}
+            for name in registers:
+                value = servo.values.get(name)
+                usual = {self._factory[servo.joint].get(name, value), run[name].value}
+                if check == "operating mode":
+                    usual |= {POSITION_MODE, CURRENT_POSITION_MODE}
+                if value is not None and value not in usual:
+                    found.append(f"servo {servo.servo_id}: {name} {value}")
+        return Finding(check, "warn", "; ".join(found), _BY_A_RUN) if found else None
+
+    def _settings(self, servo: ServoRegisters) -> tuple[ChainSetting, ...]:
+        return chain_settings(self._robot, self._units, servo.joint, PWM_FULL)
+
+
+def _factory_values(model: str) -> dict[str, int]:
+    """Initial values by the model's page of the e-manual; empty where it is not known."""
+    try:
+        rules = registers_of(model).rules
+    except ControlTableError:
+        return {}
+    return {name: rule.initial for name, rule in rules.items()}

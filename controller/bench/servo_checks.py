@@ -1,0 +1,217 @@
+"""The other side: each servo against the robot that was described."""
+
+from collections.abc import Mapping, Sequence
+
+from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
+from snakewalk.drivers.bus.probe import Probe
+from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport
+from snakewalk.drivers.protocol.registers import alarm_names
+
+_HOT_C = 60.0
+_CABLE_DROP_V = 0.5
+_DUPLICATE_REMEDY = (
+    "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
+)
+
+
+def _subject(servos: Sequence[ServoReport], verb: str) -> str:
+    return shown_subject([servo.servo_id for servo in servos], verb)
+
+
+def presence(
+    expected: Sequence[int],
+    found: Sequence[int],
+    elsewhere: Mapping[int, int],
+    baud: int,
+    port: str,
+) -> list[Finding]:
+    """Who answers, who does at another baud rate, who does not at all.
+
+    Args:
+        expected: IDs of the robot.
+        found: those that answered at ``baud``.
+        elsewhere: ID to the other baud rate at which it answered.
+        baud: the robot's.
+        port: for the remedy.
+
+    """
+    findings = []
+    rates = sorted(set(elsewhere.values()))
+    for rate in rates:
+        ids = [i for i in expected if elsewhere.get(i) == rate]
+        findings.append(
+            Finding(
+                "baud rate",
+                "fail",
+                f"{shown_subject(ids, 'answer')} at {rate} baud, not at {baud}",
+                f"snakewalk bus set --port {port} --baud {rate} --id {ids[0]} --new-baud {baud}",
+            )
+        )
+    if not rates:
+        findings.append(Finding("baud rate", "ok" if found else "warn", f"{baud} baud"))
+    missing = [i for i in expected if i not in found and i not in elsewhere]
+    if missing:
+        remedy = (
+            "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
+            if len(missing) == len(expected)
+            else f"look at the cable in front of servo {missing[0]}; snakewalk scan --port {port}"
+        )
+        findings.append(
+            Finding("servo IDs", "fail", f"no answer from {shown_ids(missing)}", remedy)
+        )
+    else:
+        findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(expected)} answer"))
+    return findings
+
+
+def unexpected_ids(expected: Sequence[int], answering: Sequence[int]) -> Finding | None:
+    """Servos on the bus that the robot does not have; None if there are none."""
+    extra = [i for i in answering if i not in expected]
+    if not extra:
+        return None
+    return Finding(
+        "servo IDs",
+        "warn",
+        f"{shown_subject(extra, 'are')} on the bus and not in the robot",
+        "describe them in the robot's TOML, or take them off",
+    )
+
+
+def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = False) -> Finding:
+    """Two servos with one ID answer twice, or over each other.
+
+    Two that are alike reply to a ping with the same bytes at the same time, which is one good
+    reply; what they measure differs. On a ``noisy`` line damage is no sign of them.
+    """
+    check = "duplicate IDs"
+    probes = (*pings, *reads)
+    doubled = sorted({p.servo_id for p in probes if p.doubled})
+    if doubled:
+        return Finding(
+            check,
+            "fail",
+            f"{shown_subject(doubled, 'answer')} twice: two servos have this ID",
+            _DUPLICATE_REMEDY,
+        )
+    requests = sum(p.requests for p in probes)
+    if noisy:
+        found = f"no servo answers twice in {requests} requests; more the noise does not let see"
+        return Finding(check, "ok", found)
+    never = sorted({p.servo_id for p in probes if p.damaged == p.requests and not p.answered})
+    if never:
+        return Finding(
+            check,
+            "fail",
+            f"{shown_subject(never, 'answer')} with damaged bytes only: two servos have this ID",
+            _DUPLICATE_REMEDY,
+        )
+    damaged = sorted({p.servo_id for p in probes if p.damaged})
+    if damaged:
+        return Finding(
+            check,
+            "warn",
+            f"answers of {shown_ids(damaged)} come damaged: two servos with this ID, or a bad line",
+            "connect it alone: if it is well then, another servo has its ID; if not, the cable",
+        )
+    return Finding(check, "ok", f"none in {requests} requests")
+
+
+def silent_to_reads(servo_ids: Sequence[int]) -> Finding | None:
+    """Servos that reply to pings, but not to reads: Status Return Level(68) is 0."""
+    if not servo_ids:
+        return None
+    return Finding(
+        "status return level",
+        "fail",
+        f"{shown_subject(servo_ids, 'reply')} to pings and not to reads: Status Return Level(68) "
+        "is 0, or the answer is lost",
+        "a run sets it to 2, unheard; else write 2 to address 68",
+    )
+
+
+def models(servos: Sequence[ServoReport], wrong: Sequence[str], model: str) -> Finding:
+    """Whether all are of the robot's model; ``wrong`` says which are not."""
+    if wrong:
+        remedy = f"the robot's TOML says {model}: correct it, or exchange the servo"
+        return Finding("model", "fail", "; ".join(wrong), remedy)
+    return Finding("model", "ok", f"{len(servos)} times {model}")
+
+
+def firmware(servos: Sequence[ServoReport]) -> Finding:
+    """Old firmwares have no fast sync read; mixed ones behave differently."""
+    versions = sorted({s.firmware for s in servos})
+    shown = ", ".join(map(str, versions))
+    old = [s for s in servos if s.firmware < FAST_READ_FIRMWARE]
+    if old:
+        return Finding(
+            "firmware",
+            "warn",
+            f"{_subject(old, 'have')} no fast sync read (before {FAST_READ_FIRMWARE}): plain "
+            "reads are used, which take longer",
+            "update it with DYNAMIXEL Wizard 2.0",
+        )
+    if len(versions) > 1:
+        return Finding("firmware", "warn", f"mixed: {shown}", "update all to the same version")
+    return Finding("firmware", "ok", f"version {shown}")
+
+
+def return_delay(servos: Sequence[ServoReport]) -> Finding:
+    """The factory's 500 us a servo add up; a run sets them to 0 by itself."""
+    slow = [s for s in servos if s.return_delay_s > 0.0]
+    if not slow:
+        return Finding("return delay", "ok", "0")
+    total_ms = sum(s.return_delay_s for s in slow) * 1e3
+    return Finding(
+        "return delay",
+        "warn",
+        f"{_subject(slow, 'wait')} before answering, {total_ms:.1f} ms together",
+        "a run sets it to 0; to do it now: snakewalk bus set --id ID --return-delay 0",
+    )
+
+
+def alarms(servos: Sequence[ServoReport]) -> Finding:
+    """Hardware Error Status(70)."""
+    bad = [s for s in servos if s.hardware_error]
+    if not bad:
+        return Finding("alarms", "ok", "none")
+    found = ", ".join(f"servo {s.servo_id}: {alarm_names(s.hardware_error)}" for s in bad)
+    return Finding("alarms", "fail", found, "remove the cause, then switch the servo power off, on")
+
+
+def torque(servos: Sequence[ServoReport]) -> Finding:
+    """Torque that a former program left on."""
+    on = [s for s in servos if s.torque_on]
+    if not on:
+        return Finding("torque", "ok", "off")
+    return Finding(
+        "torque",
+        "warn",
+        f"on at {shown_ids([s.servo_id for s in on])}",
+        "another program left it on, or still runs; a run switches it off and on again",
+    )
+
+
+def supply(servos: Sequence[ServoReport], low_v: float, high_v: float) -> Finding:
+    """Supply voltage of each servo, and what the cable takes along the chain."""
+    volts = [s.voltage_v for s in servos]
+    shown = f"{min(volts):.1f} to {max(volts):.1f} V"
+    if min(volts) < low_v:
+        return Finding(
+            "supply", "fail", f"{shown}: below {low_v:g} V", "charge the battery; thicker cable"
+        )
+    if max(volts) > high_v:
+        return Finding("supply", "fail", f"{shown}: above {high_v:g} V", "a lower supply voltage")
+    if max(volts) - min(volts) > _CABLE_DROP_V:
+        return Finding("supply", "warn", f"{shown} along the chain", "feed the chain at both ends")
+    return Finding("supply", "ok", shown)
+
+
+def heat(servos: Sequence[ServoReport], limit_c: float) -> Finding:
+    """Temperatures at rest."""
+    hottest = max(servos, key=lambda s: s.temperature_c)
+    found = f"servo {hottest.servo_id} is the warmest: {hottest.temperature_c:.0f} C"
+    if hottest.temperature_c > limit_c:
+        return Finding("temperature", "fail", found, "let it cool down")
+    if hottest.temperature_c > _HOT_C:
+        return Finding("temperature", "warn", found, "it will not walk for long: let it cool down")
+    return Finding("temperature", "ok", found)

@@ -1,0 +1,183 @@
+"""What a few seconds of frames say of a camera above the floor: rate, markers, light, latency."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.camera_latency import LatencyFit, fit_latency
+from snakewalk.controller.cameras.floor_markers import (
+    Bump,
+    FloorFit,
+    Markers,
+    find_markers,
+    fit_floor,
+    picture_move,
+)
+from snakewalk.controller.cameras.overhead_camera import LineDetection, OverheadDetector
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_LOOK_S: Final = 0.25
+"""Between two looks for markers, which take longer than a frame."""
+_LINE_S: Final = 0.05
+"""Between two frames in which the body is looked for."""
+_LINES, _READS = 400, 1000
+"""The latest that tell the latency: 20 s."""
+_SPARSE: Final = 8  # every so many pixels count for the light
+
+
+@dataclass(frozen=True, slots=True)
+class CameraReport:
+    """What was seen so far."""
+
+    frames: int
+    size_px: tuple[int, int]
+    """Width, height."""
+    duration_s: float
+    rate_hz: float
+    """NaN of less than two frames."""
+    gap_max_s: float
+    """Longest time between two frames."""
+    seen: Mapping[int, float]
+    """By marker of the table: in which share of the pictures it was found."""
+    others: tuple[int, ...]
+    """Markers in the last picture that the table does not name."""
+    floor: FloorFit | None
+    """By the last picture; None where it shows too few markers."""
+    fault: str
+    """Why there is no floor; empty where there is one."""
+    bump: Bump | None
+    """Against the picture of the empty floor; None without one, or without markers."""
+    light_spread: float
+    """Range of the picture's usual brightness (5 to 95 %), as a share of it."""
+    latency: LatencyFit | None
+    """None where no joints were read, or there is no picture of the empty floor."""
+
+
+class CameraCheck:
+    """Takes frames as they are handed over, and joints as they are read."""
+
+    def __init__(
+        self, camera: CameraConfig, robot: RobotConfig, detector: OverheadDetector | None
+    ) -> None:
+        """Begin.
+
+        Args:
+            camera: names the markers.
+            robot: what the camera looks at.
+            detector: with a picture of the empty floor; None where there is none: then neither
+                latency nor a bump is told.
+
+        """
+        self._camera, self._robot, self._detector = camera, robot, detector
+        self._frame_s: list[float] = []
+        self._light: list[float] = []
+        self._lines: deque[LineDetection] = deque(maxlen=_LINES)
+        self._joint_s: deque[float] = deque(maxlen=_READS)
+        self._joint_rad: deque[Floats] = deque(maxlen=_READS)
+        self._latest: Image | None = None
+        self._looks, self._found = 0, dict.fromkeys(camera.marker_places_m, 0)
+        self._looked_s = self._lined_s = -np.inf
+        self._window = slice(None), slice(None)
+        self.markers: Markers = {}
+        """Of the last picture that was looked at for them."""
+
+    def add_frame(self, image: Image, time_s: float) -> None:
+        """Take a frame (H, W, 3) that was handed over at this time.
+
+        Raises:
+            InputError: it is not as large as the picture of the empty floor.
+
+        """
+        self._frame_s.append(time_s)
+        self._latest = image
+        self._light.append(float(image[::_SPARSE, ::_SPARSE].mean()))
+        if self._joint_s and time_s - self._lined_s >= _LINE_S:
+            self._lined_s = time_s
+            self._add_line(image, time_s)
+        if time_s - self._looked_s < _LOOK_S:
+            return
+        self._looked_s = time_s
+        self.markers = find_markers(image)
+        self._looks += 1
+        for name in self._found:
+            self._found[name] += name in self.markers
+
+    def _add_line(self, image: Image, time_s: float) -> None:
+        """Find the body where it was in the frame before, else anywhere."""
+        whole = self._detector
+        if whole is None:
+            return
+        rows, columns = self._window
+        (x, y), left, top = whole.model.moved_px, columns.start or 0, rows.start or 0
+        part = replace(
+            whole,
+            model=replace(whole.model, moved_px=(x - left, y - top)),
+            background=np.ascontiguousarray(whole.background[rows, columns]),
+        )
+        line = part.outline(np.ascontiguousarray(image[rows, columns]), time_s)
+        self._window = slice(None), slice(None)
+        if line.status is not FrameStatus.GOOD:
+            return
+        self._lines.append(line)
+        px = whole.model.in_image(line.line_m, whole.axis_height_m)
+        around = 0.25 * float(np.ptp(px, axis=0).max()) + 8.0
+        low, high = px.min(axis=0) - around, px.max(axis=0) + around
+        (left, top), (right, below) = np.maximum(low, 0.0).astype(int), high.astype(int) + 1
+        self._window = slice(int(top), int(below)), slice(int(left), int(right))
+
+    def add_joints(self, time_s: float, joint_rad: Floats) -> None:
+        """Take joint angles (J,) that were read at this time."""
+        self._joint_s.append(time_s)
+        self._joint_rad.append(np.array(joint_rad, dtype=float))
+
+    def report(self) -> CameraReport:
+        """Return what has been seen so far.
+
+        Raises:
+            InputError: nothing was.
+
+        """
+        if self._latest is None:
+            raise InputError("the camera has handed over no frame")
+        size_px, times = (self._latest.shape[1], self._latest.shape[0]), np.array(self._frame_s)
+        apart = np.diff(times)
+        places = self._camera.marker_places_m
+        first = None if self._detector is None else self._detector.model
+        lens = None if first is None else first.lens
+        floor, fault = None, ""
+        if places:
+            try:
+                floor = fit_floor(self.markers, places, lens)
+            except InputError as error:
+                fault = str(error)
+        move = None
+        if first is not None and first.markers:
+            matrix = first.matrix(size_px)
+            move = picture_move(first.markers, self.markers, first.floor_from_px, matrix, lens)
+        low, usual, high = np.percentile(self._light, [5.0, 50.0, 95.0])
+        latency = None
+        if self._joint_s and self._detector is not None:
+            latency = fit_latency(
+                self._robot, self._lines, np.array(self._joint_s), np.array(self._joint_rad)
+            )
+        return CameraReport(
+            frames=len(times),
+            size_px=size_px,
+            duration_s=float(times[-1] - times[0]),
+            rate_hz=float(len(apart) / apart.sum()) if apart.sum() > 0.0 else float("nan"),
+            gap_max_s=float(apart.max(initial=0.0)),
+            seen={name: count / max(self._looks, 1) for name, count in self._found.items()},
+            others=tuple(sorted(set(self.markers) - set(places))),
+            floor=floor,
+            fault=fault,
+            bump=None if move is None else move.bump,
+            light_spread=float((high - low) / max(usual, 1.0)),
+            latency=latency,
+        )

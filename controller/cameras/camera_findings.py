@@ -1,0 +1,149 @@
+"""What a check of the overhead camera found, as the doctor writes it."""
+
+from collections.abc import Mapping
+from typing import Final, Literal
+
+import numpy as np
+
+from snakewalk.config.camera import CameraConfig
+from snakewalk.controller.cameras.camera_check import CameraReport
+from snakewalk.controller.cameras.floor_markers import FEWEST
+from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
+from snakewalk.controller.console.finding import Finding
+
+Lock = Literal["locked", "automatic", "not told"]
+_SLOW: Final = 0.8  # of the rate that was asked for
+_GAP: Final = 3.0  # periods of a frame
+_SEEN: Final = 0.9  # of the pictures: a marker that is seen less comes and goes
+_SIDE: Final = 0.05  # of a marker's side: more is a wrong print, or wrong places
+_LIGHT: Final = 0.03  # of the brightness: more is flicker, or a camera that regulates
+_RIGHT_S: Final = 0.01  # by which latency_s may be off
+_MOVED_PX: Final = 0.5
+
+
+def camera_findings(
+    report: CameraReport, camera: CameraConfig, locks: Mapping[str, Lock]
+) -> list[Finding]:
+    """Grade a report.
+
+    Args:
+        report: of the check.
+        camera: what was asked for.
+        locks: of ``exposure`` and ``white balance``.
+
+    """
+    return [
+        _frames(report, camera),
+        *_markers(report, camera),
+        *_bump(report),
+        *(_lock(name, state) for name, state in locks.items()),
+        _light(report),
+        *_latency(report, camera),
+    ]
+
+
+def _frames(report: CameraReport, camera: CameraConfig) -> Finding:
+    wide, high = report.size_px
+    found = (
+        f"{report.frames} of {wide} x {high} pixels in {report.duration_s:.1f} s: "
+        f"{report.rate_hz:.1f} a second, longest gap {1e3 * report.gap_max_s:.0f} ms"
+    )
+    if report.size_px != (camera.width_px, camera.height_px):
+        asked = f"{camera.width_px} x {camera.height_px}"
+        return Finding("frames", "fail", found, f"asked for are {asked} pixels: correct [camera]")
+    if not report.rate_hz >= _SLOW * camera.rate_hz:
+        return Finding(
+            "frames", "warn", found,
+            f"asked for are {camera.rate_hz:g} a second: less exposure time, another USB port",
+        )  # fmt: skip
+    if report.gap_max_s > _GAP / camera.rate_hz:
+        return Finding("frames", "warn", found, "frames were lost: is the machine or USB busy?")
+    return Finding("frames", "ok", found)
+
+
+def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
+    if not report.seen:
+        extra = ", ".join(str(name) for name in report.others)
+        seen = f"; in the picture are {extra}" if extra else ""
+        remedy = "snakewalk camera markers, and their places in [camera.markers_m]"
+        return [Finding("markers", "warn", f"none are named{seen}", remedy)]
+    shown = ", ".join(f"{name} in {100.0 * one:.0f} %" for name, one in report.seen.items())
+    seldom = [name for name, one in report.seen.items() if one < _SEEN]
+    steady = len(report.seen) - len(seldom)
+    if steady >= len(report.seen):
+        first = Finding("markers", "ok", f"all {steady} found in every picture, or nearly")
+    else:
+        lost = ", ".join(str(name) for name in seldom)
+        first = Finding(
+            "markers", "warn" if steady >= FEWEST else "fail", f"found of the pictures: {shown}",
+            f"marker {lost}: in view, lit, flat, white around it, at least 14 px wide?",
+        )  # fmt: skip
+    if report.floor is None:
+        return [first, Finding("floor", "fail", report.fault, "four markers fix a floor")]
+    floor = report.floor
+    side = float(np.mean(list(floor.side_m.values())))
+    found = (
+        f"markers lie {1e3 * floor.rms_m:.1f} mm (rms) from their places; their side is "
+        f"{1e3 * side:.0f} mm"
+    )
+    if floor.lens_m is not None:
+        x, y, z = floor.lens_m.tolist()
+        found += f"; the lens is {z:.2f} m above ({x:.2f}, {y:.2f})"
+    worst = max(floor.residual_m, key=lambda name: floor.residual_m[name])
+    if floor.residual_m[worst] > MISPLACED_M:
+        second = Finding("floor", "fail", found, f"measure the place of marker {worst} again")
+    elif abs(side / camera.marker_side_m - 1.0) > _SIDE:
+        second = Finding(
+            "floor", "warn", found,
+            f"marker_side_m is {1e3 * camera.marker_side_m:.0f} mm: was the print scaled, or are "
+            "all places?",
+        )  # fmt: skip
+    else:
+        second = Finding("floor", "ok", found)
+    return [first, second]
+
+
+def _bump(report: CameraReport) -> list[Finding]:
+    bump = report.bump
+    if bump is None:
+        return []
+    if bump.undone and bump.away_px < _MOVED_PX and not bump.left_out:
+        return [Finding("place", "ok", f"where it was, to {bump.away_px:.1f} px")]
+    remedy = "take the picture of the empty floor again"
+    return [Finding("place", "warn" if bump.undone else "fail", str(bump), remedy)]
+
+
+def _lock(name: str, state: Lock) -> Finding:
+    if state == "locked":
+        return Finding(name, "ok", state)
+    if state == "automatic":
+        return Finding(name, "warn", state, "lock it, e.g. with v4l2-ctl: a robot changes it")
+    return Finding(name, "warn", "the camera does not tell", "see the light below")
+
+
+def _light(report: CameraReport) -> Finding:
+    found = f"brightness varies by {100.0 * report.light_spread:.1f} %"
+    if report.light_spread > _LIGHT:
+        return Finding("light", "warn", found, "lamps that flicker, or exposure that is not locked")
+    return Finding("light", "ok", found)
+
+
+def _latency(report: CameraReport, camera: CameraConfig) -> list[Finding]:
+    fit = report.latency
+    if fit is None:
+        return [
+            Finding(
+                "latency", "warn", "not measured",
+                "with --port, a joint that is turned by hand, and a background in [camera]",
+            )
+        ]  # fmt: skip
+    if fit.fault:
+        return [Finding("latency", "warn", f"not measured: {fit.fault}")]
+    found = (
+        f"{1e3 * fit.latency_s:.0f} ms, to {1e3 * max(fit.error_s, 1e-3):.0f} ms, from the joints' "
+        f"motion (correlation {fit.correlation:.2f})"
+    )
+    if camera.device is not None and abs(fit.latency_s - camera.latency_s) > _RIGHT_S:
+        remedy = f"[camera] latency_s = {max(fit.latency_s, 0.0):.3f}"
+        return [Finding("latency", "warn", found, remedy)]
+    return [Finding("latency", "ok", found)]

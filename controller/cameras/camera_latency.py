@@ -1,0 +1,135 @@
+"""How late a camera's frames are, from the joints' own motion.
+
+The body's shape in a frame is compared with the shape that the joints had at earlier times: at the
+camera's latency they go together. The shape is that of the headings along the body, less their
+mean; so it does not matter where the body slides meanwhile.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.overhead_camera import LineDetection
+from snakewalk.controller.kinematics.links import body_in_world, pose_at
+
+_EARLIEST_S, _LATEST_S, _STEP_S = -0.1, 0.6, 0.005
+_PARTS: Final = 4  # of the record, whose latencies tell the error
+_LEAST: Final = 30  # frames, and reads of the joints
+_LEAST_MOVED_RAD: Final = (
+    0.03  # standard deviation of a heading: less is the picture's noise (ours)
+)
+_LIKE: Final = 0.7  # least correlation that is believed (ours)
+
+
+@dataclass(frozen=True, slots=True)
+class LatencyFit:
+    """How late frames are handed over."""
+
+    latency_s: float
+    error_s: float
+    """Standard error, from parts of the record."""
+    correlation: float
+    """Of the shapes' changes."""
+    fault: str = ""
+    """Why it must not be believed; empty where it may."""
+
+
+_NONE: Final = LatencyFit(float("nan"), float("nan"), float("nan"))
+
+
+def fit_latency(
+    robot: RobotConfig, lines: Sequence[LineDetection], joint_s: Floats, joint_rad: Floats
+) -> LatencyFit:
+    """Find the delay under which the body that is seen has the shape of the joints.
+
+    Args:
+        robot: its links.
+        lines: the body's line in frames, dated with their handing over.
+        joint_s: (T,) when the joints were read.
+        joint_rad: (T, J) their angles; rows with NaN are left out.
+
+    """
+    whole = np.isfinite(joint_rad).all(axis=1)
+    joint_s, joint_rad = joint_s[whole], joint_rad[whole]
+    found = [line for line in lines if np.isfinite(line.line_m).all()]
+    if min(len(found), len(joint_s)) < _LEAST:
+        return replace(
+            _NONE,
+            fault=f"the whole body was seen in {len(found)} frames, its joints were read "
+            f"{len(joint_s)} times; {_LEAST} are needed of each",
+        )
+    origin = pose_at(np.zeros(2), 0.0)
+    bodies = [body_in_world(robot, origin, one).headings_rad for one in joint_rad]
+    known = np.unwrap(np.unwrap(np.array(bodies), axis=1), axis=0)
+    known -= known.mean(axis=1, keepdims=True)
+    if float(known.std(axis=0).max()) < _LEAST_MOVED_RAD:
+        return replace(_NONE, fault="the joints did not move: turn one to and fro, unevenly")
+    frame_s = np.array([line.time_s for line in found])
+    delays = np.arange(_EARLIEST_S, _LATEST_S + 1e-9, _STEP_S)
+    inside = (frame_s - _LATEST_S >= joint_s[0]) & (frame_s - _EARLIEST_S <= joint_s[-1])
+    if inside.sum() < _LEAST:
+        return replace(_NONE, fault="it looked too short: frames and joints hardly overlap")
+    frame_s = frame_s[inside]
+    expected = np.stack([
+        np.stack([np.interp(frame_s - delay, joint_s, one) for one in known.T], axis=1)
+        for delay in delays
+    ])  # fmt: skip
+    lines_m = [line.line_m for line, used in zip(found, inside, strict=True) if used]
+    lines_m = _same_end_first(lines_m)
+    shown, delay, likeness = max(
+        ((shape, *_best(delays, expected, shape)) for shape in (
+            _shapes(robot, lines_m), _shapes(robot, [line[::-1] for line in lines_m])
+        )),
+        key=lambda tried: tried[2],
+    )  # fmt: skip
+    parts = [
+        _best(delays, expected[:, part], shown[part])[0]
+        for part in np.array_split(np.arange(len(shown)), _PARTS)
+    ]
+    fit = LatencyFit(delay, float(np.std(parts, ddof=1) / np.sqrt(_PARTS)), likeness)
+    if likeness < _LIKE:
+        return replace(fit, fault="the body in the picture does not move as the joints do")
+    if not delays[0] < delay < delays[-1]:
+        return replace(fit, fault=f"it is beyond {1e3 * _LATEST_S:.0f} ms")
+    return fit
+
+
+def _same_end_first(lines_m: Sequence[Floats]) -> list[Floats]:
+    """Lines (P, 2) that all begin with the end with which the first does: tips move little."""
+    found = [lines_m[0]]
+    for line in lines_m[1:]:
+        off = [np.hypot(*(one[[0, -1]] - found[-1][[0, -1]]).T).sum() for one in (line, line[::-1])]
+        found.append(line if off[0] <= off[1] else line[::-1])
+    return found
+
+
+def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
+    """(F, L) headings of the links along lines (P, 2) that begin at the head, less their mean."""
+    share = np.array(robot.link_ends) / robot.link_ends[-1]
+    shapes = []
+    for line in lines_m:
+        arc = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+        ends = np.stack([np.interp(share * arc[-1], arc, axis) for axis in line.T], axis=1)
+        ahead = ends[:-1] - ends[1:]  # from the tail to the head
+        heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        shapes.append(heading - heading.mean())
+    return np.array(shapes)
+
+
+def _best(delays: Floats, expected: Floats, shown: Floats) -> tuple[float, float]:
+    """Delay with the best correlation of the changes, to a part of a step, and it."""
+    one = (expected - expected.mean(axis=1, keepdims=True)).reshape(len(delays), -1)
+    two = (shown - shown.mean(axis=0)).ravel()
+    size = np.sqrt((one**2).sum(axis=1) * (two**2).sum())
+    likeness = one @ two / np.maximum(size, 1e-12)
+    k = int(likeness.argmax())
+    if not 0 < k < len(delays) - 1:
+        return float(delays[k]), float(likeness[k])
+    low, top, high = likeness[k - 1 : k + 2]
+    bend = low - 2.0 * top + high
+    part = 0.0 if bend >= 0.0 else 0.5 * (low - high) / bend
+    return float(delays[k] + part * _STEP_S), float(top)

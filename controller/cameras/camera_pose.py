@@ -1,0 +1,194 @@
+"""The head's pose from an overhead camera, carried from frame to frame by dead reckoning.
+
+A frame shows where the body was when it was taken; the joints' motion since then is added
+by dead reckoning. So the pose is a frame that drifts, placed anew in the world at each image.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.floor_markers import Bump
+from snakewalk.controller.cameras.overhead_camera import LineDetection
+from snakewalk.controller.cameras.pose_fit import PoseFit, fit_both_ends
+from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.pose.dead_reckoning import DeadReckoning
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.drivers.types import BodyPose, JointState
+
+MISFIT = 0.5
+"""Largest error of a fit that is used, in lengths of a link."""
+DECISIVE = 0.25
+"""Share of the worse fit's error: a fit this much better decides alone which end is the head."""
+GAP_S = 0.2
+"""A longer time without a frame that can be used is reported."""
+HISTORY_S = 2.0
+"""How far back a late frame may date."""
+
+
+PriorAt = Callable[[float], BodyPrior | None]
+"""Where the body is believed to be at a time (s); None where it was lost."""
+
+
+class Camera(Protocol):
+    """Where frames come from, as detections."""
+
+    def first(self) -> LineDetection:
+        """Take a frame now and wait for its detection; the body lies still."""
+        ...
+
+    def arrived(self, now_s: float, prior_at: PriorAt) -> Sequence[LineDetection | TrackedPose]:
+        """Return what has come in since the last call, in order of time.
+
+        With a prior the body is looked for only near to it.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """The estimate at one read of the joints, in the drifting frame."""
+
+    time_s: float
+    place: Floats
+    """(3,) x, y, heading of the head link."""
+    joint_rad: Floats
+
+
+class CameraPose:
+    """Call with each joint state, in order of time; returns the estimated pose."""
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        camera: Camera,
+        reckoning: DeadReckoning,
+        on_event: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        self._robot, self._camera, self._reckoning, self._on_event = (
+            robot,
+            camera,
+            reckoning,
+            on_event,
+        )
+        self._history: deque[_Moment] = deque()
+        self._offset = np.zeros(3)  # of the drifting frame in the world
+        self._fixed_s: float | None = None
+        self._reason = ""
+        self._gap = False
+        self._bump: Bump | None = None
+        self.frames = 0
+        """Frames taken in so far."""
+        self.used = 0
+        """Of these."""
+
+    def __call__(self, state: JointState) -> BodyPose:
+        """Advance to the state's time, and take in the frames that have arrived."""
+        odometry = self._reckoning(state)
+        place = np.array([*odometry.head_in_world_m[:2], odometry.heading_rad])
+        self._history.append(_Moment(state.time_s, place, np.array(state.position_rad)))
+        while self._history[0].time_s < state.time_s - HISTORY_S:
+            self._history.popleft()
+        if self._fixed_s is None:
+            self._fixed_s = state.time_s
+            self._update(self._camera.first())
+        for detection in self._camera.arrived(state.time_s, self._prior_at):
+            if isinstance(detection, TrackedPose):
+                self._follow(detection)
+            else:
+                self._update(detection)
+        self._report_gap(state.time_s)
+        return self._pose(_in_world(self._offset, place), state.time_s)
+
+    def _prior_at(self, time_s: float) -> BodyPrior | None:
+        if self._gap:
+            return None
+        then = self._at(time_s)
+        believed = self._pose(_in_world(self._offset, then.place), time_s)
+        body = body_in_world(self._robot, believed, then.joint_rad)
+        return BodyPrior(body.link_m[:, :2], body.forward[:, :2])
+
+    def _follow(self, found: TrackedPose) -> None:
+        self.frames += 1
+        if found.bump != self._bump:
+            self._bump = found.bump
+            self._on_event(str(found.bump))
+        if found.fault:
+            self._reason = found.fault
+            return
+        self._place(found.time_s, found.head_m, found.heading_rad)
+
+    def _place(self, time_s: float, head_m: Floats, heading_rad: float) -> None:
+        """Put the drifting frame where a camera saw the head."""
+        then = self._at(time_s)
+        self.used += 1
+        self._fixed_s = time_s
+        turn = heading_rad - then.place[2]
+        self._offset = np.append(head_m - _turned(then.place[:2], turn), turn)
+
+    def _update(self, detection: LineDetection) -> None:
+        self.frames += 1
+        if detection.status is not FrameStatus.GOOD:
+            self._reason = str(detection.status)
+            return
+        then = self._at(detection.time_s)
+        fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
+        if fit.error_m > MISFIT * self._robot.mean_link_length_m:
+            self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
+            return
+        self._place(detection.time_s, fit.head_m, fit.heading_rad)
+
+    def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
+        """Which end is the head: by the joints' shape; where both fit, by the last estimate."""
+        better, worse = sorted(fits, key=lambda fit: fit.error_m)
+        apart = worse.error_m > MISFIT * self._robot.mean_link_length_m
+        if apart and better.error_m < DECISIVE * worse.error_m:
+            return better
+        believed = _in_world(self._offset, then.place)
+        c, s = np.cos(believed[2]), np.sin(believed[2])
+        return max(fits, key=lambda fit: np.cos(fit.heading_rad) * c + np.sin(fit.heading_rad) * s)
+
+    def _at(self, time_s: float) -> _Moment:
+        """Joints and drifting pose at the time of a frame, between two reads."""
+        if len(self._history) == 1:
+            return self._history[0]
+        times = np.array([moment.time_s for moment in self._history])
+        k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1))
+        one, two = self._history[k - 1], self._history[k]
+        part = float(np.clip((time_s - one.time_s) / (two.time_s - one.time_s), 0.0, 1.0))
+        change = two.place - one.place
+        change[2] = np.arctan2(np.sin(change[2]), np.cos(change[2]))
+        joints = one.joint_rad + part * (two.joint_rad - one.joint_rad)
+        return _Moment(time_s, one.place + part * change, joints)
+
+    def _report_gap(self, now_s: float) -> None:
+        """Report when the camera has lost the body, and when it has it again."""
+        blind_s = now_s - (self._fixed_s or 0.0)
+        if self._gap != (blind_s > GAP_S):
+            self._gap = not self._gap
+            self._on_event(
+                f"the camera has lost the body: {self._reason or 'no frame came'}; reckoning on"
+                if self._gap
+                else "the camera has the body again"
+            )
+
+    def _pose(self, place: Floats, time_s: float) -> BodyPose:
+        c, s = np.cos(place[2]), np.sin(place[2])
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return BodyPose(time_s, np.array([*place[:2], self._robot.body_radius_m]), rotation)
+
+
+def _turned(point: Floats, by_rad: float) -> Floats:
+    c, s = np.cos(by_rad), np.sin(by_rad)
+    return np.array([c * point[0] - s * point[1], s * point[0] + c * point[1]])
+
+
+def _in_world(frame: Floats, place: Floats) -> Floats:
+    """(3,) a place of the drifting frame in the world."""
+    return np.append(frame[:2] + _turned(place[:2], frame[2]), frame[2] + place[2])

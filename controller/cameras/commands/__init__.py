@@ -1,0 +1,1 @@
+"""Commands of the overhead camera, one command per file."""

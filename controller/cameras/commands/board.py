@@ -1,0 +1,86 @@
+"""``snakewalk camera board``: the board of a calibration, to print."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.options import Force, Json, show
+
+if TYPE_CHECKING:
+    from snakewalk.config.arrays import Image
+
+Pattern = Annotated[str, typer.Option(help="charuco, which may be seen in part, or chessboard")]
+Squares = Annotated[str, typer.Option(help="across x down, also of a chessboard", metavar="NxM")]
+SquareMm = Annotated[float, typer.Option(help="side of a square, mm, as measured on the print")]
+DOTS = 300.0
+"""Per inch of what is printed."""
+
+
+def read_squares(text: str) -> tuple[int, int]:
+    """Read ``7x5``.
+
+    Raises:
+        InputError: it is not of that form.
+
+    """
+    across, _, down = text.partition("x")
+    if not (across.isdigit() and down.isdigit() and len(text) < 10):
+        raise InputError(f"--squares {text}: expected across x down, e.g. 7x5")
+    return int(across), int(down)
+
+
+def board(
+    out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
+    pattern: Pattern = "charuco",
+    squares: Squares = "7x5",
+    square: SquareMm = 36.0,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Draw the board for `camera calibrate`; print it without scaling, and glue it on a plate."""
+    require_extra("a board needs", "cv2", "PIL")
+    from snakewalk.controller.cameras.calibration_board import (  # noqa: PLC0415
+        CalibrationBoard,
+        read_pattern,
+    )
+    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
+        refuse_to_overwrite,
+    )
+
+    made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
+    check_print(out)
+    refuse_to_overwrite([out], force)
+    write_print(out, [made.picture(DOTS)])
+    width, height = (round(1000.0 * side, 1) for side in made.size_m)
+    show({"board": str(out), "width_mm": width, "height_mm": height, "square_mm": square}, as_json)
+
+
+def check_print(out: Path) -> None:
+    """Refuse files that nothing is printed from.
+
+    Raises:
+        InputError: it is neither a .pdf nor a .png.
+
+    """
+    if out.suffix.lower() not in (".pdf", ".png"):
+        raise InputError(f"{out}: what is printed ends in .pdf or .png")
+
+
+def write_print(out: Path, pages: "list[Image]") -> None:
+    """Write pages (H, W) in their true size with a white margin of 10 mm."""
+    from PIL import Image as Pictures  # noqa: PLC0415  an extra
+    from PIL import ImageOps  # noqa: PLC0415
+
+    from snakewalk.controller.console.result_files import atomic_write  # noqa: PLC0415
+
+    margin = round(10.0 / 25.4 * DOTS)
+    sheets = [ImageOps.expand(Pictures.fromarray(page), margin, 255) for page in pages]
+    with atomic_write(out) as part:
+        kind = out.suffix[1:].upper()
+        more: dict[str, Any] = (
+            {"save_all": True, "append_images": sheets[1:]} if kind == "PDF" else {}
+        )
+        sheets[0].save(part, format=kind, dpi=(DOTS, DOTS), resolution=DOTS, **more)

@@ -1,0 +1,139 @@
+"""``snakewalk camera calibrate``: the lens of a camera from pictures of a board."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.cameras.commands.board import (
+    Pattern,
+    SquareMm,
+    Squares,
+    read_squares,
+)
+from snakewalk.controller.console.options import Force, Json, show
+
+if TYPE_CHECKING:
+    from snakewalk.config.arrays import Image
+    from snakewalk.controller.cameras.calibration_board import BoardView, CalibrationBoard
+
+_ENDINGS = (".yml", ".yaml", ".xml", ".json")
+_PAUSE_S = 0.7
+"""Between pictures of a device: time to move the board."""
+
+
+def calibrate_camera(
+    source: Annotated[str, typer.Argument(help="folder of pictures, a film, or a device's number")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="the lens's file (.yml, .json)")],
+    pattern: Pattern = "charuco",
+    squares: Squares = "7x5",
+    square: SquareMm = 36.0,
+    views: Annotated[int, typer.Option(min=5, max=200, help="pictures looked at, at most")] = 40,
+    size: Annotated[str, typer.Option(help="px, asked of a device", metavar="WxH")] = "640x480",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Find a camera's lens from pictures of the board of `camera board`, by OpenCV's calibration.
+
+    Hold the board at 15 places or more, also in the picture's corners, tilted by up to 45 degrees.
+    """
+    require_extra("a camera's calibration needs", "cv2", "skimage")
+    from snakewalk.controller.cameras.calibration_board import (  # noqa: PLC0415
+        CalibrationBoard,
+        read_pattern,
+    )
+    from snakewalk.controller.cameras.lens_calibration import calibrate_lens  # noqa: PLC0415
+    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
+        atomic_write,
+        refuse_to_overwrite,
+    )
+
+    if out.suffix.lower() not in _ENDINGS:
+        raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
+    board = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
+    refuse_to_overwrite([out], force)
+    if source.isdigit():
+        seen, size_px = _from_device(source, size, board, views)
+    else:
+        seen, size_px = _from_files(Path(source), board, views)
+    found = calibrate_lens(seen, size_px)
+    used = sum(math.isfinite(one) for one in found.view_rms_px)
+    with atomic_write(out) as part:
+        found.lens.write(part, found.rms_px, used)
+    focal, matrix = found.lens.matrix[[0, 1], [0, 1]], found.lens.matrix
+    show(
+        {
+            "lens": str(out),
+            "size_px": list(size_px),
+            "pictures": len(seen),
+            "with_the_board": sum(one is not None for one in seen),
+            "used": used,
+            "residual_rms_px": round(found.rms_px, 3),
+            "residual_of_views_px": [
+                None if math.isnan(one) else round(one, 3) for one in found.view_rms_px.tolist()
+            ],
+            "focal_px": [round(one, 2) for one in focal.tolist()],
+            "focal_standard_error_px": round(found.focal_error_px, 2),
+            "centre_px": [round(one, 2) for one in matrix[:2, 2].tolist()],
+            "centre_standard_error_px": round(found.centre_error_px, 2),
+            "distortion": [round(one, 5) for one in found.lens.distortion.tolist()],
+            "coverage": round(found.coverage, 2),
+            "largest_tilt_deg": round(found.tilt_deg, 1),
+            "remarks": list(found.remarks),
+        },
+        as_json,
+    )
+
+
+def _from_files(
+    path: Path, board: "CalibrationBoard", most: int
+) -> tuple[list["BoardView | None"], tuple[int, int]]:
+    import numpy as np  # noqa: PLC0415  --help stays quick
+
+    from snakewalk.controller.images.video import open_footage  # noqa: PLC0415  an extra
+
+    # OpenCV finds boards in 8 bit; deeper pictures come on the same scale
+    pictures = [np.clip(one, 0, 255).astype(np.uint8) for one in open_footage(path).spread(most)]
+    sizes = sorted({picture.shape[1::-1] for picture in pictures})
+    if len(sizes) > 1:
+        shown = " and ".join(f"{width} x {height}" for width, height in sizes)
+        raise InputError(f"{path}: pictures of one size are needed, these are {shown} pixels")
+    return [board.find(one) for one in pictures], (sizes[0][0], sizes[0][1])
+
+
+def _from_device(
+    name: str, size: str, board: "CalibrationBoard", count: int
+) -> tuple[list["BoardView | None"], tuple[int, int]]:
+    """Take pictures one after another and say of each whether the board was found in it."""
+    import numpy as np  # noqa: PLC0415  --help stays quick
+
+    from snakewalk.config.camera import CameraConfig  # noqa: PLC0415
+    from snakewalk.controller.cameras.device_camera import open_device  # noqa: PLC0415  an extra
+    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415
+
+    width, _, height = size.partition("x")
+    if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
+        raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")
+    wanted = CameraConfig(device=name, width_px=int(width), height_px=int(height))
+    device, clock = open_device(wanted), WallClock()
+    seen: list[BoardView | None] = []
+    picture: Image | None = None
+    try:
+        while len(seen) < count:
+            until_s = clock.now_s() + _PAUSE_S
+            while picture is None or clock.now_s() < until_s:
+                whole, frame = device.read()
+                if not whole:
+                    raise InputError(f"camera {name}: hands over no more frames")
+                picture = np.asarray(frame, dtype=np.uint8)
+            seen.append(board.find(picture))
+            corners = "no board" if seen[-1] is None else f"{len(seen[-1].corners_px)} corners"
+            typer.echo(f"picture {len(seen)} of {count}: {corners}", err=True)
+    finally:
+        device.release()
+    if picture is None:
+        raise InputError(f"camera {name}: no picture was taken")
+    return seen, (picture.shape[1], picture.shape[0])

@@ -1,0 +1,53 @@
+"""``snakewalk camera markers``: sheets for the floor, one marker a page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
+from snakewalk.controller.console.options import Force, Json, show
+
+
+def markers(
+    out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
+    count: Annotated[int, typer.Option(min=1, max=50, help="markers, a page each")] = 6,
+    first: Annotated[int, typer.Option(min=0, max=49, help="number of the first")] = 0,
+    side: Annotated[float, typer.Option(help="of a marker, mm, without its white margin")] = 150.0,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Draw markers for the floor under the camera; print them without scaling.
+
+    Four or more, flat on the floor, as far apart as the picture allows: the table
+    `camera.markers_m` of a run names their places.
+    """
+    require_extra("markers need", "cv2", "PIL")
+    from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet  # noqa: PLC0415
+    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
+        refuse_to_overwrite,
+    )
+
+    check_print(out)
+    if out.suffix.lower() == ".png" and count > 1:
+        raise InputError(f"{out}: a .png holds one marker: --count 1, or a .pdf")
+    if first + count > COUNT:
+        raise InputError(f"--first {first} --count {count}: numbers end at {COUNT - 1}")
+    if not 10.0 <= side <= 1000.0:
+        raise InputError(f"--side {side:g}: must be 10 to 1000 mm")
+    refuse_to_overwrite([out], force)
+    pages = [marker_sheet(number, 1e-3 * side, DOTS) for number in range(first, first + count)]
+    write_print(out, pages)
+    high, wide = (round(one / DOTS * 25.4 + 20.0, 1) for one in pages[0].shape)
+    show(
+        {
+            "markers": str(out),
+            "numbers": list(range(first, first + count)),
+            "side_mm": side,
+            "page_width_mm": wide,
+            "page_height_mm": high,
+        },
+        as_json,
+    )

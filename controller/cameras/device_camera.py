@@ -1,0 +1,211 @@
+"""A real overhead camera: a thread that takes frames, looks at them, and keeps what it saw.
+
+Looking takes longer than a cycle of the loop may, so it is done beside it.
+"""
+
+import queue
+import threading
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Image
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.controller.cameras.camera_pose import PriorAt
+from snakewalk.controller.cameras.floor_learning import FloorLearning
+from snakewalk.controller.cameras.lens import Lens
+from snakewalk.controller.cameras.overhead_camera import (
+    CameraModel,
+    LineDetection,
+    OverheadDetector,
+)
+from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
+from snakewalk.controller.cameras.rendered_camera import (
+    CHECK_FRAMES,
+    OnPicture,
+    centre_of,
+    require_whole_body,
+)
+from snakewalk.controller.images.video import read_image
+from snakewalk.drivers.clock import Clock
+
+PATIENCE_S = 5.0
+"""How long the first frame is waited for."""
+ANSWER_S = 0.1
+"""How long the loop may take to say where the body is believed to be."""
+
+
+class DeviceCamera:
+    """What OpenCV opens under ``camera.device``; ``close`` it.
+
+    A frame is dated ``latency_s`` before it has been handed over.
+
+    Raises:
+        InputError: no such camera, no background, another size, no frame, or no robot in it.
+
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        clock: Clock,
+        on_picture: OnPicture = lambda picture, time_s: None,
+    ) -> None:
+        """Open it; ``on_picture`` is called from the thread that takes the frames."""
+        camera = run.camera
+        self._clock, self._on_picture = clock, on_picture
+        self.detector = overhead_detector(run, robot)
+        self._name, self._latency_s = f"camera {camera.device}", camera.latency_s
+        self._device = open_device(camera)
+        self._robot = robot
+        self._learning = FloorLearning(robot, camera.learn_s)
+        self._found: queue.SimpleQueue[LineDetection | TrackedPose | InputError] = (
+            queue.SimpleQueue()
+        )
+        self._asked: queue.SimpleQueue[float] = queue.SimpleQueue()
+        self._answers: queue.SimpleQueue[BodyPrior | None] = queue.SimpleQueue()
+        self._gone: InputError | None = None
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="overhead camera", daemon=True)
+        self._thread.start()
+        try:
+            self.start = self.first()
+            """What the camera saw first."""
+            require_whole_body(self.start, self._name)
+        except InputError:
+            self.close()
+            raise
+
+    def first(self) -> LineDetection:
+        """Wait for the next frame.
+
+        Raises:
+            InputError: none comes.
+
+        """
+        self._collect(self._clock.now_s())
+        if self._gone is not None:
+            raise self._gone
+        try:
+            found = self._found.get(timeout=PATIENCE_S)
+        except queue.Empty:
+            raise InputError(f"{self._name}: no frame came in {PATIENCE_S:g} s") from None
+        if isinstance(found, InputError):
+            self._gone = found
+            raise found
+        if isinstance(found, TrackedPose):
+            return self.first()
+        return found
+
+    def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
+        """Return what has been seen since the last call, up to ``now_s``."""
+        while not self._asked.empty():
+            self._answers.put(prior_at(self._asked.get_nowait()))
+        return self._collect(now_s)
+
+    def _collect(self, now_s: float) -> list[LineDetection | TrackedPose]:
+        found: list[LineDetection | TrackedPose] = []
+        while not self._found.empty():
+            one = self._found.get_nowait()
+            if isinstance(one, InputError):
+                self._gone = one
+            elif one.time_s <= now_s:
+                found.append(one)
+        return found
+
+    def close(self) -> None:
+        """Stop the thread and let the camera go."""
+        self._stop.set()
+        self._thread.join(timeout=PATIENCE_S)
+        self._device.release()
+
+    def _look(self, frame: Image, time_s: float) -> LineDetection | TrackedPose:
+        """Look near to where the loop believes the body; anywhere while no loop answers."""
+        while not self._answers.empty():  # to a frame that was given up
+            self._answers.get_nowait()
+        self._asked.put(time_s)
+        try:
+            prior = self._answers.get(timeout=ANSWER_S)
+        except queue.Empty:
+            prior = None
+        if prior is None:
+            return self.detector.detect(frame, time_s)
+        found = self.detector.track(frame, time_s, prior, self._robot)
+        self.detector = self._learning.after(self.detector, frame, prior, found)
+        return found
+
+    def _watch(self) -> None:
+        taken = 0
+        while not self._stop.is_set():
+            whole, frame = self._device.read()
+            if not whole:
+                self._found.put(InputError(f"{self._name}: hands over no more frames"))
+                return
+            taken += 1
+            try:
+                picture, time_s = in_colour(frame), self._clock.now_s() - self._latency_s
+                self._on_picture(picture, time_s)
+                if taken % CHECK_FRAMES == 0:
+                    self.detector = self.detector.registered(picture)
+                self._found.put(self._look(picture, time_s))
+            except InputError as fault:
+                self._found.put(InputError(f"{self._name}: {fault}"))
+                return
+
+
+def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
+    """Build the detector of a real camera from its table in the run.
+
+    Raises:
+        InputError: no background image, of another size, no lens in its file, or corners or
+            markers that fix no plane.
+
+    """
+    camera = run.camera
+    ground = in_colour(read_image(Path(camera.background or "")))
+    if ground.shape[:2] != (camera.height_px, camera.width_px):
+        raise InputError(
+            f"{camera.background}: is {ground.shape[1]} x {ground.shape[0]} pixels, the camera "
+            f"{camera.width_px} x {camera.height_px}"
+        )
+    lens = None if camera.lens is None else Lens.read(Path(camera.lens))
+    if lens is not None and lens.size_px != (camera.width_px, camera.height_px):
+        raise InputError(
+            f"{camera.lens}: is of pictures of {lens.size_px[0]} x {lens.size_px[1]} pixels, the "
+            f"camera has {camera.width_px} x {camera.height_px}: calibrate in the size of the run"
+        )
+    if camera.corners_px is not None:
+        model = CameraModel.from_corners(camera, centre_of(run), lens)
+    else:
+        model = CameraModel.of_floor(camera, centre_of(run), lens, ground)
+    return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
+
+
+def open_device(camera: CameraConfig) -> cv2.VideoCapture:
+    """Open the camera in the wanted size and rate.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    name = camera.device or ""
+    device = cv2.VideoCapture(int(name)) if name.isdigit() else cv2.VideoCapture(name)
+    if not device.isOpened():
+        raise InputError(f"camera {name}: OpenCV cannot open it")
+    device.set(cv2.CAP_PROP_FRAME_WIDTH, camera.width_px)
+    device.set(cv2.CAP_PROP_FRAME_HEIGHT, camera.height_px)
+    device.set(cv2.CAP_PROP_FPS, camera.rate_hz)
+    device.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+    return device
+
+
+def in_colour(image: NDArray[np.generic]) -> Image:
+    """(H, W, 3) whatever the number of channels."""
+    out = np.asarray(image, dtype=np.uint8)
+    return np.dstack([out] * 3) if out.ndim == 2 else out

@@ -1,0 +1,92 @@
+"""The floor as it becomes in time: what stays beside the robot is floor after a while.
+
+A running estimate outside of the body, of frames whose pose is used and fits well. Where the body
+is, and near to it, nothing is learnt however long it stands there; nor is anything while it is lost
+or ill seen, so that a pose that is wrong cannot make the robot itself a part of the floor.
+"""
+
+from dataclasses import replace
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.floor_light import in_light_of
+from snakewalk.controller.cameras.overhead_camera import OverheadDetector
+from snakewalk.controller.cameras.pose_tracking import REACH_M, BodyPrior, TrackedPose
+
+LEARN_EVERY_S: Final = 1.0
+_LONGEST_S: Final = 5.0  # that one frame counts for: a gap teaches no more than that
+_FITS: Final = 0.15  # of the radius: largest residual of a pose that is learnt from
+_BLEACHED: Final = 249.0  # grey levels: a brighter pixel may be anything
+
+
+class FloorLearning:
+    """Call ``after`` with each tracked frame, in order of time."""
+
+    def __init__(self, robot: RobotConfig, learn_s: float) -> None:
+        """Learn with the time constant ``learn_s``; 0: never."""
+        self._robot, self._learn_s = robot, learn_s
+        self._floor: NDArray[np.float32] | None = None
+        self._shown: Image | None = None
+        self._last_s: float | None = None
+
+    def after(
+        self, detector: OverheadDetector, image: Image, prior: BodyPrior, found: TrackedPose
+    ) -> OverheadDetector:
+        """Return the detector of the next frames.
+
+        Args:
+            detector: with which the frame was looked at.
+            image: (H, W[, 3]) the frame.
+            prior: the body's shape, and where it was believed.
+            found: where it was found.
+
+        """
+        if self._learn_s == 0.0:
+            return detector
+        good = not found.fault and found.error_m < _FITS * self._robot.body_radius_m
+        if not good:
+            self._last_s = None
+            return detector
+        if self._last_s is None:
+            self._last_s = found.time_s
+        passed_s = found.time_s - self._last_s
+        if passed_s < LEARN_EVERY_S:
+            return detector
+        self._last_s = found.time_s
+        if self._floor is None or detector.background is not self._shown:  # or the camera moved
+            self._floor = detector.background.astype(np.float32)
+        clear = cv2.inRange(image, (0.0,) * 3, (_BLEACHED,) * 3)
+        free = cv2.subtract(clear, _body(detector, prior, found, self._robot))
+        part = 1.0 - float(np.exp(-min(passed_s, _LONGEST_S) / self._learn_s))
+        cv2.accumulateWeighted(in_light_of(image, detector.background), self._floor, part, free)
+        self._shown = shown = np.asarray(cv2.convertScaleAbs(self._floor), dtype=np.uint8)
+        pictured = detector.background if detector.pictured is None else detector.pictured
+        return replace(detector, background=shown, pictured=pictured)
+
+
+def _body(
+    detector: OverheadDetector, prior: BodyPrior, found: TrackedPose, robot: RobotConfig
+) -> Image:
+    """(H, W) 255 where the body and its neighbourhood are."""
+    links_px = detector.model.in_image(_links(prior, found), detector.axis_height_m)
+    length_px = float(np.hypot(*np.diff(links_px, axis=0).T).sum())
+    metre = length_px / robot.middles_apart_m
+    mask = np.zeros(detector.background.shape[:2], dtype=np.uint8)
+    spots = np.rint(links_px).astype(np.int32).reshape(-1, 1, 2)
+    wide_px = 2.0 * (REACH_M + 2.0 * robot.body_radius_m) * metre
+    cv2.polylines(mask, [spots], False, 255, max(1, round(wide_px)))
+    return mask
+
+
+def _links(prior: BodyPrior, found: TrackedPose) -> Floats:
+    """(L, 2) centres of the links at the pose that was found."""
+    ahead = prior.forward[0]
+    turn = found.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
+    c, s = np.cos(turn), np.sin(turn)
+    away = prior.links_m - prior.links_m[0]
+    return np.asarray(found.head_m + away @ np.array([[c, s], [-s, c]]))

@@ -1,0 +1,333 @@
+"""Printed markers on the floor: found in a picture, what they say of the floor, and of a bump.
+
+A marker is a square of ArUco's smallest dictionary: at 16 px of side one of its cells has 2.7 px.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.cameras.lens import Lens, projected
+
+DICTIONARY: Final = "DICT_4X4_50"
+COUNT: Final = 50
+"""Numbers of markers are below."""
+FEWEST: Final = 4
+"""Markers that fix a floor."""
+_CELLS: Final = 6  # across a marker, its black border included
+_LARGER: Final = 2  # markers are looked for in a picture so many times larger: cells of 2 px (ours)
+_INCH_M: Final = 0.0254
+_DRAWN: Final = 6, 24  # px of a cell of the print that is laid onto a picture, least and most
+_STEPS: Final = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-4
+_SMOOTH: Final = 3  # px of the smoothing before a print is laid onto a picture
+_FURTHEST: Final = 0.5  # of a cell: by how much a corner may be bettered (ours)
+_AGREE_PX: Final = 1.5  # largest residual of a marker that moved with the picture (ours)
+_FEWEST_MOVED: Final = 3  # markers seen before and now that tell how the picture moved
+_TURNED_PX: Final = 0.5  # largest residual of a camera that was only turned (ours)
+_LEAST_SPREAD: Final = 0.05  # of markers' places: less, and they lie on a line
+Markers = Mapping[int, Floats]
+"""Corners (4, 2) of each marker by its number, pixels, the upper left of the print first."""
+
+
+@dataclass(frozen=True, slots=True)
+class FloorFit:
+    """The floor as its markers show it."""
+
+    floor_from_px: Floats
+    """(3, 3) homography of pixels without distortion to metres."""
+    residual_m: Mapping[int, float]
+    """By marker: how far its middle lies from where it was measured. Four markers without a lens
+    fit always."""
+    side_m: Mapping[int, float]
+    """By marker: its side as the homography has it."""
+    lens_m: Floats | None
+    """(3,) where the camera's lens is, where its matrix is known."""
+
+    @property
+    def rms_m(self) -> float:
+        """Root of the mean square of the residuals."""
+        return float(np.sqrt(np.mean(np.square(list(self.residual_m.values())))))
+
+
+@dataclass(frozen=True, slots=True)
+class Bump:
+    """By how much a camera's picture has moved since it was set up."""
+
+    shift_px: tuple[float, float]
+    """x, y: of the picture's middle."""
+    turn_rad: float = 0.0
+    """Of the picture, clockwise as it is looked at."""
+    left_out: tuple[int, ...] = ()
+    """Markers that did not move with the others: they were moved on the floor."""
+    undone: bool = True
+    """Whether the pose takes it into account; else no pose is told any more."""
+
+    @property
+    def away_px(self) -> float:
+        """Length of the shift."""
+        return float(np.hypot(*self.shift_px))
+
+    def __str__(self) -> str:
+        """What happened, in a sentence."""
+        if not self.undone:
+            return (
+                f"the floor's markers lie about {self.away_px:.1f} px from where they were, each "
+                "in its own way: camera or markers were moved; set the camera up anew"
+            )
+        said = []
+        if self.away_px >= 0.05 or abs(self.turn_rad) > 1e-3:
+            turned = np.degrees(abs(self.turn_rad))
+            said.append(
+                f"the camera was bumped: its picture has moved by {self.away_px:.1f} px"
+                + (f" and turned by {turned:.1f} degrees" if turned >= 0.05 else "")
+                + ", which is undone"
+            )
+        if self.left_out:
+            one = len(self.left_out) == 1
+            names = " and ".join(str(number) for number in self.left_out)
+            said.append(
+                f"marker {names} was moved on the floor and is left out"
+                if one
+                else f"markers {names} were moved on the floor and are left out"
+            )
+        return "; ".join(said) or "the camera is again where it was set up"
+
+
+@dataclass(frozen=True, slots=True)
+class PictureMove:
+    """Where what was seen at one pixel is seen now."""
+
+    now_from_then: Floats
+    """(3, 3) homography of pixels without distortion."""
+    bump: Bump
+
+
+def marker_picture(number: int, side_px: int) -> Image:
+    """(side, side) a marker as it is printed, without its white margin."""
+    side = max(1, side_px // _CELLS) * _CELLS
+    drawn = cv2.aruco.generateImageMarker(_dictionary(), number, side)
+    return np.asarray(drawn, dtype=np.uint8)
+
+
+def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
+    """(H, W) a page: the marker, half a cell of white, and below it its number and side."""
+    drawn = marker_picture(number, round(side_m / _INCH_M * dots_per_inch))
+    margin, foot = len(drawn) // (2 * _CELLS), len(drawn) // 6
+    page = np.pad(drawn, ((margin, margin + foot), (margin, margin)), constant_values=255)
+    text = f"marker {number}   {1e3 * side_m:g} mm"
+    thick = max(1, len(drawn) // 400)
+    size = 0.6 * len(drawn) / cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 1.0, thick)[0][0]
+    at = margin, len(page) - margin // 2
+    cv2.putText(page, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, 0, thick, cv2.LINE_AA)
+    return page
+
+
+def find_markers(picture: Image) -> dict[int, Floats]:
+    """Corners of the markers in a picture (H, W[, 3]); one that is seen twice is none."""
+    grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    large = cv2.resize(grey, None, fx=_LARGER, fy=_LARGER, interpolation=cv2.INTER_CUBIC)
+    corners, numbers, _ = cv2.aruco.ArucoDetector(_dictionary()).detectMarkers(large)
+    names = [] if numbers is None else np.asarray(numbers, dtype=int).ravel().tolist()
+    places = [(np.asarray(one, dtype=float).reshape(4, 2) + 0.5) / _LARGER - 0.5 for one in corners]
+    return {
+        name: _aligned(grey, name, place)
+        for name, place in zip(names, places, strict=True)
+        if names.count(name) == 1
+    }
+
+
+def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
+    """Corners by the whole print, laid onto the picture: gain and saturation do not move them."""
+    cells_px = float(np.hypot(*(corners[1] - corners[0]))) / _CELLS
+    cell = int(np.clip(cells_px, *_DRAWN))
+    drawn = marker_picture(number, _CELLS * cell)
+    white = cell // 2  # a sheet may end beyond
+    sheet = np.pad(drawn, white, constant_values=255).astype(np.float32)
+    low, high = white - 0.5, white - 0.5 + len(drawn)
+    ends = np.array([[low, low], [high, low], [high, high], [low, high]])
+    there = cv2.getPerspectiveTransform(ends.astype(np.float32), corners.astype(np.float32))
+    flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
+    seen = cv2.warpPerspective(grey, there, sheet.shape[::-1], flags=flags).astype(np.float32)
+    sheet = np.asarray(cv2.GaussianBlur(sheet, (0, 0), max(0.3, 0.5 * cell / cells_px)))
+    start, whole = np.eye(2, 3, dtype=np.float32), np.full(seen.shape, 255, np.uint8)
+    try:
+        _, move = cv2.findTransformECC(
+            sheet, seen, start, cv2.MOTION_AFFINE, _STEPS, whole, _SMOOTH
+        )
+    except cv2.error:  # does not converge: half covered, or blurred
+        return corners
+    turned = ends @ np.asarray(move[:, :2], dtype=float).T + move[:, 2]
+    better = projected(np.asarray(there, dtype=float), turned)
+    return better if np.abs(better - corners).max() < _FURTHEST * cells_px else corners
+
+
+def fit_floor(
+    seen: Markers, places_m: Mapping[int, Sequence[float]], lens: Lens | None
+) -> FloorFit:
+    """Fit the floor to the middles of its markers.
+
+    Args:
+        seen: in a picture.
+        places_m: (2,) of the middle of each marker on the floor.
+        lens: without distortion, pixels and floor are one homography; with a lens known the
+            camera's place is told as well.
+
+    Raises:
+        InputError: fewer than four of the markers are seen, or they lie on a line.
+
+    """
+    used = sorted(set(seen) & set(places_m))
+    if len(used) < FEWEST:
+        missing = ", ".join(str(one) for one in sorted(set(places_m) - set(used)))
+        raise InputError(
+            f"{len(used)} of {len(places_m)} markers are seen, {FEWEST} are needed; not seen: "
+            f"{missing}: in the picture, lit, at least 14 px wide?"
+        )
+    px = {name: _plain(seen[name], lens) for name in used}
+    middles = np.array([_middle(px[name]) for name in used])
+    floor = np.array([places_m[name] for name in used], dtype=float)
+    for what, places in (("the picture", middles), ("markers_m", floor)):
+        size = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+        if size[1] < _LEAST_SPREAD * size[0]:
+            raise InputError(f"the markers lie on a line in {what}: spread them over the floor")
+    homography, _ = cv2.findHomography(middles, floor)
+    lens_m: Floats | None = None
+    if lens is not None:
+        rotation, shift = _pose(floor, middles, lens.matrix)  # six numbers in place of eight
+        homography = np.linalg.inv(_over_floor((rotation, shift), lens.matrix))
+        homography, lens_m = homography / homography[2, 2], -rotation.T @ shift
+    if homography is None or not np.isfinite(homography).all():
+        raise InputError("the markers fix no floor: three of four lie on a line")
+    away = projected(homography, middles) - floor
+    sides = {}
+    for name in used:
+        corners = projected(homography, px[name])
+        sides[name] = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).mean())
+    return FloorFit(
+        np.asarray(homography, dtype=float),
+        dict(zip(used, np.hypot(*away.T).tolist(), strict=True)),
+        sides,
+        lens_m,
+    )
+
+
+def picture_move(
+    then: Markers, now: Markers, floor_from_px: Floats, matrix: Floats, lens: Lens | None
+) -> PictureMove | None:
+    """How a camera's picture has moved, by markers that are seen in both.
+
+    A bump turns the camera about its lens, or carries it by a little. Markers that are off from
+    what the others say were moved on the floor; fewer than half may be.
+
+    Args:
+        then: at the set-up.
+        now: later.
+        floor_from_px: (3, 3) of the set-up.
+        matrix: (3, 3) camera matrix, at least nearly.
+        lens: whose distortion is undone first.
+
+    Returns:
+        None where fewer than three markers are seen in both.
+
+    """
+    one, two = ({name: _plain(px, lens) for name, px in seen.items()} for seen in (then, now))
+    names = sorted(set(one) & set(two))
+    if len(names) < _FEWEST_MOVED:
+        return None
+    rest, left_out = list(names), list[int]()
+    while len(rest) >= _FEWEST_MOVED:
+        move = _turned(matrix, one, two, rest)
+        off_px = _residual_px(move, one, two, rest)
+        if off_px <= _AGREE_PX:
+            if off_px > _TURNED_PX:
+                move = _carried(matrix, floor_from_px, one, two, rest)
+            return PictureMove(move, _bump(move, matrix, tuple(sorted(left_out))))
+        if 2 * (len(left_out) + 1) >= len(names):
+            break
+        worst = min(rest, key=lambda name: _without(name, matrix, one, two, rest))
+        rest.remove(worst)
+        left_out.append(worst)
+    move = _carried(matrix, floor_from_px, one, two, names)
+    undone = len(names) >= FEWEST and _residual_px(move, one, two, names) <= _TURNED_PX
+    return PictureMove(move, replace(_bump(move, matrix, ()), undone=undone))
+
+
+def _turned(matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> Floats:
+    """(3, 3) of a camera that was turned about its lens: Wahba's problem by its SVD."""
+    rays = []
+    for seen in (one, two):
+        px = np.concatenate([seen[name] for name in names])
+        ray = np.linalg.solve(matrix, np.column_stack([px, np.ones(len(px))]).T)
+        rays.append(ray / np.linalg.norm(ray, axis=0))
+    left, _, right = np.linalg.svd(rays[1] @ rays[0].T)
+    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left) * np.linalg.det(right)]) @ right
+    return np.asarray(matrix @ turn @ np.linalg.inv(matrix))
+
+
+def _carried(
+    matrix: Floats, floor_from_px: Floats, one: Markers, two: Markers, names: Sequence[int]
+) -> Floats:
+    """(3, 3) of a camera that was turned and carried: its poses over the floor, then and now."""
+    before, after = (np.concatenate([seen[name] for name in names]) for seen in (one, two))
+    floor = projected(floor_from_px, before)
+    then, now = (_pose(floor, px, matrix) for px in (before, after))
+    move = _over_floor(now, matrix) @ np.linalg.inv(_over_floor(then, matrix))
+    return np.asarray(move / move[2, 2])
+
+
+def _without(name: int, matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
+    """How well the others agree without one of them, px."""
+    rest = [other for other in names if other != name]
+    return _residual_px(_turned(matrix, one, two, rest), one, two, rest)
+
+
+def _residual_px(move: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
+    """Of the marker that is furthest off."""
+    return max(
+        float(np.hypot(*(projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
+    )
+
+
+def _bump(move: Floats, matrix: Floats, left_out: tuple[int, ...]) -> Bump:
+    middle = matrix[:2, 2]
+    there = projected(move, middle + np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]]))
+    shift = there[0] - middle
+    right, down = (there[1:] - there[0]) / 10.0
+    turn = float(np.arctan2(right[1] - down[0], right[0] + down[1]))
+    return Bump((float(shift[0]), float(shift[1])), turn, left_out)
+
+
+def _pose(floor: Floats, px: Floats, matrix: Floats) -> tuple[Floats, Floats]:
+    """Turn (3, 3) and place (3,) of the floor as the camera sees it."""
+    flat = np.column_stack([floor, np.zeros(len(floor))])
+    _, turn, shift = cv2.solvePnP(flat, px, matrix, None, flags=cv2.SOLVEPNP_IPPE)
+    turn, shift = cv2.solvePnPRefineLM(flat, px, matrix, None, turn, shift)
+    rotation, _ = cv2.Rodrigues(turn)
+    return np.asarray(rotation, dtype=float), np.asarray(shift, dtype=float).ravel()
+
+
+def _over_floor(pose: tuple[Floats, Floats], matrix: Floats) -> Floats:
+    """(3, 3) pixels from floor."""
+    rotation, shift = pose
+    return np.asarray(matrix @ np.column_stack([rotation[:, :2], shift]))
+
+
+def _middle(corners: Floats) -> Floats:
+    """Where the diagonals (4, 2) cross: the middle, aslant as well."""
+    a, b, c, d = corners
+    along = np.linalg.solve(np.column_stack([c - a, b - d]), b - a)
+    return np.asarray(a + along[0] * (c - a))
+
+
+def _plain(px: Floats, lens: Lens | None) -> Floats:
+    return px if lens is None else lens.undistorted(px)
+
+
+def _dictionary() -> Any:
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARY))

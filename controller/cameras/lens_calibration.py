@@ -1,0 +1,126 @@
+"""The lens from pictures of a board: OpenCV's calibration, and how far it can be believed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.cameras.calibration_board import BoardView
+from snakewalk.controller.cameras.lens import Lens
+
+FEWEST_VIEWS: Final = 5
+_OUTLIER: Final = 3.0  # times the usual view's residual: a blurred or misread picture (ours)
+_CELLS: Final = 6  # each way, in which corners are counted
+_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, where alone k3 can be told
+
+
+@dataclass(frozen=True, slots=True)
+class LensCalibration:
+    """A lens, and what its pictures say of it."""
+
+    lens: Lens
+    rms_px: float
+    """Root mean square distance of corners from where the lens puts them."""
+    view_rms_px: Floats
+    """(V,) the same of each view; NaN of those left out."""
+    focal_error_px: float
+    """Standard error of the focal length."""
+    centre_error_px: float
+    """Standard error of the principal point."""
+    coverage: float
+    """Share of the picture's 6 x 6 parts in which a corner was seen."""
+    tilt_deg: float
+    """Largest angle between the board and the picture's plane."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What would make it better; empty where nothing stands out."""
+        focal = float(self.lens.matrix[0, 0])
+        found = []
+        if self.rms_px > 1.0:
+            found.append(
+                f"the residual of {self.rms_px:.2f} px is large: is the board flat, are the "
+                "squares as told, are the pictures sharp?"
+            )
+        if self.coverage < 0.6:
+            found.append(
+                f"corners lie in {100.0 * self.coverage:.0f} % of the picture: hold the board into "
+                "its corners too, where distortion is largest"
+            )
+        if self.tilt_deg < 15.0:
+            found.append(
+                f"the board was never tilted by more than {self.tilt_deg:.0f} degrees: without "
+                "tilt, distance and focal length are hard to tell apart"
+            )
+        if self.focal_error_px > 0.01 * focal:
+            found.append(
+                f"the focal length is known to {self.focal_error_px:.1f} of {focal:.0f} px only"
+            )
+        return tuple(found)
+
+
+def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) -> LensCalibration:
+    """Find the lens; views far off the others are left out.
+
+    Args:
+        views: what was found in each picture; None is left out.
+        size_px: width, height of the pictures.
+
+    Raises:
+        InputError: too few views, or none that fix a lens.
+
+    """
+    used = {k: view for k, view in enumerate(views) if view is not None}
+    if len(used) < FEWEST_VIEWS:
+        raise InputError(
+            f"the board was found in {len(used)} of {len(views)} pictures; {FEWEST_VIEWS} are "
+            "needed, better 15: is it the board that was told (pattern, squares), sharp and lit?"
+        )
+    while True:
+        found = _calibrated(used, size_px, len(views))
+        usual = float(np.nanmedian(found.view_rms_px))
+        keep = {
+            k: view for k, view in used.items() if found.view_rms_px[k] <= _OUTLIER * usual + 0.1
+        }
+        if len(keep) in (len(used), *range(FEWEST_VIEWS)):
+            return found
+        used = keep
+
+
+def _calibrated(
+    views: Mapping[int, BoardView], size_px: tuple[int, int], count: int
+) -> LensCalibration:
+    """Calibrate with all of ``views``, which are known by their place among ``count``."""
+    board = [np.column_stack([v.corners_m, np.zeros(len(v.corners_m))]) for v in views.values()]
+    try:
+        rms, matrix, distortion, turns, _, errors, _, residuals = cv2.calibrateCameraExtended(
+            [points.astype(np.float32) for points in board],
+            [view.corners_px.astype(np.float32) for view in views.values()],
+            size_px, np.eye(3), np.zeros(5), flags=_FLAGS,
+        )  # fmt: skip
+    except cv2.error as error:
+        raise InputError(f"the pictures fix no lens: {error.err}") from None
+    matrix = np.asarray(matrix, dtype=float)
+    spread = np.asarray(errors, dtype=float).ravel()
+    if not np.isfinite(matrix).all() or not np.isfinite(rms) or min(matrix[[0, 1], [0, 1]]) <= 0.0:
+        raise InputError("the pictures fix no lens: hold the board at more angles and distances")
+    view_rms = np.full(count, np.nan)
+    view_rms[list(views)] = np.asarray(residuals, dtype=float).ravel()
+    places = np.concatenate([view.corners_px for view in views.values()])
+    cells = np.clip(_CELLS * places // size_px, 0, _CELLS - 1)
+    facing = [float(cv2.Rodrigues(turn)[0][2, 2]) for turn in turns]
+    return LensCalibration(
+        lens=Lens(
+            size_px, np.asarray(matrix, dtype=float), np.asarray(distortion, dtype=float).ravel()
+        ),
+        rms_px=float(rms),
+        view_rms_px=view_rms,
+        focal_error_px=float(spread[:2].max()),
+        centre_error_px=float(spread[2:4].max()),
+        coverage=len(np.unique(cells, axis=0)) / _CELLS**2,
+        tilt_deg=float(np.degrees(np.arccos(np.clip(min(facing), -1.0, 1.0)))),
+    )

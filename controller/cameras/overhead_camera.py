@@ -1,0 +1,463 @@
+"""A camera above the floor: from a frame to the body's line in the world.
+
+The floor maps to the image by one homography. The image shows the body's outline, which lies
+as high as its axis; seen from a lens at height ``h`` above the foot ``f``, a point at height ``z``
+covers the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is undone.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
+from snakewalk.controller.cameras.floor_markers import (
+    Bump,
+    Markers,
+    PictureMove,
+    find_markers,
+    fit_floor,
+    picture_move,
+)
+from snakewalk.controller.cameras.lens import Lens, projected
+from snakewalk.controller.cameras.pose_tracking import (
+    REACH_M,
+    BodyPrior,
+    StandingOut,
+    TrackedPose,
+    track_pose,
+)
+from snakewalk.controller.images.body_detector import BodyDetector, Detection
+from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
+from snakewalk.controller.images.silhouette import Polarity, silhouette_of
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_SURROUNDINGS = 0.25  # of the picture's width: the square in which the body is a small part
+_CALM_PX = 200  # fewest pixels away from the body that tell the noise
+_MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
+_HALF = 2  # the floor is matched on a picture so many times smaller
+_PARTS = 6, 4  # of a picture, across and down
+_BETTER = 0.8  # of the square of what is left in a part, where a move explains it (ours)
+_LEAST_PARTS = 3
+_LIKE = 0.2  # correlation of two pictures of the floor, noise and robot included (ours)
+MISPLACED_M = 0.03
+"""A marker that lies further from its measured place fixes no floor (ours)."""
+_LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
+
+
+@dataclass(frozen=True, slots=True)
+class CameraModel:
+    """Where a pixel lies on the floor, and on a level plane above it."""
+
+    floor_from_px: Floats
+    """(3, 3) homography, pixels (x right, y down, whole at the centre of a pixel) to metres."""
+    foot_m: Floats
+    """(2,) floor below the lens."""
+    height_m: float
+    """Of the lens above the floor."""
+    lens: Lens | None = None
+    """Where it distorts, the homography is of pixels without distortion."""
+    moved_px: tuple[float, float] = (0.0, 0.0)
+    """x, y by which the picture has moved since the homography was measured."""
+    markers: Markers = field(default_factory=dict)
+    """Printed markers in the picture in which the homography was measured."""
+
+    @classmethod
+    def of_floor(
+        cls,
+        camera: CameraConfig,
+        centre_m: tuple[float, float],
+        lens: Lens | None,
+        background: Image,
+    ) -> Self:
+        """Build the model by the floor's printed markers, or without any that of a straight look.
+
+        Raises:
+            InputError: the markers fix no floor, as ``from_markers`` says.
+
+        """
+        if camera.markers_m is not None:
+            return cls.from_markers(camera, centre_m, lens, background)
+        return cls.straight_down(camera, centre_m, lens)
+
+    @classmethod
+    def straight_down(
+        cls, camera: CameraConfig, centre_m: tuple[float, float], lens: Lens | None = None
+    ) -> Self:
+        """Build the model of an upright pinhole camera above ``centre_m``."""
+        scale = camera.field_width_m / camera.width_px
+        c, s = scale * np.cos(camera.turn_rad), scale * np.sin(camera.turn_rad)
+        x, y = 0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1)
+        floor = np.eye(3)
+        floor[:2, :2] = [[c, s], [s, -c]]  # the image's y runs down
+        floor[:2, 2] = centre_m[0] - (c * x + s * y), centre_m[1] - (s * x - c * y)
+        return cls(floor, np.array(centre_m, dtype=float), camera.height_m, lens)
+
+    @classmethod
+    def from_corners(
+        cls, camera: CameraConfig, centre_m: tuple[float, float], lens: Lens | None = None
+    ) -> Self:
+        """Build the model from four places that are known in the image and on the floor.
+
+        Raises:
+            InputError: none are given, or three of them lie on a line.
+
+        """
+        if camera.corners_px is None or camera.corners_m is None:
+            raise InputError("camera: corners_px and corners_m are needed")
+        px = np.array(camera.corners_px, dtype=np.float32)
+        if lens is not None:
+            px = lens.undistorted(px.astype(float)).astype(np.float32)
+        floor = np.array(camera.corners_m, dtype=np.float32)
+        for name, corners, whole in (
+            ("corners_px", px, float(camera.width_px * camera.height_px)),
+            ("corners_m", floor, float(np.ptp(floor, axis=0).prod())),
+        ):
+            if _least_triangle(corners) < _LEAST_AREA * whole or whole == 0.0:
+                raise InputError(f"camera: {name}: three of the four places lie on a line")
+        found = np.asarray(cv2.getPerspectiveTransform(px, floor), dtype=float)
+        return cls(found, np.array(centre_m, dtype=float), camera.height_m, lens)
+
+    @classmethod
+    def from_markers(
+        cls,
+        camera: CameraConfig,
+        centre_m: tuple[float, float],
+        lens: Lens | None,
+        background: Image,
+    ) -> Self:
+        """Build the model from printed markers in a picture of the empty floor.
+
+        Where the lens is known its height and foot are those that the markers show.
+
+        Raises:
+            InputError: too few are seen, they lie on a line, or one is not where it was measured.
+
+        """
+        places = camera.marker_places_m
+        markers = {name: px for name, px in find_markers(background).items() if name in places}
+        try:
+            fit = fit_floor(markers, places, lens)
+        except InputError as fault:
+            raise InputError(f"camera: markers_m: {fault}") from None
+        worst = max(fit.residual_m, key=lambda name: fit.residual_m[name])
+        if fit.residual_m[worst] > MISPLACED_M:
+            raise InputError(
+                f"camera: markers_m: marker {worst} lies {1e3 * fit.residual_m[worst]:.0f} mm from "
+                "where it must be by the others: is its place right, or another's?"
+            )
+        foot, height = np.array(centre_m, dtype=float), camera.height_m
+        if fit.lens_m is not None:
+            foot, height = fit.lens_m[:2], float(fit.lens_m[2])
+        return cls(fit.floor_from_px, foot, height, lens, markers=markers)
+
+    def matrix(self, size_px: tuple[int, int]) -> Floats:
+        """(3, 3) camera matrix; without a known lens, that of a lens so high above this floor."""
+        if self.lens is not None:
+            return self.lens.matrix
+        middle = 0.5 * (np.array(size_px, dtype=float) - 1.0)
+        places = projected(
+            self.floor_from_px, middle + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        )
+        across, down = places[1:] - places[0]
+        metre_px = 1.0 / np.sqrt(abs(across[0] * down[1] - across[1] * down[0]))
+        focal = self.height_m * metre_px
+        return np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
+
+    def on_plane(self, points_px: Floats, z_m: float) -> Floats:
+        """(..., 2) world places of pixels (..., 2) of what is ``z_m`` above the floor."""
+        plain = points_px - self.moved_px
+        if self.lens is not None:
+            plain = self.lens.undistorted(plain)
+        floor = projected(self.floor_from_px, plain)
+        return np.asarray(self.foot_m + (floor - self.foot_m) * (1.0 - z_m / self.height_m))
+
+    def in_image(self, points_m: Floats, z_m: float) -> Floats:
+        """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the floor."""
+        return self.projection(z_m)(points_m)
+
+    def projection(self, z_m: float) -> Callable[[Floats], Floats]:
+        """``in_image`` of one height, for many calls."""
+        grow = 1.0 / (1.0 - z_m / self.height_m)
+        onto_floor = np.diag([grow, grow, 1.0])  # what is higher covers the floor further out
+        onto_floor[:2, 2] = self.foot_m * (1.0 - grow)
+        back = np.asarray(np.linalg.inv(self.floor_from_px) @ onto_floor, dtype=float)
+        lens, moved_px = self.lens, np.array(self.moved_px)
+
+        def project(points_m: Floats) -> Floats:
+            plain = projected(back, points_m)
+            return np.asarray((plain if lens is None else lens.distorted(plain)) + moved_px)
+
+        return project
+
+
+@dataclass(frozen=True, slots=True)
+class LineDetection:
+    """The body's line in one frame."""
+
+    time_s: float
+    """When the image was taken."""
+    line_m: Floats
+    """(101, 2) axis of the body in the world from tip to tip, which end first is not known; NaN
+    where the frame shows no whole body."""
+    status: FrameStatus
+
+
+@dataclass(frozen=True, slots=True)
+class OverheadDetector:
+    """Camera, empty floor and height of the body's axis; ``detect`` takes any frame."""
+
+    model: CameraModel
+    background: Image
+    axis_height_m: float
+    shade: float = 0.0
+    """Part of the floor's light that the body's shadow may take: so much darker is still floor."""
+    bump: Bump | None = None
+    """Of the camera since its floor was pictured."""
+    first: Self | None = None
+    """As it was before any bump that markers showed."""
+    pictured: Image | None = None
+    """The floor as it was pictured, where ``background`` has been learnt since: what was put down
+    may be taken away again, and either is floor."""
+
+    def detect(self, image: Image, time_s: float) -> LineDetection:
+        """Find the body in one frame (H, W[, 3]).
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        skeleton = self.detect_px(image).skeleton
+        line = self.model.on_plane(skeleton.points_px, self.axis_height_m)
+        return LineDetection(time_s, line, skeleton.status)
+
+    def registered(self, image: Image) -> Self:
+        """Return the detector for a camera that was bumped; itself where the floor has not moved.
+
+        Printed markers tell turns and tilts as well. Without three of them in view the floor's own
+        texture is matched: tiles, joints. A floor without any tells nothing.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        self._check_size(image)
+        first = self.first or self
+        if first.model.markers:
+            size_px = image.shape[1], image.shape[0]
+            model = first.model
+            move = picture_move(
+                model.markers, find_markers(image), model.floor_from_px, model.matrix(size_px),
+                model.lens,
+            )  # fmt: skip
+            if move is not None:
+                return self._moved_by_markers(first, move, size_px)
+        return self._moved_by_texture(image)
+
+    def _moved_by_markers(self, first: Self, move: PictureMove, size_px: tuple[int, int]) -> Self:
+        """Return the first detector with this move of its picture, where it is another than now."""
+        known, now = self.bump or Bump((0.0, 0.0)), move.bump
+        corners = np.array(
+            [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
+        )
+        floor_from_px = first.model.floor_from_px @ np.linalg.inv(move.now_from_then)
+        back = np.linalg.inv(self.model.floor_from_px) @ floor_from_px
+        off = np.hypot(*(projected(back, corners) - corners + self.model.moved_px).T)
+        same = known.left_out == now.left_out and known.undone == now.undone
+        if same and off.max() < (_MOVED_PX if now.undone else np.inf):
+            return self
+        if not now.undone:
+            return replace(self, bump=now, first=first)
+        model = replace(first.model, floor_from_px=floor_from_px)
+        columns, rows = size_px
+        grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(float)
+        lens = first.model.lens
+        then = projected(
+            np.linalg.inv(move.now_from_then), grid if lens is None else lens.undistorted(grid)
+        )
+        at = (then if lens is None else lens.distorted(then)).astype(np.float32)
+        ground = np.asarray(
+            cv2.remap(
+                first.background, at[..., 0], at[..., 1], cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            ),
+            dtype=np.uint8,
+        )  # fmt: skip
+        return replace(self, model=model, background=ground, bump=now, first=first, pictured=None)
+
+    def _moved_by_texture(self, image: Image) -> Self:
+        """The shift under which the floor's own texture lies best.
+
+        What moves in the picture covers parts of it; so the move must explain three parts more than
+        it spoils.
+        """
+        floor, now = (_texture(one) for one in (self.background, image))
+        far = _FURTHEST_PX // _HALF
+        likeness = cv2.matchTemplate(now, floor[far:-far, far:-far], cv2.TM_CCOEFF_NORMED)
+        _, best, _, (column, row) = cv2.minMaxLoc(likeness)
+        if best < _LIKE or not (0 < column < 2 * far and 0 < row < 2 * far):
+            return self
+        x, y = (
+            _HALF * (k - far + _peak(np.asarray(line[k - 1 : k + 2], dtype=float)))
+            for k, line in ((column, likeness[row]), (row, likeness[:, column]))
+        )
+        if np.hypot(x, y) < _MOVED_PX:
+            return self
+        old = self.model.moved_px
+        columns, rows = image.shape[1], image.shape[0]
+
+        def shifted(ground: Image) -> Image:
+            return np.asarray(
+                cv2.warpAffine(
+                    ground, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), (columns, rows),
+                    flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE,
+                ),
+                dtype=np.uint8,
+            )  # fmt: skip
+
+        moved = shifted(self.background)
+        if _parts_explained(now, floor, _texture(moved)) < _LEAST_PARTS:
+            return self
+        away = old[0] + x, old[1] + y
+        model = replace(self.model, moved_px=away)
+        pictured = None if self.pictured is None else shifted(self.pictured)
+        return replace(self, model=model, background=moved, bump=Bump(away), pictured=pictured)
+
+    def track(
+        self, image: Image, time_s: float, prior: BodyPrior, robot: RobotConfig
+    ) -> TrackedPose:
+        """Find the robot in one frame near to where it is believed; nothing else is looked at.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        self._check_size(image)
+        seen = self._standing_out(image, prior, robot)
+        found = track_pose(robot, seen, prior, time_s)
+        if self.bump is not None and not self.bump.undone:
+            return replace(found, fault=str(self.bump), bump=self.bump)
+        px = self.model.in_image(prior.links_m, self.axis_height_m)
+        within = (px >= 0.0) & (px <= np.array(image.shape[1::-1]) - 1.0)
+        fault = str(FrameStatus.CUT) if found.fault and not within.all() else found.fault
+        return replace(found, fault=fault, bump=self.bump)
+
+    def _standing_out(self, image: Image, prior: BodyPrior, robot: RobotConfig) -> StandingOut:
+        to_px = self.model.projection(self.axis_height_m)
+        reach_m = REACH_M + 3.0 * robot.body_radius_m
+        around = reach_m * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        px = to_px((prior.links_m[:, None] + around).reshape(-1, 2))
+        rows, columns = image.shape[:2]
+        left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
+        right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
+        window = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
+        frame = np.ascontiguousarray(image[window])
+        line = to_px(prior.links_m) - (left, top)
+        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.middles_apart_m
+        radius = robot.body_radius_m * metre
+        area = 2.0 * radius * robot.length_m * metre
+        now = np.asarray(cv2.GaussianBlur(frame, (3, 3), 0.0), dtype=np.uint8)
+        apart = np.full(frame.shape[:2], np.inf, dtype=np.float32)
+        for floor in (self.background, self.pictured):
+            if floor is not None:
+                lit = cv2.GaussianBlur(lit_floor(frame, floor[window], area), (3, 3), 0.0)
+                off = unexplained(now, np.asarray(lit, dtype=np.uint8), self.shade)
+                apart = np.minimum(apart, off)
+        near = np.zeros(apart.shape, dtype=np.uint8)
+        spots = np.rint(line).astype(np.int32).reshape(-1, 1, 2)
+        cv2.polylines(near, [spots], False, 255, max(1, round(2.0 * reach_m * metre)))
+        away = apart[near == 0]
+        some = away if away.size > _CALM_PX else apart.ravel()
+        middle = float(np.median(some))
+        above = some[some > middle] - middle
+        spread = (1.4826 * float(np.median(above)) if above.size else 0.0) + 0.5
+        clear = middle + 4.0 * spread
+        body = apart[(near > 0) & (apart > clear)]
+        level = float(np.median(body)) if body.size > 0.2 * area else 255.0
+        low_level = middle + 2.0 * spread
+        share = (apart - low_level) / max(0.7 * level - low_level, spread)
+        share = np.clip(share, 0.0, 1.0) * (near > 0)
+        return StandingOut(share.astype(np.float32), np.array([left, top], dtype=float), to_px)
+
+    def _check_size(self, image: Image) -> None:
+        floor = self.background
+        if image.shape != floor.shape:
+            sizes = " and ".join(f"{one.shape[1]} x {one.shape[0]}" for one in (image, floor))
+            raise InputError(f"frame and background must be alike, they are {sizes} pixels")
+
+    def detect_px(self, image: Image) -> Detection:
+        """Silhouette and skeleton of a frame, in pixels.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        apart = self._apart(image)
+        return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
+
+    def outline(self, image: Image, time_s: float) -> LineDetection:
+        """Find the body in one frame (H, W[, 3]) by its outline alone: a tenth of the time.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        apart = self._apart(image)
+        body = silhouette_of(apart, np.zeros_like(apart), Polarity.BOTH)
+        good = body.status is FrameStatus.GOOD
+        skeleton = skeleton_of(body.mask) if good else no_skeleton(body.status)
+        points = skeleton.points_px + body.origin_px
+        line = self.model.on_plane(points, self.axis_height_m)
+        return LineDetection(time_s, line, skeleton.status)
+
+    def _apart(self, image: Image) -> Image:
+        """(H, W) grey levels by which a frame is off its floor."""
+        self._check_size(image)
+        floor = self.background
+        lit = lit_floor(image, floor, 0.5 * (_SURROUNDINGS * image.shape[1]) ** 2)
+        return np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
+
+
+def _texture(image: Image) -> NDArray[np.float32]:
+    """(H / 2, W / 2) edges of a picture: light that changes slowly is not among them."""
+    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    half = grey.shape[1] // _HALF, grey.shape[0] // _HALF
+    small = cv2.resize(grey, half, interpolation=cv2.INTER_AREA).astype(np.float32)
+    fine, coarse = (cv2.GaussianBlur(small, (0, 0), reach) for reach in (1.0, 4.0))
+    return np.asarray(np.clip(fine - coarse, -8.0, 8.0), dtype=np.float32)
+
+
+def _parts_explained(
+    now: NDArray[np.float32], floor: NDArray[np.float32], moved: NDArray[np.float32]
+) -> int:
+    """How many more parts of the picture are like the moved floor than like the one before."""
+    far = _FURTHEST_PX // _HALF
+    before, after = (
+        cv2.resize(
+            ((now - one) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA
+        ) for one in (floor, moved)
+    )  # fmt: skip
+    better, worse = after < _BETTER * before, before < _BETTER * after
+    return int(better.sum()) - int(worse.sum())
+
+
+def _peak(values: Floats) -> float:
+    """Place of the top of the parabola through three values, from the middle one."""
+    bend = float(values[0] - 2.0 * values[1] + values[2])
+    return 0.0 if bend >= 0.0 else 0.5 * float(values[0] - values[2]) / bend
+
+
+def _least_triangle(corners: NDArray[np.float32]) -> float:
+    areas = []
+    for out in range(4):
+        a, b, c = np.delete(corners, out, axis=0).astype(float)
+        (ux, uy), (vx, vy) = b - a, c - a
+        areas.append(0.5 * abs(ux * vy - uy * vx))
+    return float(min(areas))

@@ -1,0 +1,293 @@
+"""The pose of a chain of known shape in a frame, near to where it must be.
+
+The joints are measured and the last pose is known, so the chain is looked for as a whole: first its
+axis on a ridge filter of what stands out from the floor, then, section by section across the body,
+the middle of what stands out there, fitted rigidly. Only what lies near the body is looked at.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.floor_markers import Bump
+from snakewalk.drivers.least_squares import least_squares
+
+REACH_M: Final = 0.10
+"""How far the body may be from where it is believed."""
+_TURN_RAD: Final = 0.15
+_STEP_M, _STEP_RAD = 0.0125, 0.0375  # of the search
+_ROUNDS: Final = 8
+_WIDE: Final = 2.0  # radii to each side that a section looks at, at first
+_NARROW: Final = 1.5  # and then
+_STILL_M: Final = 3e-4  # a smaller step ends the fit
+_SAMPLES: Final = 17
+_SECTION_M: Final = 0.003  # usual error of a section's middle
+_TIP_M: Final = 0.012  # of a tip: heads and tails differ from the model
+_CAP: Final = 0.4  # of the radius: by how much a tip sticks out of its link
+_REGULAR: Final = np.array([1e-6, 1e-6, 1e-6])
+_LEAST_SEEN: Final = 0.7  # of the sections
+_LEAST_HALF: Final = 0.5  # of those of each half of the body
+_OFF: Final = 0.3  # of the radius: largest residual of a fit that is believed
+_TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
+_THIN, _THICK = 0.2, 1.5  # of the body's width: what a section may hold
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPrior:
+    """Where a chain is believed to be when a frame is taken."""
+
+    links_m: Floats
+    """(L, 2) centres of the links in the world, the head's first."""
+    forward: Floats
+    """(L, 2) directions of the links, towards the head."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedPose:
+    """What a frame says of a believed pose."""
+
+    time_s: float
+    """When the image was taken."""
+    head_m: Floats
+    """(2,) centre of the head link."""
+    heading_rad: float
+    """Of the head link, in (-pi, pi]."""
+    error_m: float
+    """Root of the mean square distance of the sections' middles from the chain."""
+    fault: str
+    """Why it must not be used; empty where it may."""
+    bump: Bump | None = None
+    """Of the camera since it was set up."""
+
+
+@dataclass(frozen=True, slots=True)
+class StandingOut:
+    """What stands out from the floor in a window of a frame."""
+
+    share: NDArray[np.float32]
+    """(h, w) 0: floor, 1: as much as the body."""
+    origin_px: Floats
+    """(2,) x, y of its first pixel in the frame."""
+    to_px: Callable[[Floats], Floats]
+    """Places (..., 2) in the world, as high as the body's axis, to pixels of the frame."""
+
+    def at(self, places_m: Floats) -> Floats:
+        """(...,) share at places (..., 2)."""
+        px = (self.to_px(places_m) - self.origin_px).astype(np.float32)
+        flat = px.reshape(-1, 1, 2)
+        found = cv2.remap(
+            self.share, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+        )
+        return np.asarray(found, dtype=float).reshape(places_m.shape[:-1])
+
+
+def track_pose(
+    robot: RobotConfig, seen: StandingOut, prior: BodyPrior, time_s: float
+) -> TrackedPose:
+    """Find the chain near to where it is believed.
+
+    From frame to frame the belief is off by little, so the search is made only where a fit from
+    the belief itself fails.
+    """
+    chain = _chain(robot, prior)
+    found = _fit(robot, seen, chain, time_s, (np.zeros(2), 0.0))
+    if not found.fault:
+        return found
+    start = _search(seen, chain.places_m, chain.middle_m, robot.body_radius_m)
+    return _fit(robot, seen, chain, time_s, start)
+
+
+@dataclass(frozen=True, slots=True)
+class _Chain:
+    """Where sections and tips of a believed body lie."""
+
+    places_m: Floats
+    """(S, 2) two sections a link."""
+    ahead: Floats
+    """(S, 2) directions there."""
+    tips_m: Floats
+    """(2, 2) head's, tail's."""
+    out: Floats
+    """(2, 2) directions out of the body there."""
+    middle_m: Floats
+    """(2,) of the sections."""
+    head_m: Floats
+    """(2,) of the head link."""
+    heading_rad: float
+
+
+def _chain(robot: RobotConfig, prior: BodyPrior) -> _Chain:
+    lengths_m, radii_m = np.array(robot.link_lengths_m), np.array(robot.link_radii_m)
+    quarter = (0.25 * lengths_m)[:, None] * prior.forward
+    places = np.stack([prior.links_m + quarter, prior.links_m - quarter], 1).reshape(-1, 2)
+    reach = 0.5 * lengths_m[[0, -1]] + _CAP * radii_m[[0, -1]]
+    out = np.stack([prior.forward[0], -prior.forward[-1]])
+    tips = prior.links_m[[0, -1]] + reach[:, None] * out
+    heading = float(np.arctan2(prior.forward[0, 1], prior.forward[0, 0]))
+    return _Chain(
+        places,
+        np.repeat(prior.forward, 2, axis=0),
+        tips,
+        out,
+        places.mean(axis=0),
+        prior.links_m[0],
+        heading,
+    )
+
+
+def _fit(
+    robot: RobotConfig,
+    seen: StandingOut,
+    chain: _Chain,
+    time_s: float,
+    start: tuple[Floats, float],
+) -> TrackedPose:
+    """Fit the chain rigidly from a shift (2,) and a turn about its middle on."""
+    (shift, turn), middle, radius_m = start, chain.middle_m, robot.body_radius_m
+    places, tips = chain.places_m - middle, chain.tips_m - middle
+    wide = _WIDE
+    for left in range(_ROUNDS, 0, -1):
+        wide = _NARROW if left <= _ROUNDS // 2 else wide
+        c, s = np.cos(turn), np.sin(turn)
+        spin = np.array([[c, s], [-s, c]])
+        here, forward, out = places @ spin, chain.ahead @ spin, chain.out @ spin
+        ends_m = tips @ spin
+        at = middle + shift
+        section_spots, off = _section_spots(here + at, forward, wide * radius_m)
+        tip_spots, off_tip = _tip_spots(ends_m + at, out, radius_m)
+        value = seen.at(np.concatenate([section_spots.reshape(-1, 2), tip_spots.reshape(-1, 2)]))
+        count = section_spots.shape[0] * section_spots.shape[1]
+        across, sections = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
+        along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
+        if sections.sum() < 3:
+            break
+        normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
+        rows = np.concatenate([
+            _rows(here, normal)[sections] / _SECTION_M, _rows(ends_m, out)[ends] / _TIP_M
+        ])  # fmt: skip
+        target = np.concatenate([across[sections] / _SECTION_M, along[ends] / _TIP_M])
+        usual = max(1.0, 1.4826 * float(np.median(np.abs(target))))
+        weight = np.sqrt(1.0 / np.maximum(1.0, np.abs(target) / (1.5 * usual)))
+        step = least_squares(rows * weight[:, None], target * weight, _REGULAR)
+        shift, turn = shift + step[:2], turn + float(step[2])
+        if float(np.hypot(*step[:2])) < _STILL_M:
+            if wide == _NARROW:
+                break
+            wide = _NARROW
+    head = spin.T @ (chain.head_m - middle) + middle + shift
+    heading = chain.heading_rad + turn
+    error_m = float(np.sqrt(np.mean(across[sections] ** 2))) if sections.any() else np.inf
+    return TrackedPose(
+        time_s,
+        head,
+        float(np.arctan2(np.sin(heading), np.cos(heading))),
+        error_m,
+        _fault(robot, sections, error_m, along, ends, shift),
+    )
+
+
+def _search(
+    seen: StandingOut, places: Floats, middle: Floats, radius_m: float
+) -> tuple[Floats, float]:
+    """Shift (2,) and turn under which the chain's axis lies best on a ridge."""
+    px = seen.to_px(middle + np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]]))
+    grow = (px[1:] - px[0]) / 0.01  # (2, 2) rows: pixels for a metre of x, of y
+    radius = radius_m * float(np.sqrt(abs(np.linalg.det(grow))))
+    ridge = cv2.GaussianBlur(seen.share, (0, 0), 0.5 * radius) - cv2.GaussianBlur(
+        seen.share, (0, 0), 1.5 * radius
+    )
+    at = seen.to_px(places) - seen.origin_px
+    side = np.arange(-REACH_M, REACH_M + 1e-9, _STEP_M)
+    turns = np.arange(-_TURN_RAD, _TURN_RAD + 1e-9, _STEP_RAD)
+    x, y = (one.ravel() for one in np.meshgrid(side, side))
+    moves = np.stack([x, y], axis=1) @ grow
+    best, found = -np.inf, (np.zeros(2), 0.0)
+    rows, columns = ridge.shape
+    for turn in turns:
+        r = places - middle
+        swung = np.stack([
+            (np.cos(turn) - 1.0) * r[:, 0] - np.sin(turn) * r[:, 1],
+            np.sin(turn) * r[:, 0] + (np.cos(turn) - 1.0) * r[:, 1],
+        ], axis=1) @ grow  # fmt: skip
+        spots = np.rint((at + swung)[None] + moves[:, None]).astype(np.int32)
+        inside = (
+            (spots[..., 0] >= 0) & (spots[..., 0] < columns)
+            & (spots[..., 1] >= 0) & (spots[..., 1] < rows)
+        )  # fmt: skip
+        value = ridge[np.clip(spots[..., 1], 0, rows - 1), np.clip(spots[..., 0], 0, columns - 1)]
+        score = np.where(inside, value, 0.0).mean(axis=1)
+        k = int(score.argmax())
+        if score[k] > best:
+            best, found = float(score[k]), (np.array([x[k], y[k]]), float(turn))
+    return found
+
+
+def _section_spots(here: Floats, forward: Floats, wide_m: float) -> tuple[Floats, Floats]:
+    """Places (S, N, 2) across the chain, and how far left (N,) of it they lie."""
+    off = np.linspace(-wide_m, wide_m, _SAMPLES)
+    normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
+    return here[:, None] + off[:, None] * normal[:, None], off
+
+
+def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]]:
+    """How far left (S,) of the chain the middle of what stands out lies, and where that is told."""
+    held = value.sum(axis=1)
+    width = held * (off[1] - off[0]) / (2.0 * radius_m)
+    told = (width > _THIN) & (width < _THICK)
+    return (value @ off) / np.maximum(held, 1e-9), told
+
+
+def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floats]:
+    """Places (2, N, 3, 2) along the chain's tips, and how far beyond (N,) them they lie."""
+    off = np.linspace(-1.5 * radius_m, 2.5 * radius_m, 2 * _SAMPLES)
+    normal = np.stack([-out[:, 1], out[:, 0]], axis=1)
+    side = 0.4 * radius_m * np.array([-1.0, 0.0, 1.0])
+    spots = (
+        tips[:, None, None] + off[:, None, None] * out[:, None, None]
+        + side[:, None] * normal[:, None, None]
+    )  # fmt: skip
+    return spots, off
+
+
+def _tips(value: Floats, off: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """How far beyond the chain's tips (2,) the body ends, and where an end is seen."""
+    value = value.max(axis=2)
+    end = off[0] + value.sum(axis=1) * (off[1] - off[0])
+    told = (value[:, :4].mean(axis=1) > 0.5) & (value[:, -4:].mean(axis=1) < 0.3)
+    return end, told
+
+
+def _rows(r: Floats, direction: Floats) -> Floats:
+    """(N, 3) by how much a shift and a turn move points at ``r`` along ``direction``."""
+    turned = direction[:, 1] * r[:, 0] - direction[:, 0] * r[:, 1]
+    return np.column_stack([direction, turned])
+
+
+def _fault(
+    robot: RobotConfig,
+    sections: NDArray[np.bool_],
+    error_m: float,
+    along: Floats,
+    ends: NDArray[np.bool_],
+    shift: Floats,
+) -> str:
+    half = len(sections) // 2
+    share = float(sections.mean())
+    least = min(float(sections[:half].mean()), float(sections[half:].mean()))
+    if share < _LEAST_SEEN or least < _LEAST_HALF:
+        return f"{100.0 * share:.0f} % of the body is seen where it must be"
+    if error_m > _OFF * robot.body_radius_m:
+        return f"what is seen lies {error_m * 1e3:.0f} mm off the measured joints"
+    if not ends.any():
+        return "neither tip of the body is seen"
+    if float(np.abs(along[ends]).max()) > _TIP_OFF * robot.body_radius_m:
+        return "a tip of the body is not where it must be"
+    if float(np.hypot(*shift)) > 1.4 * REACH_M:
+        return "what is seen lies too far from where the body must be"
+    return ""

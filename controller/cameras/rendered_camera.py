@@ -1,0 +1,147 @@
+"""The overhead camera of a run: the simulator's rendered top view, or a device at the bench."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.cameras.camera_pose import PriorAt
+from snakewalk.controller.cameras.floor_learning import FloorLearning
+from snakewalk.controller.cameras.floor_markers import marker_picture
+from snakewalk.controller.cameras.overhead_camera import (
+    CameraModel,
+    LineDetection,
+    OverheadDetector,
+)
+from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.drivers.clock import Clock
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import FloorPrint
+
+OnPicture = Callable[[Image, float], None]
+"""Takes a picture (H, W, 3), blue first as OpenCV has it, and its time."""
+CHECK_FRAMES = 15
+"""After so many frames each it is looked whether the camera was bumped."""
+
+
+def centre_of(run: RunConfig) -> tuple[float, float]:
+    """Floor under the lens: as given, or the middle of start and waypoints."""
+    if run.camera.centre_m is not None:
+        return run.camera.centre_m
+    places = np.array([run.start_m, *run.waypoints_m])
+    x, y = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    return float(x), float(y)
+
+
+def require_whole_body(detection: LineDetection, camera: str) -> LineDetection:
+    """Return the detection.
+
+    Raises:
+        InputError: it does not show the whole body.
+
+    """
+    if detection.status is not FrameStatus.GOOD:
+        raise InputError(f"{camera}: the robot is not seen whole at its start: {detection.status}")
+    return detection
+
+
+def floor_prints(camera: CameraConfig) -> "list[FloorPrint]":
+    """The printed markers of a simulated floor, each with a white margin of a cell."""
+    from snakewalk.sim.rendering.looks import FloorPrint  # noqa: PLC0415  the simulator is an extra
+
+    found = []
+    for number, place_m in camera.marker_places_m.items():
+        drawn = marker_picture(number, 96)
+        cell = len(drawn) // 6
+        sheet = np.pad(drawn, cell, constant_values=255)
+        found.append(FloorPrint(place_m, camera.marker_side_m * len(sheet) / len(drawn), sheet))
+    return found
+
+
+def rendered_detector(run: RunConfig, robot: RobotConfig, ground: Image) -> OverheadDetector:
+    """Build the detector of the simulator's camera from its picture (H, W, 3) of the empty floor.
+
+    Raises:
+        InputError: its markers fix no floor.
+
+    """
+    camera = run.camera
+    model = CameraModel.of_floor(camera, centre_of(run), None, ground)
+    return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
+
+
+class RenderedCamera:
+    """The simulated robot from above; each frame arrives one period after it was taken.
+
+    A frame is taken at the first read of the joints at or after its time, and dated with that read.
+
+    Raises:
+        OffscreenError: nothing here draws without a screen.
+
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        qpos: Callable[[], Floats],
+        clock: Clock,
+        on_picture: OnPicture = lambda picture, time_s: None,
+    ) -> None:
+        from snakewalk.sim.rendering.top_view import TopView  # noqa: PLC0415  the simulator is an extra
+
+        centre_m = centre_of(run)
+        self._view = TopView(robot, world, run.camera, centre_m, run.seed, floor_prints(run.camera))
+        self.detector = rendered_detector(run, robot, self._view.empty_floor())
+        self._qpos, self._clock, self._on_picture = qpos, clock, on_picture
+        self._period_s = 1.0 / run.camera.rate_hz
+        self._next_s = clock.now_s()
+        self._coming: deque[LineDetection | TrackedPose] = deque()
+        self._robot = robot
+        self._learning = FloorLearning(robot, run.camera.learn_s)
+        self._taken = 0
+        require_whole_body(self.first(), "the simulated camera")
+
+    def first(self) -> LineDetection:
+        """Look now."""
+        return self._detect(self._clock.now_s())
+
+    def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
+        """Take a frame if one is due; return those that have arrived."""
+        if now_s >= self._next_s - 1e-9:
+            self._coming.append(self._track(now_s, prior_at(now_s)))
+            missed = int((now_s - self._next_s) / self._period_s + 1e-9)
+            self._next_s += (missed + 1) * self._period_s
+        found: list[LineDetection | TrackedPose] = []
+        while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
+            found.append(self._coming.popleft())
+        return found
+
+    def close(self) -> None:
+        """Free the frame buffer."""
+        self._view.close()
+
+    def _track(self, now_s: float, prior: BodyPrior | None) -> LineDetection | TrackedPose:
+        picture = self._view.picture(self._qpos())
+        self._on_picture(picture[..., ::-1], now_s)
+        self._taken += 1
+        if self._taken % CHECK_FRAMES == 0:
+            self.detector = self.detector.registered(picture)
+        if prior is None:
+            return self.detector.detect(picture, now_s)
+        found = self.detector.track(picture, now_s, prior, self._robot)
+        self.detector = self._learning.after(self.detector, picture, prior, found)
+        return found
+
+    def _detect(self, now_s: float) -> LineDetection:
+        return self.detector.detect(self._view.picture(self._qpos()), now_s)

@@ -1,0 +1,1 @@
+"""Commands that make and analyse tracks, one command per file."""

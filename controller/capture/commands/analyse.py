@@ -1,0 +1,144 @@
+"""``snakewalk analyse``: how the animal of a recording moved."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import (
+    Individual,
+    Json,
+    Keypoints,
+    MinScore,
+    Plane,
+    Rate,
+    console,
+)
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+
+
+def analyse(
+    recordings: Annotated[
+        list[str],
+        typer.Argument(
+            help="shipped names, or files of tracked bodies",
+            metavar="TRACK",
+            autocompletion=completion.RECORDINGS,
+        ),
+    ],
+    rate: Rate = None,
+    min_score: MinScore = None,
+    individual: Individual = None,
+    keypoints: Keypoints = None,
+    plane: Plane = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="draw tracks and maps: a file (.png, .svg, .pdf), or a folder for PNGs"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite pictures")] = False,
+    as_json: Json = False,
+) -> None:
+    """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""
+    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
+    from snakewalk.controller.track.analysis import analyse as measure  # noqa: PLC0415  heavy
+    from snakewalk.controller.track.readers.generated import EMBEDDED  # noqa: PLC0415
+    from snakewalk.controller.track.readers.keypoints import ALL, choice_of  # noqa: PLC0415
+    from snakewalk.controller.track.readers.load import check_rate, load_track  # noqa: PLC0415
+
+    check_rate(rate, recordings)
+    choice = choice_of(individual, keypoints, plane)
+    files = _pictures(recordings, picture, force)
+    found = []
+    pairs = list(zip(recordings, files, strict=True))
+    for name, file in show_progress(pairs, "recordings", len(pairs)):
+        shipped = name in EMBEDDED
+        one = measure(
+            load_track(name, *(None, None, ALL) if shipped else (rate, min_score, choice))
+        )
+        if file is not None:
+            from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415
+
+            draw_analysis(one, file)
+        found.append(one.facts() | {"picture": None if file is None else str(file)})
+    if as_json:
+        print(json.dumps(found))
+        return
+    for facts in found:
+        _show(facts)
+
+
+def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[Path | None]:
+    """Where each recording's picture goes; refused before anything is measured."""
+    if picture is None:
+        return [None] * len(recordings)
+    if picture.suffix and not picture.is_dir():
+        check_picture(picture)
+        if len(recordings) > 1:
+            raise InputError(f"{picture}: one file for {len(recordings)} recordings; give a folder")
+        files = [picture]
+    else:
+        files = [picture / f"{Path(name).stem}.png" for name in recordings]
+    if len(set(files)) < len(files):
+        raise InputError(f"{picture}: two recordings have the same name; draw them one by one")
+    refuse_to_overwrite(files, force)
+    return list(files)
+
+
+def _show(facts: dict[str, Any]) -> None:
+    """One recording as a table of two columns with the units in words."""
+    assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
+    if facts["times_uneven"]:
+        assumed = " (frames came at uneven times; bodies put between them)"
+    bridged = f"{facts['frames_bridged']} with a keypoint set, " if facts["frames_bridged"] else ""
+    length = "no scale" if facts["length_m"] is None else f"{1e3 * facts['length_m']:.4g} mm long"
+    low, high = facts["pulse_quartiles_body_lengths_s"]
+    direction = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
+    no_wave, no_pulse, no_travel = (
+        facts[f"{what}_not_told"] and f"not told: {facts[f'{what}_not_told']}"
+        for what in ("wave", "pulse", "travel")
+    )
+    rows = {
+        "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
+        f"{bridged}"
+        f"{facts['rate_hz']:g} Hz{assumed}, {length}",
+        "frequency": no_wave or f"{facts['frequency_hz']} Hz",
+        "wave": no_wave
+        or f"{facts['waves_on_body']} on the body: {facts['wavelength_body_lengths']} body "
+        f"lengths, {facts['wave_number_rad_per_body_length']} rad a body length, {direction}; "
+        f"it is {facts['wave_share']:.0%} of the bending",
+        "pulse speed": no_pulse
+        or f"{facts['pulse_body_lengths_s']} body lengths/s (half of it {low} to "
+        f"{high}), {facts['pulse_points_per_frame']} points a frame; known at "
+        f"{facts['pulse_measured_share']:.0%} of body and time",
+        "one pulse speed for the body": no_pulse
+        or f"leaves {facts['one_pulse_error_rad']} rad; goes with the "
+        f"slope along the body by {facts['one_pulse_error_correlation']}",
+        "frequency x wavelength": no_wave or f"{facts['wave_speed_body_lengths_s']} body lengths/s",
+        "travel": no_travel
+        or f"{facts['travel']} of the pulse speed; sliding weight w_d {facts['sliding_weight']}",
+        "angle amplitude": _along(facts["angle_amplitude_rad"], "rad"),
+        "sideways amplitude": _along(facts["lateral_amplitude_body_lengths"], "body lengths"),
+        "bend K": f"{facts['bend_k_rad']} rad",
+        "in 7 coefficients": f"{facts['energy_kept']:.2%} of the shapes' energy, "
+        f"{facts['energy_kept_least']:.2%} of the worst",
+        "states lie within": ", ".join(f"{a}-{b}" for a, b in facts["state_amplitudes_rad"])
+        + " rad: amplitudes of coefficients 1-7, between which random states are drawn",
+    }
+    if facts["picture"]:
+        rows["picture"] = facts["picture"]
+    if not no_wave and facts["time_towards_head"] > 0.1:
+        rows["note"] = (
+            f"the wave runs towards the head {facts['time_towards_head']:.0%} of the time"
+        )
+    table = Table(title=facts["recording"], title_justify="left", box=None, show_header=False)
+    for key, text in rows.items():
+        table.add_row(key, text)
+    console.print(table)
+
+
+def _along(values: list[float], unit: str) -> str:
+    return f"{', '.join(map(str, values))} {unit} (head, 1/4, 1/2, 3/4, tail)"

@@ -1,0 +1,114 @@
+"""``snakewalk capture``: from a film of an animal to a track that the robot can walk."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.options import Json, show
+
+
+def capture(
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            help="a video, or a folder of images; with --corrections a track captured before",
+            metavar="VIDEO|FOLDER|TRACK.npz",
+        ),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the track")] = Path("track.npz"),
+    background: Annotated[
+        Path | None, typer.Option(help="image without the animal; default: estimated from frames")
+    ] = None,
+    length_m: Annotated[
+        float | None, typer.Option(help="how long the animal is: the scale")
+    ] = None,
+    marker: Annotated[
+        str | None,
+        typer.Option(
+            help="or: the SIDE, m, of a printed ArUco or AprilTag marker in view; or "
+            "X0,Y0,X1,Y1,METRES, two places in the image and how far apart they are"
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(help="frames a second, instead of what the file says")
+    ] = None,
+    head: Annotated[
+        str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")
+    ] = None,
+    cropped: Annotated[
+        bool,
+        typer.Option(
+            "--cropped", help="the images were cropped to the animal, or the camera moves"
+        ),
+    ] = False,
+    roi: Annotated[
+        str | None, typer.Option(help="look only here: X,Y,W,H in pixels", metavar="X,Y,W,H")
+    ] = None,
+    mask: Annotated[
+        Path | None, typer.Option(help="look only where this picture is white", metavar="PNG")
+    ] = None,
+    threshold: Annotated[
+        float | None,
+        typer.Option(
+            help="grey levels by which the body's boundary stands out from the background; "
+            "default: half of the body's own contrast"
+        ),
+    ] = None,
+    overlay: Annotated[
+        Path | None, typer.Option(help="write the film with the skeleton on it (.mp4, .avi)")
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option(help="write a contact sheet of frames (.png, .jpg)")
+    ] = None,
+    steps: Annotated[
+        Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
+    ] = None,
+    review: Annotated[
+        Path | None,
+        typer.Option(
+            help="write a page (.html) on which a person flips heads, leaves frames out, drags "
+            "points, and saves the corrections; open it in a browser",
+            metavar="PAGE",
+        ),
+    ] = None,
+    corrections: Annotated[
+        Path | None,
+        typer.Option(
+            help="apply what was saved on the review page of TRACK.npz; write to -o", metavar="JSON"
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
+    as_json: Json = False,
+) -> None:
+    """Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail."""
+    require_extra("capture needs", "cv2", "skimage")
+    from snakewalk.controller.capture.capturing import (  # noqa: PLC0415  heavy
+        CaptureOptions,
+        capture_recording,
+        correct_recording,
+    )
+
+    options = CaptureOptions(
+        recording=recording,
+        output=output,
+        background=background,
+        length_m=length_m,
+        marker=marker,
+        rate_hz=rate,
+        head=head,
+        cropped=cropped,
+        roi=roi,
+        mask=mask,
+        threshold=threshold,
+        overlay=overlay,
+        sheet=sheet,
+        steps=steps,
+        review=review,
+        corrections=corrections,
+        force=force,
+    )
+    facts = (capture_recording if corrections is None else correct_recording)(options)
+    show(asdict(facts), as_json)

@@ -1,0 +1,137 @@
+"""``snakewalk track``: what recordings are, and what of them a robot can do."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import (
+    Force,
+    GivenRobot,
+    GivenWorld,
+    Individual,
+    Json,
+    Keypoints,
+    MinScore,
+    Plane,
+    Rate,
+    console,
+)
+
+if TYPE_CHECKING:
+    from snakewalk.controller.capture.recording import RecordingFacts
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+
+
+def track(
+    recordings: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="shipped names or files; default: the shipped ones",
+            metavar="NAME",
+            autocompletion=completion.RECORDINGS,
+        ),
+    ] = None,
+    robot: GivenRobot = "yaw16",
+    world: GivenWorld = "flat",
+    rate: Rate = None,
+    min_score: MinScore = None,
+    individual: Individual = None,
+    keypoints: Keypoints = None,
+    plane: Plane = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="write what was chosen as a track of its own (.npz)"),
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
+    check_picture(picture)
+    refuse_to_overwrite([picture, output], force)
+
+    from snakewalk.controller.capture.recording import examine  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
+    from snakewalk.controller.track.readers.arrays import save_track  # noqa: PLC0415
+    from snakewalk.controller.track.readers.generated import EMBEDDED  # noqa: PLC0415
+    from snakewalk.controller.track.readers.keypoints import ALL, choice_of  # noqa: PLC0415
+    from snakewalk.controller.track.readers.load import check_rate  # noqa: PLC0415
+
+    names = recordings or list(EMBEDDED)
+    if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):
+        raise InputError(f"{output}: one recording makes one .npz; {len(names)} are named")
+    check_rate(rate, names)
+    choice = choice_of(individual, keypoints, plane)
+    found = [
+        examine(
+            name,
+            robot,
+            world,
+            *(None, None, ALL) if name in EMBEDDED else (rate, min_score, choice),
+        )
+        for name in show_progress(names, "recordings", len(names))
+    ]
+    if picture is not None:
+        from snakewalk.controller.capture.plots.recording import draw  # noqa: PLC0415
+
+        draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
+    if output is not None:
+        with atomic_write(output) as part:
+            save_track(part, found[0].track)
+    if as_json:
+        print(json.dumps([one.facts.to_dict() for one in found]))
+        return
+    for one in found:
+        _show(one.facts)
+
+
+def _show(facts: "RecordingFacts") -> None:
+    """One recording as a table of two columns with the units in words."""
+    pace = facts.pace
+    length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
+    bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""
+    assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
+    if facts.times_uneven:
+        assumed = " (frames came at uneven times; bodies put between them)"
+    refused = ", ".join(f"{n} for {why}" for why, n in facts.states_refused.items() if n)
+    stall = pace.times_no_load_speed
+    rows = {
+        "source": "; ".join(dict.fromkeys((str(facts.source), str(facts.licence)))),
+        "frames": f"{facts.frames}, {facts.frames_left_out} left out, "
+        f"{bridged}"
+        f"{facts.rate_hz:g} Hz{assumed}, {length}",
+        "wave": f"{facts.waves_on_body} on the body, {facts.wave_hz} Hz, "
+        f"{facts.wave_share:.0%} of the bending; towards the head "
+        f"{facts.time_towards_head:.0%} of the time"
+        if facts.time_towards_head is not None
+        else f"not told: {facts.wave_not_told}",
+        "bend K": f"{facts.bend_k_rad} rad, at most {facts.bend_k_most_rad}",
+        "in 7 coefficients": f"{facts.energy_kept:.2%} of the energy",
+        "states": f"{facts.states_kept} of {facts.frames} usable by {facts.robot}"
+        + (f"; refused {refused}" if refused else ""),
+        "joint speed": f"{pace.joint_speed_rad_s} rad/s at the animal's pace; a plan may ask "
+        f"{pace.joint_speed_limit_rad_s:g}"
+        + ("" if stall is None else f"; {stall} of the servo's no-load speed"),
+        "slowed": f"{pace.slowed_by} times throughout (speed {pace.slowed_by_for_speed}, "
+        f"acceleration {pace.slowed_by_for_acceleration}); "
+        f"{pace.longer_if_slowed_where_needed} times longer if only where needed",
+    }
+    if facts.head_and_tail_swapped:
+        rows["warning"] = f"head and tail change places {facts.head_and_tail_swapped} times"
+    elif facts.time_towards_head is not None and facts.time_towards_head > 0.5:
+        rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
+    table = Table(title=facts.recording, title_justify="left", box=None, show_header=False)
+    for key, text in rows.items():
+        table.add_row(key, text)
+    console.print(table)

@@ -1,0 +1,1 @@
+"""Figures of captured and analysed tracks."""

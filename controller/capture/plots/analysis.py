@@ -1,0 +1,144 @@
+"""An animal's motion as pictures: tracks of its points, angle map, pulse speed map, swings.
+
+The tracks are those of [PT] Fig. 4 (one path for all points: no sliding), the maps those of Fig. 5.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from snakewalk.controller.capture.plots.recording import midlines
+from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.figures.body_map import body_map
+from snakewalk.controller.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    PALE,
+    save_picture,
+    style,
+)
+from snakewalk.controller.track.analysis import Analysis
+from snakewalk.controller.track.undulation import even_points
+
+_BODIES = 60  # drawn under the paths
+_BINS = 20
+
+
+def draw_analysis(found: Analysis, file: Path) -> None:
+    """Write one picture in the format of its ending.
+
+    Raises:
+        InputError: an ending that is no picture's.
+
+    """
+    check_picture(file)
+    track, pulse, unknown = found.track, found.pulse, found.pulse_not_told
+    scale = track.rate_hz / track.angles_rad.shape[1]
+    with style():
+        figure = Figure(figsize=(10.5, 8.1), layout="constrained", dpi=76)
+        (tracks, angles), (swings, speeds), (against, errors) = figure.subplots(
+            3, 2, gridspec_kw={"width_ratios": [1.0, 1.7]}
+        )
+        _tracks(tracks, found)
+        swing = track.angles_rad - track.angles_rad.mean(axis=1, keepdims=True)
+        body_map(figure, angles, track, swing, "rad")
+        angles.set_title("tangent angle about the mean heading")
+        _swings(swings, found)
+        if unknown is None:
+            _speeds(figure, speeds, found, scale)
+            body_map(figure, errors, track, pulse.body_error_rad, "rad", kept=pulse.frame)
+            errors.set_title("error of one pulse speed for the whole body")
+            _error_by_slope(against, found)
+        else:
+            for axes in (speeds, errors, against):
+                axes.set_axis_off()
+            speeds.text(0.0, 0.5, f"pulse speed not told:\n{unknown}", fontsize=9, wrap=True)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        save_picture(figure, file)
+
+
+def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
+    """Draw the pulse speed of body and time, body lengths a second."""
+    pulse = found.pulse
+    known = np.isfinite(pulse.points_per_frame)
+    usual = abs(pulse.typical) * scale
+    most = float(np.percentile(np.abs(pulse.points_per_frame[known]), 95.0)) * scale
+    body_map(
+        figure,
+        axes,
+        found.track,
+        pulse.points_per_frame * scale,
+        "body lengths a second",
+        kept=pulse.frame,
+        limit=max(1e-9, min(max(most, usual), 3.0 * usual)),
+    )
+    axes.set_title("pulse speed, positive towards the tail; grey: not known")
+
+
+def _tracks(axes: Axes, found: Analysis) -> None:
+    """Draw where head, middle and tail went, over the bodies."""
+    body = even_points(found.track)
+    if body is None:
+        midlines(axes, found.track)
+        axes.set_title("shapes (places not recorded)")
+        return
+    some = np.unique(np.linspace(0, len(body) - 1, _BODIES).astype(int))
+    axes.add_collection(LineCollection(list(body[some]), linewidths=1.0, colors=PALE, zorder=1))
+    middle = body.shape[1] // 2
+    for point, colour, name in ((-1, AMBER, "tail"), (middle, GREEN, "middle"), (0, BLUE, "head")):
+        x, y = body[:, point].T
+        axes.plot(x, y, color=colour, linewidth=1.1, label=name)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.autoscale_view()
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.legend(loc="best", fontsize=8, handlelength=1.2)
+    axes.set_xlabel("body lengths")
+    axes.set_title("tracks of head, middle and tail")
+
+
+def _error_by_slope(axes: Axes, found: Analysis) -> None:
+    """Draw the absolute error against the slope along the body, in bins of equal counts."""
+    error, slope = np.abs(found.pulse.body_error_rad), found.slope_rad
+    seen = np.isfinite(error)
+    order = np.argsort(slope[seen])
+    parts = [np.array_split(values[seen][order], _BINS) for values in (slope, error)]
+    x, (low, middle, high) = (
+        np.array([part.mean() for part in parts[0]]),
+        np.array([np.percentile(part, [25.0, 50.0, 75.0]) for part in parts[1]]).T,
+    )
+    axes.fill_between(x, low, high, color=PALE)
+    axes.plot(x, middle, color=BLUE, label="median, and half of all")
+    fit = found.error_slope
+    if fit is not None:
+        axes.plot(x, fit[0] * x, color=INK, linestyle="--", label=f"{fit[0]:.2f} points")
+    axes.set_xlim(0.0, float(x[-1]))
+    axes.set_ylim(0.0, None)
+    axes.set_xlabel("slope along the body, rad a point")
+    axes.set_ylabel("rad")
+    axes.legend(loc="upper left", fontsize=8)
+    axes.set_title("that error by the slope")
+
+
+def _swings(axes: Axes, found: Analysis) -> None:
+    """Draw both amplitudes along the body."""
+    how = found.undulation
+    along = np.linspace(0.0, 1.0, len(how.lateral))
+    axes.plot(along, how.lateral, color=BLUE)
+    axes.set_ylim(0.0, 1.15 * float(how.lateral.max()))
+    axes.set_ylabel("sideways, body lengths", color=BLUE)
+    axes.set_xticks([0.0, 0.5, 1.0], ["head", "middle", "tail"])
+    other = axes.twinx()
+    other.grid(visible=False)
+    other.spines["right"].set_visible(True)
+    other.spines["right"].set_color(GREY)
+    other.plot(0.5 * (along[1:] + along[:-1]), how.angle_rad, color=INK, linestyle="--")
+    other.set_ylim(0.0, 1.15 * float(how.angle_rad.max()))
+    other.set_ylabel("angle, rad (dashed)", color=INK)
+    axes.set_title("amplitude along the body")

@@ -1,0 +1,184 @@
+"""What was captured, to look at: a contact sheet, a film with the skeleton on it, single steps."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import DeepImage, Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.capture import Capture
+from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.images.video import in_8_bits
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_BODY, _HEAD, _TEXT, _BAD = (60, 200, 255), (80, 255, 80), (255, 255, 255), (80, 80, 255)
+_BACK = 32
+_TILE_PX = 200
+_STEP_PX = 300
+_FILM_PX = 480
+"""Smaller frames are enlarged to this, so that the line does not hide the animal."""
+
+
+def drawn(
+    image: DeepImage, points_px: Floats, status: FrameStatus, wide_px: int, high_px: int
+) -> Image:
+    """(high, wide, 3) the frame enlarged or shrunk to fit, the skeleton, its head, its status."""
+    canvas = np.full((high_px, wide_px, 3), _BACK, dtype=np.uint8)
+    factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
+    size = (max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor)))
+    how = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_NEAREST
+    plain = in_8_bits(image)
+    colour = plain if plain.ndim == 3 else cv2.cvtColor(plain, cv2.COLOR_GRAY2BGR)
+    canvas[: size[1], : size[0]] = cv2.resize(colour, size, interpolation=how)
+    if status.has_points:
+        line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
+        thick = 2 if max(size) > 2 * _TILE_PX else 1
+        cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
+        cv2.circle(canvas, tuple(int(v) for v in line[0]), 4 * 16, _HEAD, -1, cv2.LINE_AA, 4)
+    return canvas
+
+
+def _words(canvas: Image, text: str, good: bool) -> None:
+    place = (4, canvas.shape[0] - 5)
+    tint = _TEXT if good else _BAD
+    cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.36, tint, 1, cv2.LINE_AA)
+
+
+def contact_sheet(
+    path: Path, frames: Iterable[DeepImage], captured: Capture, columns: int = 6, rows: int = 4
+) -> None:
+    """Frames spread over the recording, every third place kept for frames that were not used."""
+    chosen = set(_chosen(captured, columns * rows))
+    tiles = []
+    for number, image in enumerate(frames):
+        if number in chosen:
+            status = captured.status[number]
+            tile = _tile(image, captured.points_px[number], status)
+            reason = "" if status is FrameStatus.GOOD else f": {status.split(':')[-1].strip()}"
+            _words(tile, f"{number}{reason}"[:34], status is FrameStatus.GOOD)
+            tiles.append(tile)
+    empty = np.full((_TILE_PX, _TILE_PX, 3), _BACK, dtype=np.uint8)
+    wide = min(columns, len(tiles))
+    tiles += [empty] * (-len(tiles) % wide)
+    sheet = np.vstack([np.hstack(tiles[k : k + wide]) for k in range(0, len(tiles), wide)])
+    with atomic_write(path) as part:
+        if not _written(part, sheet):
+            raise InputError(f"{path}: a contact sheet is a .png or .jpg")
+
+
+def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> Image:
+    """The animal and a little around it; all of a frame in which it was not found."""
+    if status.has_points:
+        rows, columns, points_px = _around(points_px)
+        image = image[rows, columns]
+    return drawn(image, points_px, status, _TILE_PX, _TILE_PX)
+
+
+def _around(points_px: Floats) -> tuple[slice, slice, Floats]:
+    """Rows and columns of the animal and a little around it; its points (n, 2) within them."""
+    reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
+    left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
+    right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int)
+    return slice(top, bottom), slice(left, right), points_px - [left, top]
+
+
+def _written(path: Path, image: Image) -> bool:
+    try:
+        return bool(cv2.imwrite(str(path), image))
+    except cv2.error:  # an ending that it does not know
+        return False
+
+
+def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px: Floats) -> None:
+    """The animal of one frame through all steps: image, silhouette, axis, equal chords, head.
+
+    Raises:
+        InputError: not a picture's ending.
+
+    """
+    body = detector.detect(image).silhouette
+    mask = np.zeros(image.shape[:2], dtype=np.uint8)
+    x, y = (int(v) for v in body.origin_px)
+    high, wide = body.mask.shape
+    mask[y : y + high, x : x + wide] = body.mask * np.uint8(200)
+    rows, columns, points_px = _around(points_px)
+    image, mask = image[rows, columns], mask[rows, columns]
+    high, wide = image.shape[:2]
+    factor = _STEP_PX / max(high, wide)
+    tile_px = max(round(wide * factor), 120), round(high * factor) + 18
+    nothing = np.empty((0, 2))
+    bare = drawn(image, nothing, FrameStatus.NOTHING, *tile_px)
+    shape = drawn(mask, nothing, FrameStatus.NOTHING, *tile_px)
+    line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
+    axis, chords = shape.copy(), shape.copy()
+    cv2.polylines(axis, [line], False, _BODY, 2, cv2.LINE_AA, 4)
+    for number, (u, v) in enumerate(line.tolist()):
+        size = 4 if number % 10 == 0 else 2
+        cv2.circle(chords, (u, v), size * 16, _BAD, -1, cv2.LINE_AA, 4)
+    whole = drawn(image, points_px, FrameStatus.GOOD, *tile_px)
+    named = {
+        "image": bare,
+        "silhouette": shape,
+        "medial axis": axis,
+        "100 equal chords": chords,
+        "skeleton, head": whole,
+    }
+    for name, tile in named.items():
+        _words(tile, name, good=True)
+    gap = np.full((tile_px[1], 8, 3), _BACK, dtype=np.uint8)
+    sheet = np.hstack([part for tile in named.values() for part in (tile, gap)][:-1])
+    with atomic_write(path) as part:
+        if not _written(part, sheet):
+            raise InputError(f"{path}: a picture is a .png or .jpg")
+
+
+def _chosen(captured: Capture, places: int) -> list[int]:
+    good = captured.good
+    bad = _spread(np.flatnonzero(~good), max(places // 3, places - int(good.sum())))
+    return bad + _spread(np.flatnonzero(good), places - len(bad))
+
+
+def _spread(numbers: NDArray[np.intp], most: int) -> list[int]:
+    at = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
+    return [int(numbers[round(k)]) for k in at]
+
+
+def overlay_film(
+    path: Path,
+    frames: Iterable[DeepImage],
+    captured: Capture,
+    on_progress: Callable[[], None] | None = None,
+) -> None:
+    """The recording with the skeleton on it, every frame with its number and status.
+
+    Raises:
+        InputError: no film of this ending can be written here.
+
+    """
+    kind = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "mp4v"}.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(f"{path}: an overlay film is an .mp4, .mkv or .avi")
+    with atomic_write(path) as part:
+        film: cv2.VideoWriter | None = None
+        wide = high = 0
+        for number, image in enumerate(frames):
+            if film is None:
+                factor = max(1, -(-_FILM_PX // max(image.shape)))
+                wide, high = ((side * factor + 1) // 2 * 2 for side in image.shape[1::-1])
+                high += 18
+                code = cv2.VideoWriter.fourcc(*kind)
+                film = cv2.VideoWriter(str(part), code, captured.rate_hz, (wide, high))
+                if not film.isOpened():
+                    raise InputError(f"{path}: this OpenCV cannot write such a film; try .avi")
+            status = captured.status[number]
+            canvas = drawn(image, captured.points_px[number], status, wide, high)
+            _words(canvas, f"{number}: {status}", status is FrameStatus.GOOD)
+            film.write(canvas)
+            if on_progress is not None:
+                on_progress()
+        if film is not None:
+            film.release()

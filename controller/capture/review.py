@@ -1,0 +1,120 @@
+"""The page on which a person reviews a capture: frames, skeletons, status over time; one file.
+
+It needs no server and no network. What is corrected on it is saved as a file that
+``controller.capture.corrections`` reads.
+"""
+
+import base64
+import json
+import math
+import shlex
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import DeepImage
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.capture import CaptureFile
+from snakewalk.controller.images.silhouette import as_deep_as
+from snakewalk.controller.images.video import in_8_bits
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_TEMPLATE: Final = Path(__file__).with_name("review.html")
+_LARGEST_PX: Final = 1280
+_SMALLEST_PX: Final = 320
+"""Longest side of the pictures on the page."""
+_MOST_BYTES: Final = 150_000_000
+"""Of all pictures (ours): a browser opens such a page in seconds."""
+_QUALITY: Final = 85
+
+
+def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
+    """How much smaller the frames are drawn, so that the page stays one that a browser opens.
+
+    Args:
+        some: frames spread over the recording.
+        count: of all frames.
+        name: of the recording, for the fault.
+
+    Raises:
+        InputError: so many frames that even small pictures would be too much.
+
+    """
+    longest: int = max(max(frame.shape[:2]) for frame in some)
+    scale = min(1.0, _LARGEST_PX / longest)
+    expected = count * float(np.mean([len(_packed(frame, scale)) for frame in some]))
+    if expected > _MOST_BYTES:
+        scale *= math.sqrt(_MOST_BYTES / expected)
+        if scale * longest < _SMALLEST_PX:
+            raise InputError(
+                f"{name}: a page with pictures of {count} frames would be too large for a browser; "
+                "capture a part of the film, or look at less of the picture by --roi"
+            )
+    return scale
+
+
+def review_page(
+    held: CaptureFile,
+    frames: Iterable[DeepImage],
+    *,
+    scale: float,
+    track: Path,
+    origin_px: tuple[int, int] = (0, 0),
+    on_progress: Callable[[], None] | None = None,
+) -> str:
+    """Write the page.
+
+    Args:
+        held: the recording.
+        frames: all of them, (H, W[, 3]), as they were captured.
+        scale: of their pictures: ``picture_scale``.
+        track: the file of the recording, which the page names.
+        origin_px: x, y of the frames' first pixel in the whole picture.
+        on_progress: called after each frame.
+
+    """
+    captured = held.captured
+    pictures: list[str] = []
+    sizes: list[tuple[int, int]] = []
+    for frame in frames:
+        sizes.append((frame.shape[1], frame.shape[0]))
+        pictures.append(base64.b64encode(_packed(frame, scale)).decode())
+        if on_progress is not None:
+            on_progress()
+    words = [str(one) for one in FrameStatus]
+    corrections = f"{track.stem}-corrections.json"
+    corrected = track.with_name(f"{track.stem}-corrected.npz")
+    data = {
+        "name": held.name,
+        "track": held.fingerprint,
+        "corrections": corrections,
+        "command": shlex.join(
+            ["snakewalk", "capture", str(track), "--corrections", corrections, "-o", str(corrected)]
+        ),
+        "rate_hz": captured.rate_hz,
+        "time_s": np.round(captured.time_s, 4).tolist(),
+        "origin": list(origin_px),
+        "sizes": sizes,
+        "length": round(float(np.nanmedian(captured.length_px)), 2),
+        "words": words,
+        "status": [words.index(str(one)) for one in captured.status],
+        "points": [
+            np.round(line, 2).ravel().tolist() if np.isfinite(line).all() else None
+            for line in captured.points_px
+        ],
+        "margin": [round(float(m), 3) if np.isfinite(m) else None for m in captured.margin],
+        "images": pictures[: len(captured.status)],
+    }
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return _TEMPLATE.read_text(encoding="utf-8").replace("__DATA__", text, 1)
+
+
+def _packed(frame: DeepImage, scale: float) -> bytes:
+    """A frame as JPEG."""
+    if scale < 1.0:
+        size = tuple(max(1, round(side * scale)) for side in frame.shape[1::-1])
+        frame = as_deep_as(frame, cv2.resize(frame, size, interpolation=cv2.INTER_AREA))
+    return bytes(cv2.imencode(".jpg", in_8_bits(frame), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])

@@ -1,0 +1,1 @@
+"""Entry point and lazy command table."""

@@ -1,0 +1,134 @@
+"""``snakewalk``: runs the command line and says in a line, with an exit code, how it ended."""
+
+import os
+import signal
+import sys
+from functools import cache
+from pathlib import Path
+from types import FrameType
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import missing_extra
+from snakewalk.controller.console.messages import plain
+from snakewalk.drivers.errors import DriverError, PortError
+
+_ENDING = tuple(
+    getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
+)
+"""Signals that would end a program without a word; SIGQUIT is Ctrl-\\."""
+_LEFT_OUT = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V4"
+"""What numpy, which is imported later, must do without on an x86-64: its sines and exponentials for
+these come from another library and differ in the last bit, and so would runs. A name that a version
+of numpy or a processor does not know is no fault."""
+_BY_SIGNAL = 128
+"""Exit code of a program that a signal has ended: this, and the signal's number."""
+_INTERRUPTED = 130
+"""Of Ctrl-C, which has been told."""
+
+
+def leave_out_avx512() -> None:
+    """Have numpy, which is not imported yet, do without what makes other last bits."""
+    os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", _LEFT_OUT)
+
+
+def main() -> None:
+    """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
+    # choice that is not installed.
+    os.environ["MUJOCO_GL"] = "disable"
+    leave_out_avx512()
+    # a script has what it starts beside itself ignore ^C and SIGQUIT, and it has to stop all the
+    # same; nohup has SIGHUP ignored, and means it
+    for number in _ENDING:
+        ignored = signal.getsignal(number) is signal.SIG_IGN
+        if signal.getsignal(number) is signal.SIG_DFL or (ignored and number.name != "SIGHUP"):
+            signal.signal(number, _unwind)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        _check_words(sys.argv[1:])
+        from snakewalk.controller.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
+
+        _tell_of_pipes()
+        app(prog_name="snakewalk")
+    except PortError as error:
+        began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
+        _end(1 if began else 2, _with_notes("; ".join(error.faults), error))
+    except InputError as error:
+        _end(2, *error.faults)
+    except DriverError as error:
+        _end(1, _with_notes(str(error), error))
+    except ModuleNotFoundError as error:
+        needed = missing_extra(error)
+        if needed is None:
+            raise
+        _end(2, needed)
+    except OSError as error:
+        place = f"{Path(str(error.filename))}: " if error.filename else ""
+        notes = getattr(error, "__notes__", [])  # of a run: what became of torque and log
+        _end(1 if notes else 2, _with_notes(f"{place}{error.strerror or error}", error))
+    except KeyboardInterrupt:
+        _end(_INTERRUPTED, "interrupted")
+    except SystemExit as stop:
+        if isinstance(stop.code, int) and stop.code > _BY_SIGNAL and stop.code != _INTERRUPTED:
+            name = signal.Signals(stop.code - _BY_SIGNAL).name
+            _print_line(_with_notes(f"ended by {name}", stop))
+        raise
+
+
+def _unwind(number: int, frame: FrameType | None) -> None:
+    """Turn a signal into an exception, so that every context ends properly."""
+    raise SystemExit(_BY_SIGNAL + number)
+
+
+def _check_words(words: list[str]) -> None:
+    """Refuse names that are no text: libraries below crash on them.
+
+    Raises:
+        InputError: the bytes of a word are not UTF-8.
+
+    """
+    for word in words:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            shown = word.encode(errors="surrogateescape").decode(errors="backslashreplace")
+            raise InputError(f"{shown}: this name is not UTF-8; rename the file") from None
+
+
+@cache
+def _tell_of_pipes() -> None:
+    """Have every opening of a named pipe told: it waits until another program opens it, too."""
+    sys.addaudithook(_tell_of_pipe)
+
+
+def _tell_of_pipe(event: str, details: tuple[object, ...]) -> None:
+    """Audit hook: say that the file about to be opened is a named pipe."""
+    if event != "open":
+        return
+    path, _, flags = details
+    if (
+        not isinstance(path, str)
+        or not isinstance(flags, int)
+        or path.startswith(("/dev/", "/proc/"))
+    ):
+        return  # a descriptor, or one of the shell's
+    if flags & getattr(os, "O_NONBLOCK", 0) or not Path(path).is_fifo():
+        return
+    to = "reads from" if flags & os.O_WRONLY else "writes to"
+    _print_line(f"{path}: a named pipe: waits for a program that {to} it; ^C ends")
+
+
+def _with_notes(text: str, error: BaseException) -> str:
+    """What ended the program, and what a run says of torque and log."""
+    return "; ".join([text, *getattr(error, "__notes__", [])])
+
+
+def _end(code: int, *lines: str) -> None:
+    for line in lines:
+        _print_line(line)
+    raise SystemExit(code) from None
+
+
+def _print_line(line: str) -> None:
+    print(f"snakewalk: {plain(line)}", file=sys.stderr)

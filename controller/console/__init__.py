@@ -1,0 +1,1 @@
+"""Shared by commands: options, progress bars, messages, tables, result files, process pool."""

@@ -1,0 +1,80 @@
+"""Values that the shell completes: shipped names, one's own files beside them, a choice's words.
+
+Each function takes what has been typed and returns what it may become. A shell completes any other
+file by itself where these return nothing.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+Complete = Callable[[str], list[str]]
+
+
+def names(*kinds: str, files: tuple[str, ...] = (".toml",)) -> Complete:
+    """Return the completion of shipped names of ``kinds``, and of files with these endings.
+
+    Args:
+        kinds: folders of the shipped configurations, ``all gaits`` or ``spine gaits``.
+        files: endings of one's own files that may stand in place of a name.
+
+    """
+
+    def complete(incomplete: str) -> list[str]:
+        found = [name for kind in kinds for name in _shipped(kind) if name.startswith(incomplete)]
+        return [*found, *_files(incomplete, files)]
+
+    return complete
+
+
+def words(*choices: str) -> Complete:
+    """Return the completion of a choice among fixed words."""
+    return lambda incomplete: [word for word in choices if word.startswith(incomplete)]
+
+
+def keys(incomplete: str) -> list[str]:
+    """Keys of ``--set``, each with its ``=``; ``run``, ``robot`` and ``world`` name the file."""
+    from snakewalk.config.loader import known_keys  # noqa: PLC0415  --help stays quick
+
+    return [f"{key}=" for key in known_keys() if key.startswith(incomplete)]
+
+
+def _shipped(kind: str) -> list[str]:
+    if kind == "all gaits":
+        from snakewalk.controller.gaits.registry import GAITS  # noqa: PLC0415  --help stays quick
+
+        return list(GAITS)
+    if kind == "spine gaits":
+        from snakewalk.controller.animals.mesh.body_motion import SWIMMERS  # noqa: PLC0415
+
+        return list(SWIMMERS)
+    from snakewalk.config.loader import shipped  # noqa: PLC0415  --help stays quick
+
+    return list(shipped(kind))  # type: ignore[arg-type]
+
+
+def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
+    """Files with these endings, and folders, in the folder that ``incomplete`` names so far."""
+    folder, slash, start = incomplete.rpartition("/")
+    place = Path(f"{folder}{slash}") if slash else Path()
+    if not place.is_dir():
+        return []
+    return sorted(
+        f"{folder}{slash}{found.name}"
+        for found in place.iterdir()
+        if found.name.startswith(start) and found.suffix in endings and found.is_file()
+    )
+
+
+RUNS = names("runs")
+ROBOTS = names("robots")
+WORLDS = names("worlds")
+GAITS = names("all gaits", "gaits")
+RUNS_OR_GAITS = names("runs", "all gaits", "gaits")
+RECORDINGS = names("recordings", files=(".csv", ".npz", ".wcon", ".h5", ".toml"))
+ANIMALS = names("animals")
+POLICIES = names("policies")
+POLICIES_OR_GAITS = names("policies", "all gaits", "gaits")
+BODIES = names("recordings", "skins", files=(".npz", ".obj", ".glb"))
+MOVING = names("recordings", "spine gaits", files=(".mcap", ".npz", ".csv"))
+MOTIONS = words("walk", "walk-printed", "walk-blind", "serpenoid")
+LOOKS = words("servos", "animal")

@@ -1,0 +1,309 @@
+"""What the commands share: options, and how a result is shown."""
+
+import json
+import platform
+import shlex
+import sys
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.result_files import LOG
+
+if TYPE_CHECKING:
+    from snakewalk.controller.metrics.summary import RunSummary
+    from snakewalk.controller.report.artifacts import Artifacts
+    from snakewalk.controller.run.execute import Finished
+    from snakewalk.controller.runlog.record import RunRecord
+
+_WIDE: Final = 200
+"""Columns of a pipe or a file, which break no line."""
+console = Console(
+    highlight=False,
+    markup=False,
+    emoji=False,  # er:100:9 is a graph
+    width=None if sys.stdout.isatty() else _WIDE,
+)
+DEFAULT_RUN = "jacksboro-traverse"
+RunName = Annotated[
+    str,
+    typer.Argument(
+        help="shipped run, or a RUN.toml", show_default=True, autocompletion=completion.RUNS
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+Seed = Annotated[int | None, typer.Option(help="of every random choice")]
+FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
+Motion = Annotated[
+    str | None,
+    typer.Option(
+        help="walk, walk-printed, walk-blind or serpenoid", autocompletion=completion.MOTIONS
+    ),
+]
+Port = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter "
+        "there is"
+    ),
+]
+ChainPort = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
+        "of the chain have ports of their own; default: the only USB adapter there is"
+    ),
+]
+RunPort = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
+        "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
+        "whose file says which; without it, the simulator"
+    ),
+]
+Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
+Look = Annotated[
+    str,
+    typer.Option(
+        help="body in the film: servos, animal, or a BODY as of `snakewalk body`",
+        autocompletion=completion.LOOKS,
+    ),
+]
+RunFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", "-o", file_okay=False, help="folder of this run; default: a new one in runs/"
+    ),
+]
+Compliant = Annotated[
+    bool | None,
+    typer.Option(
+        "--compliance/--no-compliance",
+        help="joints yield to measured current, or not; default: as the run says",
+        show_default=False,
+    ),
+]
+Shadow = Annotated[
+    bool,
+    typer.Option("--shadow", help="run the simulator beside it, and say what differs and why"),
+]
+View = Annotated[bool, typer.Option("--view", help="show the run in a browser while it lasts")]
+ViewAt = Annotated[
+    str,
+    typer.Option(
+        "--view-at", metavar="HOST:PORT", help="of the page; beyond this machine it needs a token"
+    ),
+]
+Ros = Annotated[
+    bool, typer.Option("--ros", help="tell a ROS 2 graph of the run, with a service that stops it")
+]
+VIEW_AT = "127.0.0.1:8080"
+Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
+Robot = Annotated[
+    str | None, typer.Option(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
+GivenRobot = Annotated[
+    str, typer.Option(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
+World = Annotated[
+    str | None, typer.Option(help="shipped world, or a TOML file", autocompletion=completion.WORLDS)
+]
+GivenWorld = Annotated[
+    str, typer.Option(help="shipped world, or a TOML file", autocompletion=completion.WORLDS)
+]
+TrackFile = Annotated[
+    str | None,
+    typer.Option(
+        "--track",
+        help="shipped recording, or a file of midlines or angles",
+        autocompletion=completion.RECORDINGS,
+    ),
+]
+
+Rate = Annotated[
+    float | None, typer.Option(help="frames a second of the files, instead of what they say")
+]
+MinScore = Annotated[
+    float | None,
+    typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
+]
+Individual = Annotated[
+    str | None, typer.Option(help="of a file of several animals: the one that is taken")
+]
+Keypoints = Annotated[
+    str | None,
+    typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
+]
+Plane = Annotated[str | None, typer.Option(help="of markers in space: xy (default), xz or yz")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="replace a value of the run's, robot's or world's file, e.g. "
+        "run.cycle_hz=25; may be given again",
+        metavar="KEY=VALUE",
+        autocompletion=completion.keys,
+    ),
+]
+_MESSAGES: Final = "Messages"
+"""Group of options in ``--help``."""
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="every step", rich_help_panel=_MESSAGES)
+]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="warnings and faults only", rich_help_panel=_MESSAGES),
+]
+LogLevel = Annotated[
+    Literal["debug", "info", "warning", "error"] | None,
+    typer.Option(
+        help="from which on it says something; default: info",
+        rich_help_panel=_MESSAGES,
+        show_default=False,
+    ),
+]
+LogFile = Annotated[
+    Path | None,
+    typer.Option(
+        dir_okay=False, help="write all of it to the end of this file", rich_help_panel=_MESSAGES
+    ),
+]
+
+
+def check_files(run: str | None, robot: str | None, world: str | None) -> None:
+    """Load the files of a user's own that a command names; shipped ones have no faults.
+
+    The robot and the world are those of the run where none is given.
+
+    Raises:
+        ConfigError: every fault of the first file that has one.
+
+    """
+    from snakewalk.config.loader import load_robot, load_run, load_world  # noqa: PLC0415  --help stays quick
+
+    beside = None
+    if run is not None and run.endswith(".toml"):
+        beside, given = Path(run).parent, load_run(run)
+        robot, world = robot or given.robot, world or given.world
+    if robot is not None and robot.endswith(".toml"):
+        load_robot(robot, beside)
+    if world is not None and world.endswith(".toml"):
+        load_world(world, beside)
+
+
+def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) -> None:
+    """Refuse options of a command that another one, or its absence, makes idle.
+
+    Raises:
+        InputError: one line for each.
+
+    """
+    given = {name for name, value in options.items() if value != defaults.get(name)}
+    faults = []
+    if options.get("view") is False and "view_at" in given:
+        faults.append("--view-at: is of the page: add --view")
+    if options.get("film") is False and "film" in given:
+        faults += [
+            f"--{name}: is of the film, which --no-film leaves out"
+            for name in ("look", "fine")
+            if name in given
+        ]
+    if faults:
+        raise InputError(faults)
+
+
+def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
+    """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
+
+    Raises:
+        InputError: there is no key, or no value, or a key stands twice.
+
+    """
+    values: dict[str, Any] = {}
+    for text in given or []:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"{option} {text}: expected {form}")
+        if key in values:
+            raise InputError(f"{option} {text}: {key} has a value already: leave one")
+        try:
+            values[key] = parse_json(value)
+        except ValueError:  # no JSON; too long a number; too deep a list
+            values[key] = value
+    return values
+
+
+def show(result: Mapping[str, object], as_json: bool) -> None:
+    """Print a result as a table of two columns, or as JSON; in the table no value is a dash."""
+    if as_json:
+        print(json.dumps(result))
+        return
+    table = Table(box=None, show_header=False)
+    for key, value in result.items():
+        table.add_row(key.replace("_", " "), _text(value))
+    console.print(table)
+
+
+def _text(value: object) -> str:
+    """A value for a reader: no brackets and quotes, no ``None``."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_text(one)}" for key, one in value.items()) or "-"
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(one) for one in value) or "-"
+    return "-" if value is None else str(value)
+
+
+def _what_made_it() -> str:
+    """The command, the machine and the time, for the foot of a page."""
+    words = shlex.join(["snakewalk", *sys.argv[1:]])
+    when = datetime.now().astimezone().isoformat(" ", "seconds")
+    return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
+
+
+def write_artifacts(
+    record: "RunRecord",
+    folder: Path,
+    numbers: "RunSummary | None" = None,
+    *,
+    film: bool,
+    fine: bool = False,
+    look: str = "servos",
+) -> "Artifacts":
+    """Make the report and the film of a run; print on standard error what could not be made."""
+    from snakewalk.controller.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
+
+    try:
+        made = make_artifacts(
+            record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
+        )
+    except KeyboardInterrupt as stop:
+        log = folder / LOG
+        if log.exists():
+            stop.add_note(f"the run is whole: {log}; its film: snakewalk report {log}")
+        raise
+    for line in made.notes:
+        LOGGER.warning("%s", line)
+    return made
+
+
+def show_run(
+    finished: "Finished", folder: Path, facts: Mapping[str, object], as_json: bool, *, film: bool
+) -> None:
+    """Make the report and the film, and show a run's facts and files; exit 1 if safety tripped."""
+    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
+    files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
+    show({**facts, **files, **artifacts.to_dict()}, as_json)
+    if finished.outcome.tripped is not None:
+        raise SystemExit(1)

@@ -1,0 +1,163 @@
+"""Progress for a person: one bar on standard error, and events in lines above it."""
+
+from collections.abc import Callable, Iterable, Iterator
+from types import TracebackType
+from typing import Self, TypeVar
+
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from snakewalk.controller.console.messages import LOGGER, stderr_console
+from snakewalk.controller.runtime.drive import Progress as RunProgress
+from snakewalk.drivers.clock import WallClock
+
+T = TypeVar("T")
+EVERY = 10
+"""Cycles of a run between two updates."""
+
+
+class ProgressBar:
+    """The bar: description, share, a note, time; ``transient`` bars vanish at the end."""
+
+    def __init__(
+        self, description: str, total: float | None = None, *, transient: bool = False
+    ) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}", markup=False),  # a file may be named [red]
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[note]}", markup=False),
+            TimeElapsedColumn(),
+            console=stderr_console(),
+            transient=transient,
+        )
+        self._task = self._progress.add_task(description, total=total, note="")
+
+    def __enter__(self) -> Self:
+        """Show the bar."""
+        self._progress.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the last state standing, or nothing of a transient bar."""
+        self._progress.__exit__(kind, error, trace)
+
+    def update(
+        self,
+        done: float,
+        total: float | None = None,
+        *,
+        description: str | None = None,
+        note: str = "",
+    ) -> None:
+        """Show that ``done`` of ``total`` is done; None leaves total or description as they are."""
+        self._progress.update(
+            self._task, completed=done, total=total, description=description, note=note
+        )
+
+    def advance(self) -> None:
+        """Show that one more is done."""
+        self._progress.advance(self._task)
+
+    def hide(self) -> None:
+        """Take the bar away, and its line: what it stood for failed."""
+        self._progress.live.transient = True
+        self._progress.console.quiet = not self._progress.console.is_interactive
+        self._progress.update(self._task, visible=False)
+
+    def on_event(self, kind: str, text: str) -> None:
+        """Say above the bar what a run decided by itself."""
+        LOGGER.info("%s", text)
+
+
+class RunBar(ProgressBar):
+    """Bar of a run, updated once in several cycles; subclasses define what it shows."""
+
+    def __init__(self, description: str, total: float) -> None:
+        super().__init__(description, total)
+        self._cycles = 0
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave nothing of a run that failed before its first cycle."""
+        if kind is not None and self._cycles == 0:
+            self.hide()
+        super().__exit__(kind, error, trace)
+
+    def _is_due(self, progress: RunProgress) -> bool:
+        """Count a cycle; return whether the bar is updated with it."""
+        self._cycles += 1
+        return self._cycles % EVERY == 0 or progress.done
+
+
+class PathBar(RunBar):
+    """How far along the path, which waypoint, how fast."""
+
+    def __init__(self, path_m: float) -> None:
+        super().__init__("ramp", path_m)
+
+    def on_progress(self, progress: RunProgress) -> None:
+        """Update, not in every cycle."""
+        if self._is_due(progress):
+            self.update(
+                progress.along_m,
+                description=f"waypoint {progress.reached}/{progress.waypoints}",
+                note=f"{progress.time_s:5.1f} s  {progress.speed_m_s:5.2f} m/s",
+            )
+
+
+class TimeBar(RunBar):
+    """How much of its time a gait, or anything else that takes a known time, has gone.
+
+    ``name_at`` takes the time gone by, in seconds, and returns what then moves: a run may change
+    its gait.
+    """
+
+    def __init__(
+        self, name: str, seconds: float, name_at: Callable[[float], str] | None = None
+    ) -> None:
+        super().__init__(name, seconds)
+        self._name_at = name_at if name_at is not None else lambda gone_s: name
+        self._start_s: float | None = None
+
+    def on_progress(self, progress: RunProgress) -> None:
+        """Update, not in every cycle."""
+        if self._start_s is None:
+            self._start_s = progress.time_s
+        if self._is_due(progress):
+            gone_s = progress.time_s - self._start_s
+            self.update(gone_s, description=self._name_at(gone_s), note=f"{gone_s:5.1f} s")
+
+
+def in_real_time(on_progress: Callable[[RunProgress], None]) -> Callable[[RunProgress], None]:
+    """Hold a simulated run to the pace of a person's clock."""
+    clock = WallClock()
+    ahead_s: float | None = None
+
+    def wait(progress: RunProgress) -> None:
+        nonlocal ahead_s
+        on_progress(progress)
+        if ahead_s is None:
+            ahead_s = clock.now_s() - progress.time_s
+        clock.sleep_until_s(progress.time_s + ahead_s)
+
+    return wait
+
+
+def show_progress(
+    items: Iterable[T], description: str, total: int, *, done: int = 0, transient: bool = True
+) -> Iterator[T]:
+    """Yield items under a bar that counts them; ``done`` of ``total`` were done before."""
+    with ProgressBar(description, total, transient=transient) as bar:
+        bar.update(done)
+        for number, item in enumerate(items, start=done + 1):
+            yield item
+            bar.update(number)

@@ -1,0 +1,106 @@
+"""``snakewalk export``: a run's log for other programs."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+
+def export(
+    log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
+    csv: Annotated[
+        Path | None, typer.Option(file_okay=False, help="folder of CSV tables, one a channel")
+    ] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(file_okay=False, help="folder of Parquet tables, one a channel")
+    ] = None,
+    ros2: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="a ROS 2 bag, FILE.mcap", metavar="FILE")
+    ] = None,
+    foxglove: Annotated[
+        Path | None,
+        typer.Option(dir_okay=False, help="for Foxglove in 3-D, FILE.mcap", metavar="FILE"),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a run's log as tables, as a ROS 2 bag, or for Foxglove with the body in 3-D."""
+    from snakewalk.controller.exchange.flat_table import (  # noqa: PLC0415  heavy; --help stays quick
+        flat_tables,
+        write_csv,
+        write_parquet,
+    )
+    from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene  # noqa: PLC0415
+    from snakewalk.controller.exchange.ros_bag import write_ros_bag  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+
+    _check_names(log, csv, parquet, ros2, foxglove)
+    record = read_log(log)
+    if record.note:
+        LOGGER.warning("%s: %s", log, record.note)
+    tables = flat_tables(record)
+    writers: dict[Path, Callable[[Path], int | dict[str, int]]] = {}
+    for folder, ending, write in ((csv, "csv", write_csv), (parquet, "parquet", write_parquet)):
+        if folder is not None:
+            writers |= {folder / f"{t.name}.{ending}": partial(write, t) for t in tables}
+    if ros2 is not None:
+        writers[ros2] = partial(write_ros_bag, record)
+    if foxglove is not None:
+        writers[foxglove] = partial(write_foxglove_scene, record)
+    folders = {folder for folder in (csv, parquet) if folder is not None and not folder.exists()}
+    files = [file for file in writers if file.parent not in folders]
+    refuse_to_overwrite([*sorted(folders), *files], force)
+    written: dict[str, int | dict[str, int]] = {}
+    for file, write_to in writers.items():
+        with atomic_write(file) as part:
+            written[str(file)] = write_to(part)
+    if as_json:
+        print(json.dumps({"log": str(log), "written": written}))
+        return
+    for name, count in written.items():
+        what = f"{count} rows" if isinstance(count, int) else f"{sum(count.values())} messages"
+        console.print(f"{name}  {what}")
+
+
+def _check_names(
+    log: Path, csv: Path | None, parquet: Path | None, ros2: Path | None, foxglove: Path | None
+) -> None:
+    """Refuse what cannot be written, before the log is read.
+
+    Raises:
+        InputError: nothing is asked for, a name is wrong, or a package is missing.
+
+    """
+    bags = [path for path in (ros2, foxglove) if path is not None]
+    if not bags and csv is None and parquet is None:
+        raise InputError(
+            "say what to write: --csv FOLDER, --parquet FOLDER, --ros2 FILE.mcap or "
+            "--foxglove FILE.mcap"
+        )
+    faults = [
+        f"{path}: is an MCAP file; name it {path.with_suffix('.mcap').name}"
+        for path in bags
+        if path.suffix != ".mcap"
+    ]
+    faults += [
+        f"{path}: is the log itself; give another name"
+        for path in bags
+        if path.exists() and log.exists() and path.samefile(log)
+    ]
+    if len(bags) == 2 and ros2 == foxglove:
+        faults.append("--ros2 and --foxglove have the same name")
+    if faults:
+        raise InputError(faults)
+    if parquet is not None:
+        require_extra("Parquet needs", "pyarrow")
+    if ros2 is not None:
+        require_extra("a ROS 2 bag needs", "rosbags")

@@ -1,0 +1,345 @@
+"""A log as Foxglove opens it in 3-D: body, ground, path and waypoints, joints and events.
+
+An MCAP file of Foxglove's well-known messages in JSON, which needs no package. Frames and joints
+have the names of ``robot export``.
+"""
+
+from collections.abc import Iterator
+from itertools import cycle
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from mcap.writer import Writer
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.ground import water_surface_m
+from snakewalk.config.heightfield import HeightField, surface
+from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
+from snakewalk.controller.exchange.foxglove_schema import SCHEMAS
+from snakewalk.controller.exchange.imu_readings import IMU_TOPIC, imu_readings, recorded_topics
+from snakewalk.controller.runlog.encode import encode, floats, number
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.sim.physics.solids import solids
+
+Json = dict[str, Any]
+Row = tuple[float, str, Json]
+"""Time in s, topic, message."""
+_TOPICS: Final = {
+    "/scene": "foxglove.SceneUpdate",
+    "/tf": "foxglove.FrameTransforms",
+    "/joint_states": "foxglove.JointStates",
+    "/joint_goals": "foxglove.JointStates",
+    "/head_pose": "foxglove.PoseInFrame",
+    IMU_TOPIC: "foxglove.PoseInFrame",
+    "/log": "foxglove.Log",
+}
+_LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
+"""Of ``foxglove.Log``."""
+_HEAD: Final = (0.85, 0.33, 0.10, 1.0)
+_LINKS: Final = ((0.20, 0.45, 0.70, 1.0), (0.35, 0.65, 0.85, 1.0))
+_PATH: Final = (0.95, 0.75, 0.10, 1.0)
+_WAYPOINT: Final = (0.10, 0.65, 0.30, 0.35)
+_GROUND: Final = ((0.33, 0.36, 0.30, 1.0), (0.80, 0.78, 0.68, 1.0))
+_WATER: Final = (0.55, 0.80, 0.92, 0.25)
+"""Colours (ours): red, green, blue, opacity; of the ground's lowest and highest point."""
+_UPRIGHT: Final = (0.0, 0.0, 0.0, 1.0)
+_ALONG: Final = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
+"""Turns a cylinder, which stands along z, along x."""
+_ACROSS: Final = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+"""The same along y."""
+_MARGIN_M: Final = 1.0
+"""How far a flat floor is drawn beyond the path (ours)."""
+_WIDTH_PX: Final = 3.0
+_PATH_HEIGHT_M: Final = 0.005
+"""Above the ground, so that the line is seen (ours)."""
+
+
+def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
+    """Write the file; returns how many messages each topic has."""
+    topics = recorded_topics(_TOPICS, record)
+    counts = dict.fromkeys(topics, 0)
+    with path.open("wb") as file:
+        writer: Any = Writer(file)
+        writer.start(profile="", library=f"snakewalk {record.header.software}")
+        schemas = {
+            name: writer.register_schema(name, "jsonschema", encode(schema).encode())
+            for name, schema in SCHEMAS.items()
+        }
+        channels = {
+            topic: writer.register_channel(topic, "json", schemas[name])
+            for topic, name in topics.items()
+        }
+        for time_s, topic, message in sorted(_rows(record), key=itemgetter(0)):
+            stamp_ns = round(time_s * 1e9)
+            data = encode(message).encode()
+            writer.add_message(channels[topic], stamp_ns, data, publish_time=stamp_ns)
+            counts[topic] += 1
+        writer.finish()
+    return counts
+
+
+def _rows(record: RunRecord) -> Iterator[Row]:
+    things = [*_body(record), _ground(record), *_water(record), *_obstacle(record)]
+    yield 0.0, "/scene", _scene(things)
+    for time_s, points_m in record.waypoints:
+        yield time_s, "/scene", _scene([_waypoints(record, time_s, points_m)])
+    for time_s, points_m in record.paths:
+        yield time_s, "/scene", _scene([_path(record, time_s, points_m)])
+    yield from _frames(record)
+    yield from _joints(record)
+    yield from _imu(record)
+    for event in record.events:
+        message = {
+            "timestamp": _time(event.time_s),
+            "level": _LEVELS[event.level],
+            "message": f"{event.kind}: {event.text}",
+            "name": "snakewalk",
+            "file": "",
+            "line": 0,
+        }
+        yield event.time_s, "/log", message
+
+
+def _frames(record: RunRecord) -> Iterator[Row]:
+    frames = body_frames(record)
+    translations, turns = floats(frames.translation_m), floats(frames.quaternion)
+    for time_s, ats, rotations in zip(frames.time_s.tolist(), translations, turns, strict=True):
+        now = _time(time_s)
+        transforms = [
+            {
+                "timestamp": now,
+                "parent_frame_id": parent,
+                "child_frame_id": name,
+                "translation": _xyz(at),
+                "rotation": _quaternion(turn),
+            }
+            for parent, name, at, turn in zip(
+                frames.parents, frames.names, ats, rotations, strict=True
+            )
+        ]
+        yield time_s, "/tf", {"transforms": transforms}
+        if len(record.pose.time_s):
+            pose = _pose(ats[0], rotations[0])
+            yield time_s, "/head_pose", {"timestamp": now, "frame_id": WORLD, "pose": pose}
+
+
+def _imu(record: RunRecord) -> Iterator[Row]:
+    """The link's axes as the device says them, where the link is: beside its frame, drift shows."""
+    readings = imu_readings(record)
+    rows = zip(
+        readings.time_s.tolist(),
+        floats(readings.link_m),
+        floats(readings.quaternion),
+        strict=True,
+    )
+    for time_s, at, turn in rows:
+        pose = _pose(at, turn)
+        yield time_s, IMU_TOPIC, {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
+
+
+def _joints(record: RunRecord) -> Iterator[Row]:
+    rows, names = record.cycle, joint_names(record.header.robot)
+    effort_n_m = rows.current_a * record.header.torque_constant_n_m_a
+    measured = np.stack([rows.measured_rad, rows.velocity_rad_s, effort_n_m], axis=2)
+    for time_s, states, goals in zip(
+        rows.time_s.tolist(), floats(measured), floats(rows.sent_rad), strict=True
+    ):
+        now = _time(time_s)
+        yield (
+            time_s,
+            "/joint_states",
+            {
+                "timestamp": now,
+                "joints": [
+                    {"name": name} | _known(position=q, velocity=v, effort=e)
+                    for name, (q, v, e) in zip(names, states, strict=True)
+                ],
+            },
+        )
+        yield (
+            time_s,
+            "/joint_goals",
+            {
+                "timestamp": now,
+                "joints": [
+                    {"name": name} | _known(position=goal)
+                    for name, goal in zip(names, goals, strict=True)
+                ],
+            },
+        )
+
+
+def _body(record: RunRecord) -> Iterator[Json]:
+    """A cylinder for each link of spine and legs, which moves with its frame."""
+    robot = record.header.robot
+    for link, color in zip(range(robot.link_count), cycle(_LINKS), strict=False):
+        length_m, width_m = robot.link_lengths_m[link], 2.0 * robot.link_radii_m[link]
+        if length_m == 0.0:
+            continue
+        cylinder = {
+            "pose": _pose([0.0 if link == 0 else -0.5 * length_m, 0.0, 0.0], _ALONG),
+            "size": _xyz([width_m, width_m, 0.94 * length_m]),  # a gap shows the joint
+            "bottom_scale": 1.0,
+            "top_scale": 1.0 if link else 0.6,  # the head's tip
+            "color": _color(_HEAD if link == 0 else color),
+        }
+        yield _entity(f"link{link}", 0.0, frame=f"link{link}", locked=True, cylinders=[cylinder])
+    for link, joint in enumerate(robot.limb_joints, robot.link_count):
+        pair, side = robot.limbs[joint.pair], joint.outward
+        length_m, width_m = pair.segments_m[joint.place], 2.0 * pair.foot_radius_m
+        cylinder = {
+            "pose": _pose([0.0, 0.5 * side * length_m, 0.0], _ACROSS),
+            "size": _xyz([width_m, width_m, length_m]),
+            "bottom_scale": 1.0,
+            "top_scale": 1.0,
+            "color": _color(_LINKS[joint.place % 2]),
+        }
+        yield _entity(f"link{link}", 0.0, frame=f"link{link}", locked=True, cylinders=[cylinder])
+
+
+def _ground(record: RunRecord) -> Json:
+    """The ground's triangles, the same as those of the physics, coloured by height."""
+    field = _drawn_ground(record)
+    corners_m, faces = surface(field)
+    height = corners_m[:, 2]
+    share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)
+    low, high = np.array(_GROUND)
+    triangles = {
+        "pose": _pose([0.0, 0.0, 0.0], _UPRIGHT),
+        "points": _points(corners_m),
+        "color": _color(_GROUND[1]),
+        "colors": [_color(one) for one in floats(low + share[:, None] * (high - low))],
+        "indices": faces.ravel().tolist(),
+    }
+    return _entity("ground", 0.0, triangles=[triangles])
+
+
+def _water(record: RunRecord) -> Iterator[Json]:
+    """The surface, seen through."""
+    surface_m = water_surface_m(record.header.world, record.header.ground)
+    if surface_m is not None:
+        middle_m, size_m = surface_m
+        pose, size = _pose(middle_m.tolist(), _UPRIGHT), _xyz([*size_m.tolist(), 0.002])
+        cube = {"pose": pose, "size": size, "color": _color(_WATER)}
+        yield _entity("water", 0.0, cubes=[cube])
+
+
+def _obstacle(record: RunRecord) -> Iterator[Json]:
+    """Pole, pipe, pegs or walls, of the parts that the body touches."""
+    thing = record.header.world.obstacle
+    if thing is None:
+        return
+    cubes, cylinders = [], []
+    for part in solids(thing):
+        turn = Rotation.from_matrix(part.axes).as_quat().tolist()
+        drawn = {"pose": _pose(part.centre_m.tolist(), turn), "color": _color(part.colour)}
+        if part.kind == "box":
+            cubes.append(drawn | {"size": _xyz(2.0 * np.array(part.half_m))})
+        else:
+            radius_m, half_m = part.half_m
+            size = _xyz([2.0 * radius_m, 2.0 * radius_m, 2.0 * half_m])
+            cylinders.append(drawn | {"size": size, "bottom_scale": 1.0, "top_scale": 1.0})
+    yield _entity("obstacle", 0.0, cubes=cubes, cylinders=cylinders)
+
+
+def _drawn_ground(record: RunRecord) -> HeightField:
+    """The log's height field, or a flat floor of four corners around path and body."""
+    if record.header.ground is not None:
+        return record.header.ground
+    places = [points[:, :2] for _, points in record.paths] + [record.pose.head_m[:, :2]]
+    seen = np.concatenate([*places, np.zeros((1, 2))])
+    low = np.nanmin(seen, axis=0) - _MARGIN_M
+    size_m = float(np.max(np.nanmax(seen, axis=0) + _MARGIN_M - low))
+    return HeightField(np.zeros((2, 2)), size_m, float(low[0]), float(low[1]))
+
+
+def _waypoints(record: RunRecord, time_s: float, points_m: Floats) -> Json:
+    size_m = 2.0 * (number(record.header.plan.waypoint_radius_m) or 0.0)
+    spheres = [
+        {
+            "pose": _pose(at, _UPRIGHT),
+            "size": _xyz([size_m, size_m, size_m]),
+            "color": _color(_WAYPOINT),
+        }
+        for at in floats(_on_ground(record, points_m))
+    ]
+    return _entity("waypoints", time_s, spheres=spheres)
+
+
+def _path(record: RunRecord, time_s: float, points_m: Floats) -> Json:
+    raised = _on_ground(record, points_m) + np.array([0.0, 0.0, _PATH_HEIGHT_M])
+    line = {
+        "type": 0,  # a strip
+        "pose": _pose([0.0, 0.0, 0.0], _UPRIGHT),
+        "thickness": _WIDTH_PX,
+        "scale_invariant": True,
+        "points": _points(raised),
+        "color": _color(_PATH),
+        "colors": [],
+        "indices": [],
+    }
+    return _entity("path", time_s, lines=[line])
+
+
+def _on_ground(record: RunRecord, points_m: Floats) -> Floats:
+    """(n, 3) points; those on paper, (n, 2), at the ground's height."""
+    if points_m.shape[1] == 3:
+        return points_m
+    ground = record.header.ground
+    height = 0.0 if ground is None else ground.elevation_m(points_m[:, 0], points_m[:, 1])
+    return np.column_stack([points_m, np.broadcast_to(height, len(points_m))])
+
+
+def _scene(entities: list[Json]) -> Json:
+    return {"deletions": [], "entities": entities}
+
+
+def _entity(
+    name: str, time_s: float, *, frame: str = WORLD, locked: bool = False, **shapes: list[Json]
+) -> Json:
+    """Something that is drawn until another of its name replaces it."""
+    kinds = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models")
+    return {
+        "timestamp": _time(time_s),
+        "frame_id": frame,
+        "id": name,
+        "lifetime": {"sec": 0, "nsec": 0},
+        "frame_locked": locked,
+        "metadata": [],
+        **{kind: shapes.get(kind, []) for kind in kinds},
+    }
+
+
+def _time(time_s: float) -> Json:
+    seconds, nanoseconds = divmod(round(time_s * 1e9), 1_000_000_000)
+    return {"sec": seconds, "nsec": nanoseconds}
+
+
+def _xyz(values: Any) -> Json:
+    x, y, z = map(float, values)
+    return {"x": x, "y": y, "z": z}
+
+
+def _quaternion(values: Any) -> Json:
+    x, y, z, w = values
+    return {"x": x, "y": y, "z": z, "w": w}
+
+
+def _pose(at: Any, turn: Any) -> Json:
+    return {"position": _xyz(at), "orientation": _quaternion(turn)}
+
+
+def _points(values: Floats) -> list[Json]:
+    return [_xyz(point) for point in floats(values)]
+
+
+def _color(values: Any) -> Json:
+    r, g, b, a = values
+    return {"r": r, "g": g, "b": b, "a": a}
+
+
+def _known(**values: float | None) -> Json:
+    return {name: value for name, value in values.items() if value is not None}

@@ -1,0 +1,1 @@
+"""Style and shared drawings of figures."""

@@ -1,0 +1,64 @@
+"""Gait changes by the pattern generator, drawn.
+
+`python -m snakewalk.controller.figures.cpg OUT.png`.
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.figures.style import save_picture
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.controller.motion.cpg_motion import CpgMotion
+
+ROBOT = "alternating16"
+GAITS_SHOWN = ("sidewinding", "rolling", "concertina", "lateral-undulation")
+STEP_S = 0.02
+STAY_S = 5.0
+
+
+def draw(out: Path) -> None:
+    """Draw angles and speeds of all joints over four gaits, and rest."""
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt  # noqa: PLC0415  after the choice of backend
+
+    robot = load_robot(ROBOT)
+    nowhere = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
+    motion = CpgMotion(robot, np.zeros(robot.joint_count))
+    angles: list[NDArray[np.float64]] = []
+    speeds: list[NDArray[np.float64]] = []
+    changes: list[tuple[float, str, float]] = []
+    for name in (*GAITS_SHOWN, ""):
+        taken_s = motion.become(GAITS[name]()) if name else motion.stop()
+        changes.append((len(angles) * STEP_S, name or "rest", taken_s))
+        for _ in range(round((taken_s + (STAY_S if name else 1.0)) / STEP_S)):
+            angles.append(motion.step(STEP_S, nowhere))
+            speeds.append(motion.velocity_rad_s())
+    time_s = STEP_S * np.arange(len(angles))
+    figure, axes = plt.subplots(2, 1, figsize=(9.0, 5.0), sharex=True, layout="constrained")
+    colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, robot.joint_count))
+    for axis, rows, limit in (
+        (axes[0], np.array(angles), max(robot.limit_rad)),
+        (axes[1], np.array(speeds), robot.joint_speed_limit_rad_s),
+    ):
+        for joint, colour in enumerate(colours):
+            axis.plot(time_s, rows[:, joint], color=colour, linewidth=0.6)
+        for bound in (-limit, limit):
+            axis.axhline(bound, color="0.4", linewidth=0.8, linestyle="--")
+        for start_s, _, taken_s in changes:
+            axis.axvspan(start_s, start_s + taken_s, color="tab:orange", alpha=0.13, linewidth=0)
+    for start_s, name, _ in changes:
+        axes[0].annotate(name, (start_s, 1.02), xycoords=("data", "axes fraction"), fontsize=9)
+    axes[0].set_ylabel("joint, rad")
+    axes[1].set_ylabel("joint speed, rad/s")
+    axes[1].set_xlabel("time, s (orange: the change; dashed: limits)")
+    save_picture(figure, out, dpi=72)
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1]))

@@ -1,0 +1,159 @@
+"""Map of a run: ground, path and waypoints, and the body at several times."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    GROUND,
+    INK,
+    RED,
+    WIDTH_IN,
+    legend_above,
+)
+from snakewalk.controller.metrics.path_error import waypoint_times_s
+from snakewalk.controller.runlog.record import RunRecord
+
+_BODY_SPACING = 1.3  # body lengths between the bodies drawn
+_MARGIN_M = 0.35
+
+
+def path_figure(record: RunRecord) -> Figure | None:
+    """Map in the horizontal plane; None without a pose."""
+    pose = record.pose
+    if len(pose.time_s) == 0:
+        return None
+    low, high = _extent(record)
+    wide, tall = high - low
+    height = float(np.clip(0.86 * WIDTH_IN * tall / wide, 3.2, 7.2))
+    figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
+    axes = figure.subplots()
+    axes.set_aspect("equal")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    if record.header.ground is not None:
+        draw_ground(axes, record.header.ground)
+    _plan(axes, record)
+    _bodies(axes, record)
+    axes.plot(*pose.centre_m[:, :2].T, color=BLUE, linewidth=2.0, label="centre of mass")
+    axes.plot(*pose.head_m[:, :2].T, color=BLUE, linewidth=0.7, alpha=0.55, label="head")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    legend_above(axes)
+    return figure
+
+
+def _extent(record: RunRecord) -> tuple[Floats, Floats]:
+    plan, pose = record.header.plan, record.pose
+    links = pose.links_m[..., :2].reshape(-1, 2)
+    around = [plan.waypoints_m - plan.waypoint_radius_m, plan.waypoints_m + plan.waypoint_radius_m]
+    parts = [plan.path_m[:, :2], *around, pose.head_m[:, :2], links]
+    points = np.concatenate(parts)
+    points = points[np.isfinite(points).all(axis=1)]
+    return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
+
+
+def draw_ground(axes: Axes, ground: HeightField) -> None:
+    """Draw hills as colours, shade and contour lines."""
+    w, h = ground.size_m
+    extent = (ground.x0_m, ground.x0_m + w, ground.y0_m, ground.y0_m + h)
+    colour = GROUND((ground.z_m - ground.z_m.min()) / max(float(np.ptp(ground.z_m)), 1e-9))
+    light = LightSource(azdeg=315, altdeg=50)
+    shade = light.hillshade(ground.z_m, vert_exag=1.0, dx=ground.spacing_m, dy=ground.spacing_m)
+    colour[..., :3] *= (0.72 + 0.36 * shade)[..., None]
+    pale = np.clip(0.35 + 0.65 * colour[..., :3], 0.0, 1.0)
+    axes.imshow(pale, origin="lower", extent=extent, interpolation="bilinear", zorder=0)
+    x = np.linspace(extent[0], extent[1], ground.z_m.shape[1])
+    y = np.linspace(extent[2], extent[3], ground.z_m.shape[0])
+    lines = axes.contour(x, y, ground.z_m, levels=8, colors=INK, linewidths=0.4, alpha=0.45)
+    axes.clabel(lines, fontsize=7, fmt="%.2f m")
+    axes.grid(visible=False)
+
+
+def _plan(axes: Axes, record: RunRecord) -> None:
+    plan = record.header.plan
+    paths = record.paths if len(plan.waypoints_m) else ()
+    for number, (_, path) in enumerate(paths):
+        label = "planned path" if number == 0 else ("laid again" if number == 1 else None)
+        strong = number == 0
+        axes.plot(
+            *path[:, :2].T,
+            color=INK if strong else GREY,
+            linewidth=1.4 if strong else 1.0,
+            linestyle=(0, (5, 3)) if strong else (0, (1, 2)),
+            label=label,
+            zorder=2,
+        )
+    reached = len(waypoint_times_s(record.pose, plan))
+    for number, point in enumerate(plan.waypoints_m):
+        colour = GREEN if number < reached else RED
+        axes.add_patch(
+            Circle(
+                (float(point[0]), float(point[1])),
+                plan.waypoint_radius_m,
+                facecolor=colour,
+                edgecolor=colour,
+                alpha=0.16,
+                zorder=1,
+            )
+        )
+        axes.annotate(
+            str(number + 1), point, ha="center", va="center", color="white", fontsize=9,
+            fontweight="bold", zorder=6,
+            bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": "white"},
+        )  # fmt: skip
+
+
+def _bodies(axes: Axes, record: RunRecord) -> None:
+    pose, robot = record.pose, record.header.robot
+    known = np.flatnonzero(np.isfinite(pose.links_m).all(axis=(1, 2)))
+    if len(known) == 0:
+        return
+    along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[known, :2], axis=0, prepend=[[0, 0]]).T))
+    along_m -= along_m[0]
+    count = 1 + max(1, int(along_m[-1] / (_BODY_SPACING * robot.length_m)))
+    half_m = 0.5 * robot.link_lengths_m[0], 0.5 * robot.link_lengths_m[-1]
+    chosen = known[np.searchsorted(along_m, np.linspace(0.0, along_m[-1], count))]
+    for k, row in enumerate(chosen):
+        strength = 0.25 + 0.6 * k / max(len(chosen) - 1, 1)
+        outline = body_outline_m(pose.links_m[row, :, :2], half_m, robot.body_radius_m)
+        axes.add_patch(
+            Polygon(
+                outline,
+                closed=True,
+                facecolor=BLUE,
+                edgecolor="white",
+                linewidth=0.7,
+                alpha=strength,
+                zorder=3,
+                label=f"body, {len(chosen)} times" if k == len(chosen) - 1 else None,
+            )
+        )
+
+
+def body_outline_m(links_m: Floats, half_m: tuple[float, float], radius_m: float) -> Floats:
+    """Outline (n, 2) of a body along link centres (L, 2): round head, tapering tail.
+
+    ``half_m`` are half the lengths of the head and of the tail.
+    """
+    first = _unit(links_m[0] - links_m[1])
+    last = _unit(links_m[-1] - links_m[-2])
+    line = np.vstack([links_m[0] + half_m[0] * first, links_m, links_m[-1] + half_m[1] * last])
+    tangent = _unit(np.gradient(-line, axis=0))  # towards the head
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    radius = radius_m * np.interp(np.linspace(0, 1, len(line)), [0, 0.75, 1], [1, 1, 0.35])
+    left, right = line + radius[:, None] * normal, line - radius[:, None] * normal
+    turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)[1:-1]
+    cap = line[0] + radius[0] * (np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * normal[0])
+    return np.vstack([right[::-1], cap, left])
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -1,0 +1,1 @@
+"""Images of bodies: silhouettes, medial axes, films and mesh files."""

@@ -1,0 +1,98 @@
+"""The ground without the animal: from many frames, or from the surroundings in one frame."""
+
+from collections.abc import Iterator, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import DeepImage
+from snakewalk.controller.images.silhouette import Polarity, as_deep_as
+
+_GRID_PX = 64  # longest side of the picture to which the surface is fitted
+_ROUNDS = 4
+_STRONGEST_PX = 20.0  # pixels that decide the polarity
+_QUANTILE = 0.85  # a dark animal may cover a pixel in so large a share of the frames
+
+
+def median_background(frames: Sequence[DeepImage]) -> DeepImage:
+    """(H, W[, 3]) median over frames of one size; right where the animal is gone half the time."""
+    return _quantile(np.stack(frames), 0.5)
+
+
+def background_candidates(
+    frames: Sequence[DeepImage],
+) -> Iterator[tuple[DeepImage, Polarity | None, str]]:
+    """The median over frames, and for slow animals a light and a dark quantile of each pixel.
+
+    Yields:
+        background (H, W[, 3]), the polarity that it supposes (None: any), and its name.
+
+    """
+    stack = np.stack(frames)
+    yield _quantile(stack, 0.5), None, "the median of frames"
+    yield _quantile(stack, _QUANTILE), Polarity.DARK, "the lighter frames at each place"
+    yield _quantile(stack, 1.0 - _QUANTILE), Polarity.LIGHT, "the darker frames at each place"
+
+
+def _quantile(stack: DeepImage, quantile: float) -> DeepImage:
+    place = round(quantile * (len(stack) - 1))
+    return np.ascontiguousarray(np.partition(stack, place, axis=0)[place])
+
+
+def smooth_background(image: DeepImage) -> DeepImage:
+    """A background from the frame itself: a second-order surface through all but the animal.
+
+    For an animal that hardly moves, and for images cropped to it: the ground must be plain, but
+    its light may be uneven.
+    """
+    if image.ndim == 3:
+        return np.dstack([smooth_background(image[..., k]) for k in range(image.shape[2])])
+    rows, columns = image.shape
+    shrink = max(1.0, max(rows, columns) / _GRID_PX)
+    size = (max(4, round(columns / shrink)), max(4, round(rows / shrink)))
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    grey = np.asarray(small, dtype=float).ravel()
+    y, x = np.meshgrid(*(np.linspace(-1.0, 1.0, side) for side in small.shape), indexing="ij")
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
+    rest = grey - np.median(grey)
+    for _ in range(_ROUNDS):
+        spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest)))) + 1.0
+        kept = np.abs(rest - np.median(rest)) < 2.5 * spread
+        some = terms[kept]
+        fit = np.linalg.solve(some.T @ some + 1e-6 * np.eye(6), some.T @ grey[kept])
+        rest = grey - terms @ fit
+    surface = (terms @ fit).reshape(small.shape).astype(np.float32)
+    if image.dtype == np.uint8:
+        surface = np.clip(surface, 0.0, 255.0)
+    whole = cv2.resize(surface, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return as_deep_as(image, whole)
+
+
+def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> DeepImage:
+    """(H, W[, 3]) the image without what is narrower than ``side_px``: a morphological closing.
+
+    Of dark things on lighter ground; an opening of light things on darker ground. Wide shades of
+    the ground, as those of a lens, of stains and of lamps, are kept.
+    """
+    kind = cv2.MORPH_OPEN if polarity is Polarity.LIGHT else cv2.MORPH_CLOSE
+    calm = cv2.medianBlur(image, 3)
+    box = np.ones((side_px, side_px), dtype=np.uint8)
+    closed = cv2.morphologyEx(calm, kind, box, borderType=cv2.BORDER_REPLICATE)
+    return as_deep_as(image, cv2.blur(closed, (side_px, side_px)))
+
+
+def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity:
+    """Whether the pixels that stand out most are darker or lighter than the ground, or both."""
+    kind: type[np.int16 | np.float32] = np.int16 if image.dtype == np.uint8 else np.float32
+    apart: NDArray[np.int16 | np.float32] = image.astype(kind) - background.astype(kind)
+    if apart.ndim == 3:
+        strongest = np.argmax(np.abs(apart), axis=2)[..., None]
+        apart = np.take_along_axis(apart, strongest, axis=2)[..., 0]
+    smooth = np.asarray(cv2.GaussianBlur(apart, (5, 5), 0.0), dtype=float) - np.median(apart)
+    part = min(0.5, _STRONGEST_PX / smooth.size)
+    edge = 0.5 * float(np.percentile(np.abs(smooth), 100.0 - 100.0 * part))
+    dark, light = np.count_nonzero(smooth < -edge), np.count_nonzero(smooth > edge)
+    if max(dark, light) < 4 * min(dark, light):
+        return Polarity.BOTH
+    return Polarity.DARK if dark > light else Polarity.LIGHT

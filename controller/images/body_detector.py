@@ -1,0 +1,279 @@
+"""One frame in, one skeleton out: silhouette and medial axis against a known background."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Bools, DeepImage
+from snakewalk.config.errors import InputError
+from snakewalk.controller.images.background import (
+    background_candidates,
+    contrast_polarity,
+    median_background,
+    smooth_background,
+    surrounding_ground,
+)
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton, skeleton_of_level
+from snakewalk.controller.images.residual import check_residual
+from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhouette_of
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_LENGTH_TOLERANCE = 0.15  # of the length: frames that agree on the body's length
+_BETTER = 0.04  # of the frames: by how much more must agree to leave the median
+_FEWEST = 5  # frames from which a ground is learnt
+_CALM = 8  # frames whose median has little of their noise
+_CLEAR = 0.9  # share from which no other size of the surroundings is tried
+_SURE = 0.5  # share from which a ground's length of the body is believed
+_FAINT = 0.5  # of the strongest contrast: a ground's body that is fainter may be a stain
+_PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
+_WIDTHS = 1.5  # of the body: the same
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """The body found in one frame."""
+
+    silhouette: Silhouette
+    skeleton: Skeleton
+    """Its ends in no particular order; its status is that of the frame."""
+    background: DeepImage
+    """(H, W[, 3]) the image that the frame was compared with."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyDetector:
+    """Background and contrast of a scene; ``detect`` takes any frame, in any order."""
+
+    background: DeepImage | None
+    """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
+    polarity: Polarity
+    background_source: str
+    """Where the background is from, in words."""
+    surroundings_px: int = 0
+    """Where there is no background: side of the square whose ground a place is compared with; 0: a
+    smooth surface is fitted to the frame."""
+    inside: Bools | None = None
+    """(H, W) where the animal may be; a body that reaches beyond is cut. None: everywhere."""
+    threshold: float | None = None
+    """Contrast at the body's boundary, grey levels; None: half of the body's own."""
+
+    def detect(self, image: DeepImage) -> Detection:
+        """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
+
+        Raises:
+            InputError: the frame is not as large as the background.
+
+        """
+        background = self.ground_of(image)
+        if background.shape != image.shape:
+            raise InputError(
+                f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
+            )
+        body = silhouette_of(image, background, self.polarity, self.threshold)
+        if self.inside is not None and body.status is FrameStatus.GOOD:
+            left, top = (int(v) for v in body.origin_px)
+            rows, columns = body.mask.shape
+            if (body.mask & ~self.inside[top : top + rows, left : left + columns]).any():
+                body = replace(body, status=FrameStatus.CUT)
+        if body.status is not FrameStatus.GOOD:
+            return Detection(body, no_skeleton(body.status), background)
+        skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
+        if skeleton.status is FrameStatus.GOOD:
+            ghosts = self.background is not None
+            status = check_residual(image, background, self.polarity, body, skeleton, ghosts=ghosts)
+            if status is not FrameStatus.GOOD:
+                skeleton = no_skeleton(status)
+        return Detection(body, skeleton, background)
+
+    def ground_of(self, image: DeepImage) -> DeepImage:
+        """(H, W[, 3]) what a frame is compared with."""
+        if self.background is not None:
+            return self.background
+        if self.surroundings_px:
+            return surrounding_ground(image, self.polarity, self.surroundings_px)
+        return smooth_background(image)
+
+
+def make_detector(
+    frames: Sequence[DeepImage],
+    background: DeepImage | None = None,
+    *,
+    cropped: bool = False,
+    inside: Bools | None = None,
+    threshold: float | None = None,
+) -> BodyDetector:
+    """Learn a scene from a few frames spread over the recording.
+
+    Without a background the median of the frames is taken. Where the animal hardly moves, or the
+    camera goes with it, the median shows the animal itself; then another ground is taken if more
+    frames agree on the body's length and are explained by it: the median of frames in which the
+    animal is painted out, a brighter or darker quantile of each pixel's values, or what is found in
+    each frame alone, a smooth surface or the surroundings of each place.
+
+    Args:
+        frames: (H, W) or (H, W, 3), 8 bit.
+        background: the scene without the animal.
+        cropped: the camera moves, or the frames were cropped to the animal: the ground is found in
+            each frame alone.
+        inside: (H, W) where the animal may be.
+        threshold: contrast at the body's boundary, grey levels, of a user who knows it.
+
+    Raises:
+        InputError: no frames, or the background is of another size.
+
+    """
+    if not frames:
+        raise InputError("no frames to look at")
+    plain = BodyDetector(None, Polarity.BOTH, "", 0, inside, threshold)
+    if background is not None:
+        given = replace(plain, background=background, background_source="given")
+        given.detect(frames[0])
+        return replace(given, polarity=_usual_polarity(frames, background))
+    surface = replace(
+        plain,
+        polarity=_usual_polarity(frames, None),
+        background_source="a smooth surface through each frame",
+    )
+    alone = [_Candidate.of(surface, frames)]
+    around = _with_surroundings(surface, alone[0], frames)
+    if around is not None:
+        alone.append(_Candidate.of(around, frames))
+    if cropped or len({frame.shape for frame in frames}) > 1 or len(frames) < _FEWEST:
+        return _best(alone)
+    median, *quantiles = [
+        replace(
+            plain,
+            background=candidate,
+            polarity=_usual_polarity(frames, candidate) if polarity is None else polarity,
+            background_source=source,
+        )
+        for candidate, polarity, source in background_candidates(frames)
+    ]
+    fixed = [median, *quantiles]
+    painted = _painted_out(_best(alone), frames)
+    if painted is not None:
+        fixed.insert(1, painted)
+    return _best([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
+
+
+def whole_share(detector: BodyDetector, frames: Sequence[DeepImage]) -> float:
+    """Share of the frames that show a whole body of about the usual length."""
+    return _Candidate.of(detector, frames).share
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A detector, and how it does on some frames."""
+
+    detector: BodyDetector
+    share: float
+    """Of the frames: they show a whole body of the usual length, which explains the picture."""
+    length_px: float
+    """Usual length; 0 where there is none."""
+    width_px: float
+    contrast: float
+    """At the boundaries of these bodies, grey levels."""
+
+    @classmethod
+    def of(cls, detector: BodyDetector, frames: Sequence[DeepImage]) -> "_Candidate":
+        found = [detector.detect(frame) for frame in frames]
+        bodies = [one.skeleton for one in found]
+        length = np.array([one.length_px for one in bodies])
+        if not np.isfinite(length).any():
+            return cls(detector, 0.0, 0.0, 0.0, 0.0)
+        usual = float(np.nanmedian(length))
+        share = float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
+        width = 2.0 * float(np.nanmedian([np.median(one.radius_px) for one in bodies]))
+        edges = [one.silhouette.threshold for one in found if np.isfinite(one.skeleton.length_px)]
+        return cls(detector, share, usual, width, float(np.median(edges)))
+
+
+def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
+    """The first with about the highest share; half of a body in all frames counts as half.
+
+    A part of the body stands out as much as all of it; what is longer and much fainter is a stain.
+    """
+    sure = [one for one in candidates if one.share >= _SURE]
+    strongest = max((one.contrast for one in sure), default=0.0)
+    whole = [one.length_px for one in sure if one.contrast >= _FAINT * strongest]
+    longest = max(whole, default=0.0)
+    scores = [
+        one.share * (min(1.0, one.length_px / longest) if longest else 1.0) for one in candidates
+    ]
+    best = max(scores)
+    return next(
+        one.detector
+        for one, score in zip(candidates, scores, strict=True)
+        if score >= best - _BETTER
+    )
+
+
+def _with_surroundings(
+    surface: BodyDetector, seen: _Candidate, frames: Sequence[DeepImage]
+) -> BodyDetector | None:
+    """The detector that compares each place with its surroundings; None without a polarity."""
+    if surface.polarity is Polarity.BOTH:
+        return None
+    side = min(frames[0].shape[:2])
+    tried = [2 * max(2, round(part * side)) + 1 for part in _PARTS]
+    if seen.width_px > 0.0:
+        tried.insert(0, 2 * max(2, round(_WIDTHS * seen.width_px)) + 1)
+    source = "the surroundings of each place in each frame"
+    found: list[_Candidate] = []
+    for size in tried:
+        detector = replace(surface, background_source=source, surroundings_px=size)
+        found.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
+        if found[-1].share >= _CLEAR:
+            break
+    return _best(found)
+
+
+def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:
+    """Median of the frames with the animal painted over; None where it is seldom found alone."""
+    out = []
+    for frame in frames:
+        detection = detector.detect(frame)
+        if detection.skeleton.status is not FrameStatus.GOOD:
+            continue
+        body = detection.silhouette
+        reach = 2 * round(0.5 * float(np.median(detection.skeleton.radius_px)) + 2.0) + 1
+        left, top = (int(v) for v in body.origin_px)
+        rows, columns = body.level.shape
+        cover = np.zeros(frame.shape[:2], dtype=np.uint8)
+        cover[top : top + rows, left : left + columns] = body.mask
+        cover = np.asarray(cv2.dilate(cover, np.ones((reach, reach), np.uint8)), dtype=np.uint8)
+        painted = frame.copy()
+        painted[cover > 0] = detection.background[cover > 0]
+        out.append(painted)
+    if len(out) < max(_CALM, len(frames) // 2):
+        return None
+    ground = median_background(out)
+    return replace(
+        detector,
+        background=ground,
+        background_source="the median of frames, the animal painted out of each",
+        surroundings_px=0,
+    )
+
+
+def _usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
+    """The polarity of most frames.
+
+    Against a background that shows the animal a frame stands out both ways; then what each frame
+    shows alone decides.
+    """
+    found = [
+        contrast_polarity(frame, smooth_background(frame) if background is None else background)
+        for frame in frames[:: max(1, len(frames) // 9)]
+    ]
+    usual = max(Polarity, key=found.count)
+    if background is not None and usual is Polarity.BOTH:
+        return _usual_polarity(frames, None)
+    return usual
+
+
+def _size(image: DeepImage) -> str:
+    kind = "grey" if image.ndim == 2 else "colour"
+    return f"{image.shape[1]} x {image.shape[0]} {kind}"

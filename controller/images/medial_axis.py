@@ -1,0 +1,333 @@
+"""The medial axis of a silhouette as one ordered curve from tip to tip ([PT] 2.3).
+
+The body is thinned at a fixed working width, so that the cost does not depend on its size. Side
+branches are pruned by taking the longest path between two ends. The line of pixels is centred and
+extended to both tips.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from skimage.morphology import skeletonize
+
+from snakewalk.config.arrays import Bools, Floats, Image, Ints
+from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.images.thin_body_fit import THIN_PX, fitted
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.drivers.compiling import compiled
+
+Level = NDArray[np.float32]
+SEGMENTS = 100
+_MARGIN = 3
+_LARGEST_PX = 8000  # side of the enlarged cut-out
+_HOLE = 0.35  # a larger hole, in squares of the width, is a loop of the body
+_THIN_TIP = 0.2  # of the contrast, where a body two pixels wide ends: blur takes its tips away
+_UNSURE_PX = 4.5  # a thinner body's line is used only where its blurred picture fits
+_LONG = 2.5  # widths: what is shorter is no long body
+_BRANCH = 0.14  # of the length: a longer side branch is a part of the body
+WORKING_WIDTH = 14.0
+"""Width of the body while it is thinned, px."""
+_SMOOTH = 3.0  # of the chain of pixels, working px
+_CENTRINGS = 2
+_TURN_GAIN = 1.0  # of the turn towards the ridge on the way to a tip
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """A body in one image; lengths in pixels of that image, x to the right and y downwards."""
+
+    points_px: Floats
+    """(101, 2) x, y at 100 equal chords from tip to tip; NaN where there is none. Which end is the
+    head, ``identity`` decides. A pixel's centre has whole coordinates."""
+    radius_px: Floats
+    """(101,) distance to the boundary."""
+    length_px: float
+    """Sum of the chords; NaN where there is no skeleton."""
+    status: FrameStatus
+
+    def reversed(self) -> "Skeleton":
+        """The same body from its other end."""
+        return Skeleton(
+            self.points_px[::-1].copy(), self.radius_px[::-1].copy(), self.length_px, self.status
+        )
+
+
+def no_skeleton(status: FrameStatus) -> Skeleton:
+    """Stand-in for the skeleton of a frame that cannot be used: all NaN."""
+    nan = np.full((SEGMENTS + 1, 3), np.nan)
+    return Skeleton(nan[:, :2].copy(), nan[:, 2].copy(), float("nan"), status)
+
+
+def skeleton_of(mask: Bools) -> Skeleton:
+    """Skeleton of a body given as a mask (H, W) of one component, holes of the image filled or not.
+
+    Never raises on a mask: an empty, round, looped or branching one has a status other than
+    ``GOOD``, and NaN for points. The order of the ends is arbitrary.
+    """
+    shape = np.ascontiguousarray(mask, dtype=np.uint8)
+    rows, columns = np.flatnonzero(shape.any(axis=1)), np.flatnonzero(shape.any(axis=0))
+    if not rows.size:
+        return no_skeleton(FrameStatus.NOTHING)
+    top, left = int(rows[0]), int(columns[0])
+    body = shape[top : rows[-1] + 1, left : columns[-1] + 1]
+    level = cv2.copyMakeBorder(body, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
+    return skeleton_of_level(
+        level.astype(np.float32),
+        0.5,
+        (float(left - _MARGIN), float(top - _MARGIN)),
+        grey=False,
+    )
+
+
+def skeleton_of_level(
+    level: Level,
+    threshold: float,
+    origin_px: tuple[float, float] = (0.0, 0.0),
+    noise_level: float = 0.0,
+    *,
+    grey: bool = True,
+) -> Skeleton:
+    """Skeleton of the largest part of ``level`` (h, w) above ``threshold``: finer than of a mask.
+
+    Args:
+        level: contrast of one body against nothing, as a cut-out of an image.
+        threshold: the contrast at the body's boundary.
+        origin_px: x, y of the cut-out's first pixel in the image.
+        noise_level: contrast that noise alone reaches; tips are not searched below it.
+        grey: whether ``level`` falls off at the boundary as blur makes it; a mask does not.
+
+    """
+    width = _width(level > threshold)
+    if width is None:
+        return no_skeleton(FrameStatus.BLOB)
+    step = min(WORKING_WIDTH / width, _LARGEST_PX / max(level.shape))
+    fine = _rescaled(level, step)
+    solid = _largest(fine > threshold)
+    if solid is None:
+        return no_skeleton(FrameStatus.NOTHING)
+    solid, looped = _filled(solid, _HOLE * WORKING_WIDTH**2)
+    if looped:
+        return no_skeleton(FrameStatus.LOOP)
+    depth = np.asarray(cv2.distanceTransform(solid, cv2.DIST_L2, 5), dtype=np.float32)
+    thin = skeletonize(solid > 0)  # type: ignore[no-untyped-call]
+    path = _longest_path(np.asarray(thin, dtype=bool))
+    if path is None:
+        return no_skeleton(FrameStatus.BLOB)
+    curve, branch = path
+    if branch > _BRANCH * len(curve) + float(depth.max()):
+        return no_skeleton(FrameStatus.BRANCH)
+    inside = float(np.percentile(fine[solid > 0], 75))
+    tip = inside * float(np.clip(_THIN_TIP + 0.075 * (width - 2.0), _THIN_TIP, 0.5))
+    line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, noise_level)))
+    if line is None:
+        return no_skeleton(FrameStatus.BLOB)
+    if width < THIN_PX and grey:
+        found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
+        if found is None and width < _UNSURE_PX:
+            return no_skeleton(FrameStatus.BLOB)
+        if found is not None:
+            line = (found[0] + 0.5) * step - 0.5 + _MARGIN
+    try:
+        even = equipartition(line, SEGMENTS)
+    except (NoEquipartitionError, ValueError):
+        return no_skeleton(FrameStatus.BLOB)
+    radius = _sample(depth, even.points) / step
+    points = (even.points - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
+    return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
+
+
+def _width(mask: Bools) -> float | None:
+    """Width of a long body from area and outline, px: ``A = L w``, ``U = 2 (L + w)``."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not contours:
+        return None
+    outline = max(contours, key=len)
+    half = 0.5 * cv2.arcLength(outline, closed=True) + 2.0  # the chain runs through pixel centres
+    area = float(np.count_nonzero(mask))
+    square = half * half - 4.0 * area
+    if square <= 0.0 or area < 6.0:
+        return None
+    wide = 0.5 * (half - np.sqrt(square))
+    return float(wide) if half > _LONG * wide + wide else None
+
+
+def _rescaled(level: Level, scale: float) -> Level:
+    if scale < 1.0:
+        level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
+    rows, columns = (max(1, round(side * scale)) for side in level.shape)
+    how = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_LINEAR
+    matrix = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5]]) * scale - [[0, 0, 0.5], [0, 0, 0.5]]
+    fine = cv2.warpAffine(
+        level, matrix, (columns, rows), flags=how, borderMode=cv2.BORDER_REPLICATE
+    )
+    fine = cv2.copyMakeBorder(fine, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
+    return np.asarray(cv2.GaussianBlur(fine, (0, 0), 1.0), dtype=np.float32)
+
+
+def _to_the_tips(
+    chain: Floats, fine: Level, threshold: float, depth: Level, tip: float
+) -> Floats | None:
+    """Smooth the chain of pixels, cut the forks off its ends, and go on to the boundary."""
+    line = gaussian_filter1d(chain, _SMOOTH, axis=0, mode="nearest")
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    deep = _sample(depth, line)
+    # within a radius of the end the axis of a blunt body turns into one of its corners
+    inner = np.flatnonzero((arc >= deep) & (arc[-1] - arc >= deep))
+    if len(inner) < 4:
+        return None
+    core = line[inner[0] : inner[-1] + 1]
+    for _ in range(_CENTRINGS):
+        core = _centred(core, fine, threshold)
+    reach = min(round(WORKING_WIDTH), len(core))
+    head = _tip(core[:reach][::-1], fine, tip)
+    tail = _tip(core[-reach:], fine, tip)
+    return np.vstack([head[::-1], core, tail])
+
+
+def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
+    """Move each point to the middle between both sides.
+
+    Thinning is off by up to a pixel, and smoothing cuts bends short.
+    """
+    along = np.gradient(line, axis=0)
+    side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    out = np.arange(0.0, WORKING_WIDTH, 0.5)
+    reach = []
+    for sign in (1.0, -1.0):
+        ray = line[:, None] + sign * out[:, None] * side[:, None]
+        level = _sample(fine, ray)
+        below = level < threshold
+        last = np.argmax(below, axis=1)
+        row = np.arange(len(line))
+        high, low = level[row, np.maximum(last - 1, 0)], level[row, last]
+        part = np.clip((high - threshold) / np.maximum(high - low, 1e-6), 0.0, 1.0)
+        reach.append(np.where(last > 0, out[last] - 0.5 + 0.5 * part, np.nan))
+    off = 0.5 * (reach[0] - reach[1])
+    known = np.flatnonzero(np.abs(off) < 0.25 * WORKING_WIDTH)
+    if not known.size:
+        return line
+    off = np.interp(np.arange(len(line)), known, off[known])
+    return np.asarray(line + gaussian_filter1d(off, _SMOOTH, mode="nearest")[:, None] * side)
+
+
+def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
+    """Points on from the last of ``end`` (K, 2), along the ridge, to where the body ends."""
+    ahead = end[-1] - end[0]
+    ahead = ahead / np.hypot(*ahead)
+    across = np.linspace(-0.5, 0.5, 15) * WORKING_WIDTH
+    here, found, last = end[-1], [], threshold
+    for _ in range(round(4.0 * WORKING_WIDTH)):
+        there = here + ahead
+        side = np.array([-ahead[1], ahead[0]])
+        level = _sample(fine, np.vstack([there, there + across[:, None] * side]))
+        if level[0] <= threshold:
+            part = (last - threshold) / max(last - level[0], 1e-6)
+            found.append(here + float(np.clip(part, 0.0, 1.0)) * ahead)
+            break
+        last = float(level[0])
+        weight = np.maximum(level[1:] - threshold, 0.0)
+        off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
+        turned = ahead + _TURN_GAIN * off / WORKING_WIDTH * side
+        ahead = turned / np.hypot(*turned)
+        here = there + 0.5 * _TURN_GAIN * off * side
+        found.append(here)
+    return np.asarray(found)
+
+
+def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
+    """Values (...) between the pixels at points (..., 2), one or two leading axes; 0 outside."""
+    rows = points if points.ndim == 3 else points[:, None]
+    x, y = np.ascontiguousarray(np.moveaxis(rows, -1, 0), dtype=np.float32)
+    found = cv2.remap(
+        np.asarray(image, dtype=np.float32),
+        x,
+        y,
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=0,
+    )
+    return np.asarray(found, dtype=float).reshape(points.shape[:-1])
+
+
+def _largest(mask: Bools) -> Image | None:
+    """(h, w) the largest part, 1 inside; None where there is nothing."""
+    count, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    if count < 2:
+        return None
+    best = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return np.asarray(label == best, dtype=np.uint8)
+
+
+def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
+    """Holes filled, and whether one was larger than ``hole_px``, so that the body encloses it."""
+    count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
+    outside = label[0, 0]
+    holes = [stats[k, cv2.CC_STAT_AREA] for k in range(1, count) if k != outside]
+    looped = max(holes, default=0) > hole_px
+    return (label != outside).astype(np.uint8), bool(looped)
+
+
+def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
+    """The longest path between two ends (K, 2) x, y, and how far off it another part reaches."""
+    rows, columns = np.nonzero(thin)
+    if len(rows) < 3:
+        return None
+    wide = thin.shape[1]
+    place = np.full(thin.size, -1)
+    flat = np.asarray(rows * wide + columns)
+    place[flat] = np.arange(len(flat))
+
+    def paths_from(start: Sequence[int]) -> tuple[Floats, Ints]:
+        length, before = np.full(len(flat), -1.0), np.full(len(flat), -1)
+        walk_line(place, flat, wide, np.asarray(start), length, before)
+        return length, before
+
+    one, _ = paths_from([0])
+    far, before = paths_from([int(np.argmax(one))])
+    chain = [int(np.argmax(far))]
+    while before[chain[-1]] >= 0:
+        chain.append(int(before[chain[-1]]))
+    away, _ = paths_from(chain)
+    return np.column_stack([columns[chain], rows[chain]]).astype(float), float(away.max())
+
+
+_INTS = "int64[::1]"
+
+
+@compiled(f"void({_INTS}, {_INTS}, int64, {_INTS}, float64[::1], {_INTS})")
+def walk_line(
+    place: Ints, flat: Ints, wide: int, start: Ints, length: Floats, before: Ints
+) -> None:
+    """Walk over the pixels of a thin line from some of them, a pixel further at a time.
+
+    Args:
+        place: (H W,) index of each pixel of the line, -1 beside it; the rim of the image is beside.
+        flat: (N,) where the line's pixels are in it.
+        wide: W.
+        start: (S,) indices of the first pixels.
+        length: (N,) px; out: of the way to each pixel, in place of -1. Slanted steps are longer.
+        before: (N,) out: the pixel before it, in place of -1.
+
+    """
+    front = np.empty(len(flat), np.int64)
+    count = len(start)
+    for k in range(count):
+        front[k] = start[k]
+        length[start[k]] = 0.0
+    slanted = 2.0**0.5
+    sides = (1, -1, wide, -wide, wide + 1, wide - 1, -wide + 1, -wide - 1)
+    at = 0
+    while at < count:
+        here = front[at]
+        at += 1
+        for side in range(8):
+            other = place[flat[here] + sides[side]]
+            if other >= 0 and length[other] < 0.0:
+                length[other] = length[here] + (1.0 if side < 4 else slanted)
+                before[other] = here
+                front[count] = other
+                count += 1

@@ -1,0 +1,100 @@
+"""What a body found in a frame leaves unexplained: a part beyond its tips, or a ghost."""
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Bools, DeepImage, Floats
+from snakewalk.controller.images.background import surrounding_ground
+from snakewalk.controller.images.medial_axis import Skeleton
+from snakewalk.controller.images.silhouette import Polarity, Silhouette, as_deep_as, contrast
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_AROUND = 0.5  # of the length, looked at on each side
+_WEAK = 0.2  # of the body's contrast: what is left over and weaker is ground
+_NEAR = 1.5  # widths from a tip: what begins there may be the body's
+_AWAY = 1.2  # widths from the body: a shadow stays nearer
+_PART = 0.02  # of the body's summed contrast: so much beyond a tip is a part of it
+_GHOST = 0.05  # the same for what the background shows and the frame does not
+_GHOST_WEAK = 0.3  # of the body's contrast
+
+
+def check_residual(
+    image: DeepImage,
+    background: DeepImage,
+    polarity: Polarity,
+    silhouette: Silhouette,
+    skeleton: Skeleton,
+    *,
+    ghosts: bool,
+) -> FrameStatus:
+    """Whether the body explains the picture around it: its status is ``GOOD`` if so.
+
+    Args:
+        image: (H, W[, 3]) the frame.
+        background: the same without the animal.
+        polarity: whether the animal is darker or lighter than its ground.
+        silhouette: the body in the frame.
+        skeleton: its skeleton.
+        ghosts: whether the background is one of the film, which may show the animal itself.
+
+    """
+    wide = 2.0 * max(float(np.median(skeleton.radius_px)), 0.5)
+    around = round(_AROUND * skeleton.length_px)
+    rows, columns = silhouette.level.shape
+    left, top = (int(v) for v in silhouette.origin_px)
+    low_x, low_y = max(0, left - around), max(0, top - around)
+    window = (slice(low_y, top + rows + around), slice(low_x, left + columns + around))
+    seen, ground = image[window], background[window]
+    body = np.zeros(seen.shape[:2], dtype=bool)
+    body[top - low_y : top - low_y + rows, left - low_x : left - low_x + columns] = silhouette.mask
+    same = _soft(contrast(seen, ground, polarity))
+    level = 2.0 * silhouette.threshold
+    mass = float(same[body].sum())
+    least = max(silhouette.noise_level, _WEAK * level)
+    tips = skeleton.points_px[[0, -1]] - [low_x, low_y]
+    if _beyond_tips(same, body, tips, wide, least) > _PART * mass:
+        return FrameStatus.PART
+    if ghosts and polarity is not Polarity.BOTH:
+        least = max(silhouette.noise_level, _GHOST_WEAK * level)
+        if _ghost(seen, ground, polarity, body, wide, least) > _GHOST * mass:
+            return FrameStatus.GHOST
+    return FrameStatus.GOOD
+
+
+def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:
+    """Sum of contrast of what begins at a tip and goes away from the body."""
+    apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
+    rest = (same > least) & (apart > 1.5)
+    count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
+    if count < 2:
+        return 0.0
+    y, x = np.nonzero(rest)
+    part = label[rest]
+    near = np.zeros(count, dtype=bool)
+    for tip in tips:
+        near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR * wide + 2.0]] = True
+    away = rest & (apart > _AWAY * wide)
+    return float(same[away & near[label]].sum())
+
+
+def _ghost(
+    seen: DeepImage, ground: DeepImage, polarity: Polarity, body: Bools, wide: float, least: float
+) -> float:
+    """Sum of what stands out the wrong way beside the body where the ground holds something alike.
+
+    A ghost away from the body does not spoil it.
+    """
+    opposite = Polarity.LIGHT if polarity is Polarity.DARK else Polarity.DARK
+    wrong = _soft(contrast(seen, ground, opposite))
+    side = 2 * round(1.5 * wide) + 3
+    own = contrast(ground, surrounding_ground(ground, polarity, side), polarity)
+    apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
+    shown = (wrong > least) & (_soft(own) > least) & (apart > 1.5)
+    count, label = cv2.connectedComponents(shown.astype(np.uint8), connectivity=8)
+    near = np.zeros(count, dtype=bool)
+    near[label[shown & (apart < wide)]] = True
+    return float(wrong[shown & near[label]].sum())
+
+
+def _soft(apart: DeepImage) -> DeepImage:
+    return as_deep_as(apart, cv2.GaussianBlur(apart, (3, 3), 0.0))

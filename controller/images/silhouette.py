@@ -1,0 +1,195 @@
+"""The silhouette of one animal: where a frame differs from its background ([PT] 2.2)."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bools, DeepImage
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_MARGIN = 4
+_CLEAR = 6.0  # standard deviations of the noise by which an animal's pixel must stand out
+_LEAST_PX = 12
+_RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
+_CANDIDATES = 4  # parts that may be the animal
+_SHARE = 0.4  # of the squares of a part's contrast: the contrast of the part
+_SHRUNK_PX = 400  # longest side of the picture on which the noise is measured
+
+
+class Polarity(StrEnum):
+    """Whether the animal is darker or lighter than its ground."""
+
+    DARK = "dark"
+    LIGHT = "light"
+    BOTH = "both"
+
+
+@dataclass(frozen=True, slots=True)
+class Silhouette:
+    """One body in one image, cut out."""
+
+    level: NDArray[np.float32]
+    """(h, w) contrast against the background, grey values; other things in the cut-out are 0."""
+    threshold: float
+    """Contrast at the boundary: half of the body's own."""
+    noise_level: float
+    """Contrast that noise alone may reach."""
+    origin_px: tuple[float, float]
+    """x, y of the cut-out's first pixel in the image."""
+    area_px: float
+    distractors: float
+    """Area of the next largest object that stands out, over this body's; noise and dirt count."""
+    status: FrameStatus
+
+    @property
+    def mask(self) -> Bools:
+        """(h, w) the body."""
+        return np.asarray(self.level > self.threshold)
+
+
+def as_deep_as(image: DeepImage, values: NDArray[Any]) -> DeepImage:
+    """Grey levels as whole numbers where the image has only these; deeper ones as they are."""
+    if image.dtype == np.uint8 and values.dtype != np.uint8:
+        return np.asarray(np.rint(values), dtype=np.uint8)
+    return np.asarray(values, dtype=image.dtype)
+
+
+def contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
+    """(H, W) how much each pixel stands out; of a colour image its strongest channel."""
+    if polarity is Polarity.BOTH:
+        apart = cv2.absdiff(image, background)
+    elif polarity is Polarity.DARK:
+        apart = cv2.subtract(background, image)
+    else:
+        apart = cv2.subtract(image, background)
+    if apart.ndim == 3:
+        one, two, three = (cv2.extractChannel(apart, k) for k in range(3))
+        apart = cv2.max(cv2.max(one, two, dst=one), three, dst=one)
+    return np.asarray(np.maximum(apart, 0) if apart.dtype == np.float32 else apart)
+
+
+def _noise_of(apart: DeepImage) -> tuple[float, float]:
+    """Median and spread of the contrast of the background, from every n-th pixel."""
+    every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
+    some = apart[::every, ::every].ravel()
+    middle = float(np.median(some))
+    above = some[some >= middle].astype(float) - middle
+    return middle, float(1.4826 * np.median(above)) + 0.5
+
+
+def silhouette_of(
+    image: DeepImage,
+    background: DeepImage,
+    polarity: Polarity = Polarity.BOTH,
+    threshold: float | None = None,
+) -> Silhouette:
+    """Find the animal of one frame.
+
+    Args:
+        image: (H, W) or (H, W, 3), see ``DeepImage``.
+        background: the same without the animal.
+        polarity: whether the animal is darker or lighter than its ground.
+        threshold: contrast at the boundary, grey levels; None: half of the body's own.
+
+    """
+    apart = as_deep_as(image, cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0))
+    middle, spread = _noise_of(apart)
+    clear = middle + _CLEAR * spread
+    if threshold is not None:
+        return _cut_out(apart, threshold, min(clear, threshold), middle)
+    found = _parts((apart > clear).astype(np.uint8))
+    if found is None:
+        return _no_silhouette()
+    threshold = _threshold_of_body(apart, *found, middle, middle + 3.0 * spread)
+    return _cut_out(apart, threshold, clear, middle)
+
+
+def _threshold_of_body(
+    apart: DeepImage,
+    label: NDArray[np.int32],
+    stats: NDArray[np.int32],
+    middle: float,
+    least: float,
+) -> float:
+    """Half of the contrast of the part with the most contrast in sum.
+
+    Stains of a JPEG and a soft shade of the ground may be larger than the animal, and joined to
+    it. So where a part is mostly fainter than half of its strong pixels, its contrast is a
+    percentile in which each pixel counts by the square of its own, and a part's sum is taken above
+    half of that.
+    """
+    strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
+    inside = label > 0
+    squares = np.bincount(label[inside], weights=strength[inside] ** 2, minlength=len(stats))
+    best, most = least, -1.0
+    for part in np.argsort(squares)[: -_CANDIDATES - 1 : -1]:
+        if squares[part] <= 0.0:
+            break
+        left, top, wide, high, _ = (int(v) for v in stats[part])
+        window = (slice(top, top + high), slice(left, left + wide))
+        own = np.sort(strength[window][label[window] == part])
+        weight = np.cumsum(own**2)
+        level = float(own[np.searchsorted(weight, _SHARE * weight[-1])])
+        usual = float(np.percentile(own, 70))
+        if usual > 0.5 * level:
+            level = usual
+        threshold = max(middle + 0.5 * level, least)
+        mass = float(own[own > threshold - middle].sum())
+        if mass > most:
+            best, most = threshold, mass
+    return best
+
+
+def _no_silhouette() -> Silhouette:
+    """The silhouette of a frame without an animal."""
+    empty = np.zeros((1, 1), dtype=np.float32)
+    return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
+
+
+def _parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+    """Labels and statistics of the connected parts, searched only where the mask is not empty."""
+    left, top, wide, high = cv2.boundingRect(mask)
+    if wide * high < _LEAST_PX:
+        return None
+    window = (slice(top, top + high), slice(left, left + wide))
+    count, inner, stats, _ = cv2.connectedComponentsWithStats(mask[window], connectivity=8)
+    if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_PX:
+        return None
+    label = np.zeros(mask.shape, dtype=np.int32)
+    label[window] = inner
+    stats[:, cv2.CC_STAT_LEFT] += left
+    stats[:, cv2.CC_STAT_TOP] += top
+    return label, np.asarray(stats, dtype=np.int32)
+
+
+def _cut_out(apart: DeepImage, threshold: float, noise_level: float, middle: float) -> Silhouette:
+    """The body of most contrast above the threshold, with a margin; whether alone and whole."""
+    found = _parts((apart > threshold).astype(np.uint8))
+    if found is None:
+        return _no_silhouette()
+    label, stats = found
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    sums = np.bincount(label.ravel(), weights=(apart - np.float32(middle)).ravel())
+    best = 1 + int(np.argmax(sums[1:]))
+    left, top, wide, high, area = (int(v) for v in stats[best])
+    rows, columns = apart.shape
+    status = FrameStatus.GOOD
+    distractors = float(np.delete(areas, best - 1).max(initial=0)) / area
+    if distractors > _RIVAL:
+        status = FrameStatus.SEVERAL
+    elif left == 0 or top == 0 or left + wide == columns or top + high == rows:
+        status = FrameStatus.CUT
+    window = (
+        slice(max(0, top - _MARGIN), min(rows, top + high + _MARGIN)),
+        slice(max(0, left - _MARGIN), min(columns, left + wide + _MARGIN)),
+    )
+    level = apart[window].astype(np.float32)
+    other = (label[window] != best) & (label[window] != 0)
+    if other.any():
+        level[cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
+    origin = (float(window[1].start), float(window[0].start))
+    return Silhouette(level, threshold, noise_level, origin, float(area), distractors, status)

@@ -1,0 +1,1 @@
+"""Commands of learnt policies, one command per file."""

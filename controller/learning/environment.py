@@ -1,0 +1,283 @@
+"""A snake of simulated servos as a Gymnasium environment: a step is a control cycle on the bus.
+
+Everything between the action and the physics is what a run has: the safety link vets the goals, the
+chain turns them into packets, simulated servos answer on a simulated line. A policy that has learnt
+here has met clamps, wire time, quantised readings and servo lag.
+"""
+
+from typing import Any, Final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import checked, load_robot, load_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.controller.kinematics.links import BodyView, body_in_world
+from snakewalk.controller.run.backend import Backend, simulated
+from snakewalk.controller.run.prepared_run import PathlessRun, pose_with
+from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.drivers.errors import SafetyTrippedError
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.types import JointCommand, JointState
+
+_FLOATS: Final = readonly_array()
+_SPEED_RAD_S: Final = 20.0
+_SPEED_M_S: Final = 3.0
+_CURRENT_A: Final = 10.0
+"""Ends of the observation space (ours): far beyond what a body of such servos does."""
+
+
+class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A chain of servos on its ground that is to go along x, as far as it can for its energy.
+
+    With J joints, head first; ``observation_names`` has a name with its unit for each number.
+
+    Action (J,): goal angles as shares of the joints' limits, -1 to 1: the goals in rad are
+    ``action * limit_rad``. The safety link clamps their rate.
+
+    Observation (4 J + 7,): measured angles (rad), velocities (rad/s) and currents (A), as the
+    packets brought them; the goals that safety let through last (rad); from the simulation the
+    world's up in the axes of the head; cosine and sine of the body's mean heading, x being 0; the
+    velocity of the centre of mass along x and y since the last step (m/s).
+
+    Reward, in m: how far the centre of mass came along x, less ``energy_weight_m_j`` metres for
+    each joule that the motors took in. If safety trips, the episode terminates, and
+    ``trip_penalty_m`` is taken off; ``info["tripped"]`` says why. Otherwise it ends by the time
+    limit of ``make``.
+
+    ``info`` has ``x_m`` and ``y_m`` of the centre of mass, ``energy_j`` since the start,
+    ``clamped`` (joints whose goal safety moved in this step), and ``tripped``.
+
+    Args:
+        robot: shipped robot, or a TOML file.
+        world: shipped world, or a TOML file.
+        cycle_hz: control cycles, and steps, a second of the robot.
+        physics_step_s: 5 ms is good enough on a floor (``docs/physics.md``), and quick.
+        energy_weight_m_j: metres that a joule is worth.
+        trip_penalty_m: metres that a trip costs.
+        start_joint_rad: joints start within this, drawn evenly.
+        start_heading_rad: so does the heading, around x.
+
+    Raises:
+        InputError: a file is wrong, or MuJoCo is not installed.
+
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  as Gymnasium has it
+
+    def __init__(
+        self,
+        robot: str = "yaw16",
+        world: str = "flat",
+        *,
+        cycle_hz: float = 50.0,
+        physics_step_s: float = 0.005,
+        energy_weight_m_j: float = 0.0005,
+        trip_penalty_m: float = 1.0,
+        start_joint_rad: float = 0.1,
+        start_heading_rad: float = 0.2,
+    ) -> None:
+        require_extra("the environment needs", "mujoco")
+        body = load_robot(robot)
+        fields = {
+            "name": "snake-environment",
+            "robot": body.name,
+            "world": world,
+            "motion": "source",
+            "cycle_hz": cycle_hz,
+            "physics_step_s": physics_step_s,
+        }
+        run = checked(RunConfig, fields, "SnakeEnvironment")
+        self._prepared = PathlessRun(run, body, load_world(world))
+        self._energy_weight_m_j, self._trip_penalty_m = energy_weight_m_j, trip_penalty_m
+        self._spread_rad = (start_joint_rad, start_heading_rad)
+        if min(self._spread_rad) < 0.0 or start_joint_rad > min(body.limit_rad):
+            raise InputError(
+                f"start_joint_rad = {start_joint_rad:g}, start_heading_rad = "
+                f"{start_heading_rad:g}: expected 0 to {min(body.limit_rad):g}, and at least 0"
+            )
+        self.limit_rad: Floats = np.array(body.limit_rad)
+        """(J,) what an action of 1 means."""
+        self.action_space = spaces.Box(-1.0, 1.0, (body.joint_count,), dtype=np.float32)
+        ends = np.repeat([np.pi, _SPEED_RAD_S, _CURRENT_A], body.joint_count)
+        self._end = np.concatenate(
+            [ends, self.limit_rad, np.ones(5), np.full(2, _SPEED_M_S)]
+        ).astype("f4")
+        self.observation_space = spaces.Box(-self._end, self._end, dtype=np.float32)
+        self.observation_names = _names(body)
+        """Of each number of an observation, with its unit."""
+        self._limits = SafetyLimits.from_config(body, run.safety)
+        self._backend: Backend | None = None
+        self._link: SafeLink | None = None
+        self._due_s, self._taken_j = 0.0, 0.0
+        self._view: BodyView | None = None
+        self._sent_rad: Floats = np.zeros(body.joint_count)
+
+    @property
+    def robot(self) -> RobotConfig:
+        """The body and its servos."""
+        return self._prepared.robot
+
+    @property
+    def period_s(self) -> float:
+        """Of the robot's time, a step."""
+        return 1.0 / self._prepared.run.cycle_hz
+
+    @property
+    def view(self) -> BodyView:
+        """The body as it was measured last.
+
+        Raises:
+            gymnasium.error.ResetNeeded: there is no episode.
+
+        """
+        if self._view is None:
+            raise gymnasium.error.ResetNeeded("call reset before a look at the body")
+        return self._view
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Lay another robot of the same kind on the ground, torque on; takes as long as 600 steps.
+
+        Raises:
+            InputError: ``options`` are given; there are none.
+
+        """
+        super().reset(seed=seed)
+        if options:
+            raise InputError(f"reset knows no options, but got {', '.join(options)}")
+        joints, heading = self._spread_rad
+        robot, run = self._prepared.robot, self._prepared.run
+        start_rad = self.np_random.uniform(-joints, joints, robot.joint_count)
+        initial = pose_with(robot, float(self.np_random.uniform(-heading, heading)), start_rad)
+        backend = simulated(run, robot, self._prepared.world, self._prepared.ground, initial)
+        link = SafeLink(backend.chain, self._limits, backend.clock)
+        state = link.enable()
+        self._backend, self._link = backend, link
+        self._due_s, self._taken_j = backend.clock.now_s(), backend.energy().electrical_j
+        self._sent_rad = state.position_rad
+        self._view = None
+        observation, _ = self._observe(backend, state)
+        return observation, self._info(link)
+
+    def step(
+        self, action: NDArray[np.floating[Any]]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Send goals (J,), as shares of the limits; wait for the next cycle, read all servos.
+
+        Raises:
+            gymnasium.error.ResetNeeded: there is no episode, or safety has tripped in it.
+
+        """
+        backend, link = self._backend, self._link
+        if backend is None or link is None or link.tripped:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        goal_rad = np.asarray(action, dtype=float) * self.limit_rad
+        self._due_s += self.period_s
+        try:
+            link.write(JointCommand(backend.clock.now_s(), goal_rad))
+        except SafetyTrippedError:
+            pass  # it has latched: the episode ends, with what can still be read
+        else:
+            if link.last_verdict is not None:
+                self._sent_rad = link.last_verdict.goal_rad
+        backend.clock.sleep_until_s(self._due_s)
+        observation, progress_m = self._observe(backend, link.read())
+        taken_j = backend.energy().electrical_j
+        reward = progress_m - self._energy_weight_m_j * (taken_j - self._taken_j)
+        self._taken_j = taken_j
+        info = self._info(link)
+        tripped = info["tripped"] is not None
+        if tripped:
+            reward -= self._trip_penalty_m
+        return observation, reward, tripped, False, info
+
+    def _observe(self, backend: Backend, state: JointState) -> tuple[NDArray[np.float32], float]:
+        """Observation, and how far the centre of mass came along x since the one before."""
+        assert backend.pose is not None  # a simulated one
+        pose = backend.pose()
+        view = body_in_world(self._prepared.robot, pose, state.position_rad)
+        moved_m = np.zeros(2) if self._view is None else (view.centre_m - self._view.centre_m)[:2]
+        self._view = view
+        values = np.empty_like(self._end)
+        _fill(
+            *(values, self._end, state.position_rad, state.velocity_rad_s, state.current_a),
+            *(self._sent_rad, view.rotation, moved_m * self._prepared.run.cycle_hz),
+        )
+        return values, float(moved_m[0])
+
+    def _info(self, link: SafeLink) -> dict[str, Any]:
+        assert self._view is not None
+        verdict = link.last_verdict
+        return {
+            "x_m": float(self._view.centre_m[0]),
+            "y_m": float(self._view.centre_m[1]),
+            "energy_j": self._taken_j,
+            "clamped": [] if verdict is None else verdict.clamped.nonzero()[0].tolist(),
+            "tripped": link.tripped,
+        }
+
+
+@compiled(
+    f"void(float32[::1], float32[::1], {_FLOATS}, {_FLOATS}, {_FLOATS}, {_FLOATS},"
+    " float64[:, :, ::1], float64[::1])"
+)
+def _fill(
+    values: NDArray[np.float32],
+    end: NDArray[np.float32],
+    position_rad: Floats,
+    velocity_rad_s: Floats,
+    current_a: Floats,
+    sent_rad: Floats,
+    rotation: Floats,
+    velocity_m_s: Floats,
+) -> None:
+    """Fill an observation (4 J + 7,), cut at its ends.
+
+    Args:
+        values: to be filled.
+        end: greatest values.
+        position_rad: (J,)
+        velocity_rad_s: (J,)
+        current_a: (J,)
+        sent_rad: (J,)
+        rotation: (L, 3, 3) axes of the links as columns; the mean heading is of their directions,
+            each followed from the one before without a jump by a turn.
+        velocity_m_s: (2,) of the centre of mass.
+
+    """
+    joints = len(position_rad)
+    for k in range(joints):
+        values[k] = position_rad[k]
+        values[joints + k] = velocity_rad_s[k]
+        values[2 * joints + k] = current_a[k]
+        values[3 * joints + k] = sent_rad[k]
+    at = 4 * joints
+    for axis in range(3):
+        values[at + axis] = rotation[0, 2, axis]
+    before = total = np.arctan2(rotation[0, 1, 0], rotation[0, 0, 0])
+    for link in range(1, len(rotation)):
+        heading = np.arctan2(rotation[link, 1, 0], rotation[link, 0, 0])
+        before = heading - 2.0 * np.pi * np.rint((heading - before) / (2.0 * np.pi))
+        total += before
+    mean = total / len(rotation)
+    values[at + 3], values[at + 4] = np.cos(mean), np.sin(mean)
+    values[at + 5], values[at + 6] = velocity_m_s[0], velocity_m_s[1]
+    for k in range(len(values)):
+        values[k] = min(max(values[k], -end[k]), end[k])
+
+
+def _names(robot: RobotConfig) -> tuple[str, ...]:
+    """Name of each number of an observation."""
+    kinds = ("measured", "rad"), ("velocity", "rad_s"), ("current", "a"), ("sent", "rad")
+    joints = [f"{of}_joint{k}_{unit}" for of, unit in kinds for k in range(robot.joint_count)]
+    body = ("up_forward", "up_left", "up_up", "heading_cos", "heading_sin")
+    return (*joints, *body, "velocity_x_m_s", "velocity_y_m_s")

@@ -1,0 +1,80 @@
+"""The environment of a policy's training: what runs in it is the policy's own motion.
+
+It is ``SnakeEnvironment`` with the eyes and hands of a ``PolicyMotion``: an observation is what the
+motion observes on a robot without a camera, an action changes the motion's wave.
+"""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from snakewalk.controller.learning.environment import SnakeEnvironment
+from snakewalk.controller.motion.policy import WAVE_SPAN, Origin, Policy, observation_names
+from snakewalk.controller.motion.policy_motion import PolicyMotion
+
+_UNTRAINED = Policy(
+    name="untrained",
+    robot="any",
+    origin=Origin(method="none", seed=0, steps=0, world="none", software="none"),
+)
+
+
+class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A snake whose wave an agent changes; reward, end and ``info`` are ``SnakeEnvironment``'s.
+
+    With n yaw joints and P = 16 values of a wave (``PolicyWave``):
+
+    Action (P,): -1 to 1, changes of the wave in ``WAVE_SPAN``, from the wave of ``policy``.
+
+    Observation (2 n + 4,): cosine and sine of the phase and of the body's mean heading, measured
+    angles, and the motion's last goals; ``observation_names`` has a name for each.
+
+    Args:
+        policy: whose wave an action of zeros runs; its network is left out. By default a lateral
+            undulation.
+        options: of ``SnakeEnvironment``.
+
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  as Gymnasium has it
+
+    def __init__(self, policy: Policy = _UNTRAINED, **options: Any) -> None:
+        self._snake = SnakeEnvironment(**options)
+        self._policy = policy.model_copy(update={"network": (), "observation": ()})
+        self._motion: PolicyMotion | None = None
+        self.observation_names = observation_names(self._snake.robot)
+        """Of each number of an observation, with its unit."""
+        ends = np.full(len(self.observation_names), np.pi, dtype="f4")
+        self.observation_space = spaces.Box(-ends, ends, dtype=np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, WAVE_SPAN.shape, dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Lay another robot on the ground, with a motion at its beginning."""
+        super().reset(seed=seed)
+        own = int(self.np_random.integers(2**31)) if seed is None else seed
+        _, info = self._snake.reset(seed=own, options=options)
+        self._motion = PolicyMotion(self._policy, self._snake.robot)
+        return self._observe(self._motion), info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Change the wave, go on by a cycle.
+
+        Raises:
+            gymnasium.error.ResetNeeded: there is no episode, or safety has tripped in it.
+
+        """
+        if self._motion is None:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        goal_rad = self._motion.act(np.asarray(action, dtype=float), self._snake.period_s)
+        _, reward, tripped, cut, info = self._snake.step(goal_rad / self._snake.limit_rad)
+        return self._observe(self._motion), reward, tripped, cut, info
+
+    def _observe(self, motion: PolicyMotion) -> NDArray[np.float32]:
+        return motion.observe(self._snake.view).astype("f4")

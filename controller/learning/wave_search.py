@@ -1,0 +1,96 @@
+"""A policy's wave by evolution: CMA-ES over its values, on episodes of the environment.
+
+N. Hansen, A. Ostermeier, Completely Derandomized Self-Adaptation in Evolution Strategies,
+Evolutionary Computation 9 (2), 159-195, 2001, as the package ``cma`` has it.
+"""
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from functools import cache, partial
+from importlib.metadata import version
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.pool import process_pool
+from snakewalk.controller.learning.environment import SnakeEnvironment
+from snakewalk.controller.motion.policy import WAVE_SPAN, Origin, Policy, PolicyWave
+from snakewalk.controller.motion.policy_motion import PolicyMotion
+
+_SIGMA = 0.3
+"""First spread of the candidates, in ``WAVE_SPAN`` (ours)."""
+
+
+def search_wave(
+    name: str,
+    *,
+    robot: str,
+    world: str,
+    generations: int,
+    population: int,
+    steps: int,
+    seed: int,
+    workers: int,
+    on_progress: Callable[[int, float], None] = lambda generation, reward_m: None,
+) -> Policy:
+    """Search the wave whose episodes earn most; the same one for the same arguments.
+
+    Each candidate has one episode; all of a generation have the same start, each generation
+    another one. The result is the mean of the last generation's distribution, which has seen more
+    starts than any of its members. ``on_progress`` takes the generations done and the mean reward
+    of the last.
+
+    Raises:
+        InputError: the package ``cma`` is not installed, or no such robot or world.
+
+    """
+    require_extra("learning a policy needs", "cma", "gymnasium", "mujoco")
+    import cma  # noqa: PLC0415  an extra
+
+    start = PolicyWave().vector()
+    options = {"popsize": population, "seed": seed + 1, "verbose": -9}  # 0 is the time of day
+    strategy = cma.CMAEvolutionStrategy(np.zeros(len(start)), _SIGMA, options)
+    software = f"snakewalk {version('snakewalk')}, cma {version('cma')}"
+
+    def policy(genes: Floats, asked: int) -> Policy:
+        origin = Origin(
+            method="cma", seed=seed, steps=asked * steps, world=world, software=software
+        )
+        wave = PolicyWave.of(start + WAVE_SPAN * genes)
+        return Policy(name=name, robot=robot, origin=origin, wave=wave)
+
+    with process_pool(workers) if workers > 1 else nullcontext() as pool:
+        rate = map if pool is None else pool.map
+        for generation in range(generations):
+            genes = strategy.ask()
+            work = partial(_earned, world=world, start=seed + generation, steps=steps)
+            rewards = list(rate(work, [policy(each, 0) for each in genes]))
+            strategy.tell(genes, [-reward_m for reward_m in rewards])
+            on_progress(generation + 1, float(np.mean(rewards)))
+    return policy(strategy.result.xfavorite, generations * population)
+
+
+def episode_reward_m(snake: SnakeEnvironment, policy: Policy, *, seed: int, steps: int) -> float:
+    """Let a policy move a snake for ``steps``, or until safety trips; returns the rewards' sum."""
+    snake.reset(seed=seed)
+    motion = PolicyMotion(policy, snake.robot)
+    earned_m = 0.0
+    for _ in range(steps):
+        goal_rad = motion.step(snake.period_s, snake.view)
+        _, reward_m, tripped, _, _ = snake.step(goal_rad / snake.limit_rad)
+        earned_m += reward_m
+        if tripped:
+            break
+    return earned_m
+
+
+def _earned(policy: Policy, *, world: str, start: int, steps: int) -> float:
+    snake = _environment(policy.robot, world)
+    return episode_reward_m(snake, policy, seed=start, steps=steps)
+
+
+@cache
+def _environment(robot: str, world: str) -> SnakeEnvironment:
+    """One of a process: to make it costs as much as an episode."""
+    return SnakeEnvironment(robot, world)

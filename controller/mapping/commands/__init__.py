@@ -1,0 +1,1 @@
+"""Commands that make worlds from files and images, one command per file."""

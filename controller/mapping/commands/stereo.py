@@ -1,0 +1,154 @@
+"""``snakewalk terrain from-stereo``: a world from a calibrated pair of pictures."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.options import Force, Json
+from snakewalk.controller.mapping.commands.elevation import (
+    Fill,
+    Picture,
+    WorldOut,
+    check_fill,
+    check_world_files,
+    finish,
+    not_positive,
+)
+
+if TYPE_CHECKING:
+    from snakewalk.config.arrays import Image
+
+
+def stereo(
+    left: Annotated[Path, typer.Argument(help="picture of the left camera")],
+    right: Annotated[Path, typer.Argument(help="picture of the right camera, of the same moment")],
+    calibration: Annotated[
+        Path,
+        typer.Option(help="of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a calib.txt"),
+    ],
+    out: WorldOut,
+    unit: Annotated[str, typer.Option(help="of the calibration's T: m, cm, mm")] = "m",
+    height: Annotated[
+        float | None, typer.Option(help="m of the left camera above the ground; default: fitted")
+    ] = None,
+    tilt: Annotated[
+        float | None, typer.Option(help="degrees of its axis, downwards; default: fitted")
+    ] = None,
+    roll: Annotated[float, typer.Option(help="degrees about its axis, the right side down")] = 0.0,
+    disparities: Annotated[
+        int, typer.Option(min=16, max=2048, help="px, the largest that is tried")
+    ] = 128,
+    spacing: Annotated[float, typer.Option(help="m between samples in the robot's world")] = 0.03,
+    error: Annotated[
+        float, typer.Option(help="m: points whose expected error is larger are left out")
+    ] = 0.03,
+    far: Annotated[
+        float | None, typer.Option(help="m ahead, at most; default: as far as --error allows")
+    ] = None,
+    scale: Annotated[float, typer.Option(help="metres in the robot's world per metre")] = 1.0,
+    fill: Fill = 0.0,
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Make a world of the ground in front of a stereo camera; what it did not see stays unknown.
+
+    (0, 0) of the world is below the left camera, x is where it looks.
+    """
+    require_extra("stereo pictures need", "cv2", "PIL")
+    from snakewalk.controller.mapping.raster_file import UNITS_M  # noqa: PLC0415
+    from snakewalk.controller.mapping.stereo_camera import (  # noqa: PLC0415
+        read_calibration,
+        rectify,
+    )
+    from snakewalk.controller.mapping.stereo_ground import (  # noqa: PLC0415
+        CameraStand,
+        stereo_ground,
+    )
+    from snakewalk.controller.mapping.world_file import MapWorld  # noqa: PLC0415  --help stays quick
+
+    positive = {
+        "--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale,
+    }  # fmt: skip
+    faults = not_positive(positive)
+    check_fill(fill, faults)
+    faults += [
+        f"{option} {angle:g}: must be within 90 degrees"
+        for option, angle in (("--tilt", tilt or 0.0), ("--roll", roll))
+        if not -90.0 < angle <= 90.0
+    ]
+    if (height is None) != (tilt is None):
+        faults.append("--height and --tilt belong together; without both the ground is fitted")
+    elif height is None and roll != 0.0:
+        faults.append("--roll belongs to --height and --tilt")
+    if unit not in UNITS_M:
+        faults.append(f"--unit {unit}: is none of {', '.join(UNITS_M)}")
+    if faults:
+        raise InputError(faults)
+    check_world_files(out, picture, [left, right, calibration], force)
+    pair = rectify(read_calibration(calibration, UNITS_M[unit]), _picture(left), _picture(right))
+    stand = None
+    if height is not None and tilt is not None:
+        stand = CameraStand(height, math.radians(tilt), math.radians(roll))
+    made = stereo_ground(
+        pair, disparities, spacing / scale, error, stand, math.inf if far is None else far
+    )
+    seen = made.elevation
+    placed = replace(
+        seen,
+        z_m=scale * seen.z_m,
+        spacing_m=spacing,
+        x0_m=scale * seen.x0_m,
+        y0_m=scale * seen.y0_m,
+    )
+    world = MapWorld.of(out, placed.height_field(fill))
+    degrees = math.degrees(made.stand.tilt_rad), math.degrees(made.stand.roll_rad)
+    how = "fitted to the points" if made.fitted else "given"
+    world.write(
+        [
+            f"From {left.name} and {right.name}, at a scale of {scale:g}; samples {spacing:g} m",
+            "apart. (0, 0) is below the left camera, x is where it looked.",
+            f"The camera stood {made.stand.height_m:.3f} m above the ground, tilted down by",
+            f"{degrees[0]:.1f} degrees and rolled by {degrees[1]:.1f}, {how}.",
+            *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
+        ]
+    )
+    finish(
+        world,
+        {
+            "camera": how,
+            "camera_height_m": round(made.stand.height_m, 4),
+            "camera_tilt_deg": round(degrees[0], 2),
+            "camera_roll_deg": round(degrees[1], 2),
+            "matched_share": round(made.told_share, 4),
+            "mapped_share": round(made.used_share, 4),
+        },
+        picture,
+        as_json=as_json,
+    )
+
+
+def _picture(file: Path) -> "Image":
+    """(H, W, 3), blue first."""
+    import cv2  # noqa: PLC0415  an extra
+    import numpy as np  # noqa: PLC0415
+    from PIL import Image as Pictures  # noqa: PLC0415  an extra
+
+    from snakewalk.config.archive import check_expansion  # noqa: PLC0415  --help stays quick
+
+    data = file.read_bytes()
+    try:
+        with Pictures.open(file) as opened:
+            columns, rows = opened.size
+        check_expansion(file, len(data), 3 * columns * rows)
+        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError, cv2.error):
+        found = None
+    if found is None:
+        raise InputError(f"{file}: cannot be read as a picture")
+    return np.asarray(found, dtype=np.uint8)

@@ -1,0 +1,183 @@
+"""The stereo head of a simulated run: rendered pictures on the way, and the map that comes of them.
+
+The true ground is seen by the renderer and by the physics alone. What goes into the map is what the
+pictures show, placed by the pose that the run measures, with the errors of a picture's own pose.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.camera import MappingConfig, StereoHeadConfig
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.kinematics.links import BodyView, body_in_world, chain_points_m
+from snakewalk.controller.mapping.stereo_camera import RectifiedPair
+from snakewalk.controller.mapping.stereo_ground import seen_points
+from snakewalk.controller.terrain.growing_map import GrowingMap
+from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.rendering.stereo_view import CameraFrame, StereoView, tilted
+
+_BODY_MARGIN_M = 0.03
+"""Points so near to the body's own skin, in plan, are left out (ours)."""
+_BLUR_PX = 1.0
+"""Of a moving camera, between two instants of which its picture is the mean."""
+_MOST_INSTANTS = 5
+
+
+class _Seen(NamedTuple):
+    arrives_s: float
+    taken_s: float
+    points_m: Floats
+    error_m: Floats
+
+
+class StereoHead:
+    """Takes a pair of pictures each period, and adds its ground to the map when it is matched.
+
+    Raises:
+        OffscreenError: nothing here draws without a screen.
+
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField,
+        qpos: Callable[[], Floats],
+        ground_map: GrowingMap,
+    ) -> None:
+        assert robot.stereo_head is not None
+        assert run.mapping is not None
+        self._config: StereoHeadConfig = robot.stereo_head
+        self._mapping: MappingConfig = run.mapping
+        config = self._config
+        self._view = StereoView(
+            robot,
+            world,
+            ground,
+            size_px=(config.width_px, config.height_px),
+            focal_px=config.focal_px,
+            baseline_m=config.baseline_m,
+            seed=run.seed,
+        )
+        self._robot, self._qpos, self._map = robot, qpos, ground_map
+        self._random = np.random.default_rng([run.seed, 1])
+        self._coming: deque[_Seen] = deque()
+        self._next_s = -np.inf
+        self._before: tuple[float, Floats] | None = None
+        """Time and qpos (7 + J,) of the last call."""
+
+    def observe(self, now_s: float, pose: BodyPose, joint_rad: Floats) -> None:
+        """Take a picture if one is due; add those to the map that are matched by now.
+
+        Args:
+            now_s: of the run's clock.
+            pose: of the head, as the run measures it.
+            joint_rad: (J,) as measured.
+
+        """
+        qpos = np.array(self._qpos())
+        if now_s >= self._next_s - 1e-9:
+            self._next_s = now_s + self._mapping.period_s
+            body = body_in_world(self._robot, pose, joint_rad)
+            points_m, error_m = self._look(now_s, qpos, body)
+            self._coming.append(_Seen(now_s + self._mapping.latency_s, now_s, points_m, error_m))
+        self._before = now_s, qpos
+        self.fuse(now_s)
+
+    def fuse(self, now_s: float) -> None:
+        """Add to the map what has arrived."""
+        while self._coming and self._coming[0].arrives_s <= now_s + 1e-9:
+            seen = self._coming.popleft()
+            self._map.add(seen.points_m, seen.error_m, seen.taken_s)
+
+    def close(self) -> None:
+        """Free the frame buffer."""
+        self._view.close()
+
+    def _look(self, now_s: float, qpos: Floats, body: BodyView) -> tuple[Floats, Floats]:
+        """(n, 3) points of the ground in the world as the run believes it, and their errors."""
+        config = self._config
+        left, right = self._view.taken(self._exposed(now_s, qpos), qpos)
+        matrix = self._view.camera_matrix
+        pair = RectifiedPair(
+            left,
+            right,
+            np.ones(left.shape[:2], bool),
+            config.focal_px,
+            (float(matrix[0, 2]), float(matrix[1, 2])),
+            0.0,
+            config.baseline_m,
+            np.eye(3),
+        )
+        _, seen_m, error_m = seen_points(pair, config.disparities, self._mapping.error_m)
+        near = np.linalg.norm(seen_m, axis=1) <= self._mapping.far_m
+        believed = self._frame(body)
+        off = Rotation.from_rotvec(self._random.normal(0.0, config.angle_error_rad, 3))
+        at_m = believed.at_m + self._random.normal(0.0, config.position_error_m, 3)
+        points_m = seen_m[near] @ (off.as_matrix() @ believed.axes).T + at_m
+        self._touch(body)
+        free = ~self._is_body(points_m, body)
+        return points_m[free], error_m[near][free]
+
+    def _true_frame(self, q: Floats) -> CameraFrame:
+        """Where the left camera is with the body at ``q`` (7 + J,)."""
+        turned = Rotation.from_quat(q[3:7], scalar_first=True).as_matrix()
+        body = body_in_world(self._robot, BodyPose(0.0, q[:3], turned), q[7:])
+        return self._frame(body)
+
+    def _frame(self, body: BodyView) -> CameraFrame:
+        config = self._config
+        carrier = body.rotation[config.link]
+        mount_m = np.array([0.0, 0.5 * config.baseline_m, config.height_m])
+        at_m = body.link_m[config.link] + carrier @ mount_m
+        return CameraFrame(at_m, tilted(config.tilt_rad, carrier))
+
+    def _exposed(self, now_s: float, qpos: Floats) -> list[CameraFrame]:
+        """Instants of the exposure, up to now: more of them, the more the camera moves in it."""
+        frame = self._true_frame(qpos)
+        if self._before is None or now_s <= self._before[0]:
+            return [frame]
+        share = self._config.exposure_s / (now_s - self._before[0])
+        before = self._true_frame(self._before[1])
+        turn = Rotation.from_matrix(before.axes @ frame.axes.T).as_rotvec() * share
+        moved_m = (before.at_m - frame.at_m) * share
+        blur_px = self._config.focal_px * float(np.linalg.norm(turn))
+        count = min(1 + round(blur_px / _BLUR_PX), _MOST_INSTANTS)
+        return [
+            CameraFrame(
+                frame.at_m + part * moved_m,
+                Rotation.from_rotvec(part * turn).as_matrix() @ frame.axes,
+            )
+            for part in np.linspace(0.0, 1.0, count)
+        ]
+
+    def _touch(self, body: BodyView) -> None:
+        """The ground is a radius below each link that lies on it."""
+        radius_m = np.array(self._robot.link_radii_m)
+        self._map.touch(body.link_m - radius_m[:, None] * [0.0, 0.0, 1.0])
+
+    def _is_body(self, points_m: Floats, body: BodyView) -> Bools:
+        """(n,) whether points may be of the body itself."""
+        chain_m = chain_points_m(self._robot, body)[:, :2]
+        reach_m = self._robot.body_radius_m + _BODY_MARGIN_M
+        low, high = chain_m.min(axis=0) - reach_m, chain_m.max(axis=0) + reach_m
+        near = ((points_m[:, :2] > low) & (points_m[:, :2] < high)).all(axis=1)
+        close_m, hit = points_m[near, :2], np.zeros(int(near.sum()), bool)
+        for one, other in pairwise(chain_m):
+            along = other - one
+            share = (close_m - one) @ along / max(float(along @ along), 1e-12)
+            foot_m = one + np.clip(share, 0.0, 1.0)[:, None] * along
+            hit |= np.hypot(*(close_m - foot_m).T) < reach_m
+        near[near] = hit
+        return np.asarray(near)

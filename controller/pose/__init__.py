@@ -1,0 +1,1 @@
+"""Pose sources: where the head is, with time and uncertainty."""

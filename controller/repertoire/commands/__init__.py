@@ -1,0 +1,1 @@
+"""Commands of recorded actions, one command per file."""

@@ -1,0 +1,72 @@
+"""``snakewalk repertoire crowd``: many bodies on a terrain, as a film."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+
+def crowd(
+    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
+    world: Annotated[
+        str, typer.Option(help="shipped world with hills, or a TOML file")
+    ] = "jacksboro-basin",
+    bodies: Annotated[int, typer.Option(min=1, max=5000, help="how many")] = 100,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="of the film")] = 20.0,
+    out: Annotated[Path, typer.Option("-o", "--out", help="the film, .mp4")] = Path("crowd.mp4"),
+    detail: Annotated[
+        bool, typer.Option("--detail/--no-detail", help="level of detail and culling")
+    ] = True,
+    seed: Annotated[int, typer.Option(min=0, help="of places, sizes and whims")] = 0,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Film many animals that wander over a terrain by recorded actions, without physics."""
+    from snakewalk.config.ground import build_ground  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415
+    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.repertoire.crowd_film import FPS, CrowdScene, film_crowd  # noqa: PLC0415
+    from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
+
+    if out.suffix != ".mp4":
+        raise InputError(f"{out}: a film ends in .mp4")
+    refuse_to_overwrite([out], force)
+    repertoire = load_repertoire(file)
+    robot, place = load_robot(repertoire.robot), load_world(world)
+    ground = build_ground(place)
+    if ground is None:
+        raise InputError(f"world {place.name}: has no hills; there are jacksboro-basin and others")
+    scene = CrowdScene(repertoire, robot, ground, bodies, seed=seed, detail=detail)
+    with atomic_write(out) as part, ProgressBar("film", seconds * FPS, transient=True) as bar:
+        frames = film_crowd(
+            scene,
+            robot,
+            place,
+            ground,
+            bodies,
+            seconds,
+            part,
+            frame_s=repertoire.frame_s,
+            on_frame=bar.update,
+        )
+    costs = scene.costs
+    hidden, far, middle, near = (round(float(of), 1) for of in costs.levels / costs.frames)
+    show(
+        {
+            "film": str(out),
+            "world": place.name,
+            "bodies": bodies,
+            "frames": frames,
+            "hidden_mean": hidden,
+            "far_mean": far,
+            "middle_mean": middle,
+            "near_mean": near,
+            "motion_ms_a_frame": round(1e3 * costs.motion_s / costs.frames, 3),
+            "laying_ms_a_frame": round(1e3 * costs.laying_s / costs.frames, 3),
+        },
+        as_json,
+    )

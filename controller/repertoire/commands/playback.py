@@ -1,0 +1,131 @@
+"""``snakewalk repertoire play``: recorded actions by wanted speed and turn."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Film,
+    Force,
+    Json,
+    Robot,
+    Ros,
+    RunFolder,
+    RunPort,
+    Set,
+    View,
+    ViewAt,
+    World,
+    key_values,
+    show_run,
+)
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+
+
+def play_actions(
+    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
+    speed: Annotated[
+        float | None, typer.Option(help="wanted, m/s; negative: tail first; default: 0.4")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(help="wanted, rad/s, positive to the left; default: 0")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="then it comes to rest; default: 20")
+    ] = None,
+    schedule: Annotated[
+        Path | None,
+        typer.Option(help="both over time: TOML, or CSV with time_s,speed_m_s,turn_rad_s"),
+    ] = None,
+    patience: Annotated[
+        int | None,
+        typer.Option(min=1, help="cycles until an action gives way to another of its kind"),
+    ] = None,
+    robot: Robot = None,
+    world: World = None,
+    set_: Set = None,
+    port: RunPort = None,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
+    ros: Ros = False,
+    film: Film = True,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw wanted and measured speed and turn")
+    ] = None,
+    out: RunFolder = None,
+    force: Force = False,
+    seed: Annotated[int, typer.Option(min=0, help="of the changes by --patience")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
+    refuse_to_overwrite([picture], force)
+    check_picture(picture)
+    import numpy as np  # noqa: PLC0415  --help stays quick
+
+    from snakewalk.config.playback import ScheduleConfig  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
+    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
+    from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule  # noqa: PLC0415
+    from snakewalk.controller.run.execute import execute  # noqa: PLC0415
+    from snakewalk.controller.run.factory import prepare_schedule  # noqa: PLC0415
+
+    given = {"speed_m_s": speed, "turn_rad_s": turn, "duration_s": seconds}
+    changes = {key: value for key, value in given.items() if value is not None}
+    if schedule is not None and (speed is not None or turn is not None):
+        raise InputError("--schedule holds speed and turn: leave out --speed and --turn")
+    asked = ScheduleConfig() if schedule is None else read_schedule(schedule)
+    if seconds is not None and seconds <= 0.0:
+        raise InputError(f"--seconds {seconds:g}: must be over 0")
+    prepared = prepare_schedule(
+        file,
+        asked.model_copy(update=changes),
+        robot=robot,
+        world=world,
+        patience=patience,
+        seed=seed,
+        keys=key_values("--set", set_),
+    )
+    with (
+        run_folder(f"actions-{prepared.run.name}", out) as folder,
+        watched(view, view_at, ros) as watchers,
+        TimeBar(prepared.run.name, prepared.config.duration_s) as bar,
+    ):
+        finished = execute(
+            prepared,
+            folder,
+            port,
+            force=force,
+            view=watchers,
+            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
+            on_event=bar.on_event,
+        )
+    assert isinstance(finished.source, ScheduleMotion), "a schedule's run has no other motion"
+    played = finished.source.played
+    names = [segment.name for segment in prepared.repertoire.segments]
+    result: dict[str, object] = {
+        "repertoire": str(file),
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "size": round(prepared.scale, 4),
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "tripped": finished.outcome.tripped,
+        "actions": [names[action.action] for action in played],
+    }
+    if played:
+        requested, recorded, measured = (
+            np.array([getattr(action, key) for action in played])
+            for key in ("requested", "recorded", "measured")
+        )
+        for key, off in (("choice", recorded - requested), ("body", measured - recorded)):
+            median = np.median(np.abs(off), axis=0)
+            result[f"{key}_error_median_m_s"] = round(float(median[0]), 4)
+            result[f"{key}_error_median_rad_s"] = round(float(median[1]), 4)
+        if picture is not None:
+            from snakewalk.controller.repertoire import repertoire_plots as plots  # noqa: PLC0415
+
+            plots.draw_schedule(prepared, played, picture)
+            result["picture"] = str(picture)
+    show_run(finished, folder, result, as_json, film=film)

@@ -1,0 +1,200 @@
+"""A run of recorded actions by wanted speed and turn, with the secondary controller ([YT] 5.1)."""
+
+import csv
+import io
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.archive import MOST_JSON_BYTES, read_text
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import checked, load
+from snakewalk.config.playback import RepertoireConfig, ScheduleConfig
+from snakewalk.config.synthesis import curve_at
+from snakewalk.controller.kinematics.frame import body_frame
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.repertoire.motion import ActionsInForce, RepertoireMotion
+from snakewalk.controller.repertoire.repertoire import Repertoire, load_repertoire
+from snakewalk.controller.repertoire.search import plane_pose
+from snakewalk.controller.repertoire.secondary import SecondaryController
+from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
+from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
+
+COLUMNS: Final = ("time_s", "speed_m_s", "turn_rad_s")
+
+
+def read_schedule(path: Path) -> ScheduleConfig:
+    """Read a schedule: TOML, or CSV with the columns ``COLUMNS``, whose last time is its duration.
+
+    Raises:
+        InputError: every fault at once.
+
+    """
+    if path.suffix != ".csv":
+        return load(path, ScheduleConfig)
+    try:
+        rows = csv.DictReader(io.StringIO(read_text(path, MOST_JSON_BYTES)))
+        if tuple(rows.fieldnames or ()) != COLUMNS:
+            raise InputError(f"{path}: expected the columns {','.join(COLUMNS)}")
+        table = [[_number(path, line, row[name]) for name in COLUMNS] for line, row in _lines(rows)]
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: not CSV: {error}") from None
+    if not table:
+        raise InputError(f"{path}: no rows")
+    curves = {COLUMNS[k]: [[row[0], row[k]] for row in table] for k in (1, 2)}
+    return checked(ScheduleConfig, curves | {"duration_s": table[-1][0]}, str(path))
+
+
+def _lines(rows: "csv.DictReader[str]") -> list[tuple[int, dict[str, str | None]]]:
+    return [(rows.line_num, dict(row)) for row in rows]
+
+
+def _number(path: Path, line: int, text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise InputError(f"{path}:{line}: {text or 'nothing'} where a number should be")
+    return value
+
+
+@dataclass(frozen=True)
+class ScheduleRun(PathlessRun):
+    """A ``PreparedRun`` of recorded actions without waypoints."""
+
+    @property
+    def config(self) -> RepertoireConfig:
+        """The run's table ``repertoire``."""
+        if self.run.repertoire is None:
+            raise InputError(f"run {self.run.name}: has no table [repertoire]")
+        return self.run.repertoire
+
+    @cached_property
+    def repertoire(self) -> Repertoire:
+        """The recorded actions.
+
+        Raises:
+            InputError: no such file, actions of other joints, or a ground that is not flat.
+
+        """
+        found = load_repertoire(Path(self.config.file))
+        found.check(self.robot)
+        if self.world.ground.kind != "flat":
+            raise InputError(
+                f"world {self.world.name}: its ground is {self.world.ground.kind}; an action "
+                "repeats itself only on a flat one"
+            )
+        return found
+
+    @property
+    def scale(self) -> float:
+        """Length of this body over that of the recorded one."""
+        return self.robot.length_m / self.repertoire.length_m
+
+    def controller(self) -> SecondaryController:
+        """Return a fresh one, for this body's size."""
+        return SecondaryController(
+            self.repertoire,
+            scale=self.scale,
+            patience=self.config.patience,
+            seed=self.run.seed,
+        )
+
+    def initial_pose(self) -> InitialPose:
+        """Return the shape with which the first action begins."""
+        first = self.controller().choose(*self.requested(0.0))
+        goals_rad = self.repertoire.segments[first].goal_rad
+        return pose_with(self.robot, self.start_heading_rad, goals_rad[0])
+
+    def requested(self, time_s: float) -> tuple[float, float]:
+        """Wanted speed, m/s, and turn, rad/s."""
+        asked = self.config
+        return float(curve_at(asked.speed_m_s, time_s)), float(curve_at(asked.turn_rad_s, time_s))
+
+    def check_plan(self) -> PlanSummary:
+        """Load the actions; joins keep within the joints' limits while it runs."""
+        assert self.repertoire.segments, "a repertoire has actions"
+        return plan_without_path(self.run)
+
+    def make_source(self, on_event: OnEvent) -> "ScheduleMotion":
+        """Return a fresh motion."""
+        return ScheduleMotion(self, on_event)
+
+
+@dataclass(frozen=True, slots=True)
+class PlayedAction:
+    """One action, as it was chosen and as the body made it."""
+
+    begin_s: float
+    action: int
+    requested: tuple[float, float]
+    """Speed, m/s, and turn, rad/s."""
+    recorded: tuple[float, float]
+    """The same of the action, at this body's size."""
+    measured: tuple[float, float]
+    """The same of the body, over the time that the action and the join to it took."""
+
+
+class ScheduleMotion(ActionsInForce):
+    """Asks the secondary controller for an action at the end of each, and comes to rest in time."""
+
+    def __init__(self, prepared: ScheduleRun, on_event: OnEvent) -> None:
+        self._prepared, self._on_event = prepared, on_event
+        self._controller = prepared.controller()
+        self._now_s = 0.0
+        self._begun: tuple[float, int, tuple[float, float], Floats] | None = None
+        self.played: list[PlayedAction] = []
+        """So far."""
+        self._requested = prepared.requested(0.0)
+        first = self._controller.choose(*self._requested)
+        super().__init__(RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose))
+        on_event("action", self._name(first))
+
+    def step(self, dt_s: float, view: BodyView) -> Floats:
+        """Go on by ``dt_s`` and return the new targets (J,)."""
+        if self._begun is None:
+            self._begun = (self._now_s, self._motion.action, self._requested, _pose(view))
+        if self._now_s >= self._prepared.config.duration_s:
+            self._motion.stop()
+        self._now_s += dt_s
+        return self._motion.step(dt_s, view)
+
+    def _name(self, action: int) -> str:
+        return self._prepared.repertoire.segments[action].name
+
+    def _choose(self, view: BodyView) -> int:
+        assert self._begun is not None, "an action is under way"
+        begin_s, before, requested, pose = self._begun
+        now = _pose(view)
+        segment, scale = self._prepared.repertoire.segments[before], self._prepared.scale
+        recorded = scale * segment.speed_m_s, segment.turn_rad_s
+        measured = _rates(pose, now, self._now_s - begin_s)
+        self.played.append(PlayedAction(begin_s, before, requested, recorded, measured))
+        self._requested = self._prepared.requested(self._now_s)
+        action = self._controller.choose(*self._requested)
+        self._begun = self._now_s, action, self._requested, now
+        if action != before:
+            self._on_event("action", self._name(action))
+        return action
+
+
+def _pose(view: BodyView) -> Floats:
+    return plane_pose(body_frame(view.link_m))
+
+
+def _rates(before: Floats, after: Floats, time_s: float) -> tuple[float, float]:
+    """Speed along an arc, m/s, negative tail first, and turn, rad/s, between poses (3,)."""
+    turn = float(wrap(after[2] - before[2]))
+    x, y = after[:2] - before[:2]
+    ahead = np.cos(before[2] + 0.5 * turn) * x + np.sin(before[2] + 0.5 * turn) * y
+    arc_m = float(np.copysign(np.hypot(x, y), ahead)) / float(np.sinc(0.5 * turn / np.pi))
+    return arc_m / time_s, turn / time_s

@@ -1,0 +1,1 @@
+"""The command that draws a run's report and film."""

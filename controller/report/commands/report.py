@@ -1,0 +1,39 @@
+"""``snakewalk report``: the page and the film of a run, from its log alone."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json, Look, show, write_artifacts
+from snakewalk.controller.console.result_files import refuse_mixture
+
+
+def report(
+    log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="folder; default: the log's")
+    ] = None,
+    film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
+    fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
+    look: Look = "servos",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Make report.html, summary.json and film.mp4 again from a log."""
+    from snakewalk.controller.animals.mesh.body_look import check_look  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415  heavy; --help stays quick
+
+    check_look(look)
+    record = read_log(log)
+    if record.note:
+        LOGGER.warning("%s: %s", log, record.note)
+    folder = log.parent if out is None else out
+    refuse_mixture(log, folder, force)
+    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look)
+    if artifacts.report is None:
+        raise SystemExit(2)
+    files = artifacts.to_dict()
+    summary = str(folder / "summary.json")
+    show({"report": files["report"], "summary": summary, "film": files["film"]}, as_json)

@@ -1,0 +1,52 @@
+"""Joint angles over time as three maps: asked, measured, and what is left between them."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.figures.style import ANGLES, canvas
+from snakewalk.controller.runlog.record import RunRecord
+
+_COLUMNS = 1400
+
+
+def joints_figure(record: RunRecord) -> Figure | None:
+    """Joint against time, head at the top; None without a cycle."""
+    cycle = record.cycle
+    if len(cycle.time_s) < 2:
+        return None
+    joints = cycle.asked_rad.shape[1]
+    asked, measured = cycle.asked_rad, cycle.measured_rad
+    gap = np.where(cycle.valid, measured - asked, np.nan)
+    span = _largest(np.concatenate([asked, measured]))
+    height = float(np.clip(0.075 * joints, 1.2, 2.6)) * 3 + 0.9
+    figure, panels = canvas(3, height)
+    grid = np.linspace(cycle.time_s[0], cycle.time_s[-1], min(_COLUMNS, len(cycle.time_s)))
+    rows = np.searchsorted(cycle.time_s, grid).clip(0, len(cycle.time_s) - 1)
+    extent = (float(grid[0]), float(grid[-1]), joints + 0.5, 0.5)
+    for axes, values, title, limit in zip(
+        panels,
+        (asked, measured, gap),
+        ("Asked", "Measured", "Measured minus asked"),
+        (span, span, _largest(gap)),
+        strict=True,
+    ):
+        image = axes.imshow(
+            values[rows].T, aspect="auto", cmap=ANGLES, vmin=-limit, vmax=limit, extent=extent,
+            interpolation="nearest",
+        )  # fmt: skip
+        axes.set_title(title)
+        axes.set_ylabel("joint")
+        axes.grid(visible=False)
+        axes.set_facecolor("#c9d1d8")
+        axes.set_yticks(range(1, joints + 1, max(1, -(-joints // 5))))
+        bar = figure.colorbar(image, ax=axes, pad=0.01, aspect=12)
+        bar.set_label("rad")
+        bar.outline.set_visible(False)
+    panels[-1].set_xlabel("time (s)      joint 1 is behind the head; grey: no answer in that cycle")
+    return figure
+
+
+def _largest(values: Floats) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return max(float(np.quantile(known, 0.999)), 1e-3) if known.size else 1e-3

@@ -1,0 +1,80 @@
+"""The figures of the page, in order, each with what to see in it."""
+
+from collections.abc import Callable
+from typing import Final
+
+from matplotlib.figure import Figure
+
+from snakewalk.controller.figures.path import path_figure
+from snakewalk.controller.figures.style import data_uri, style
+from snakewalk.controller.report.figures.advance import advance_figure
+from snakewalk.controller.report.figures.attitude import attitude_figure
+from snakewalk.controller.report.figures.effort import effort_figure
+from snakewalk.controller.report.figures.joints import joints_figure
+from snakewalk.controller.report.figures.safety import safety_figure
+from snakewalk.controller.report.figures.timing import timing_figure
+from snakewalk.controller.report.figures.walk import walk_figure
+from snakewalk.controller.report.page import Section
+from snakewalk.controller.runlog.record import RunRecord
+
+_IN_CURVES: Final = frozenset({"Speed and path", "Effort", "Time on the bus"})
+"""What the curves of the page show as well, to be zoomed."""
+_ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
+    (
+        "The way",
+        "Seen from above. A waypoint's disc is its radius: green when the centre of mass has come "
+        "inside it in its turn, orange when not. The body grows darker with time.",
+        path_figure,
+    ),
+    (
+        "Speed and path",
+        "Forward speed of the links along themselves, against what the friction model predicts "
+        "for the pulse speed asked. Green lines: a waypoint reached.",
+        advance_figure,
+    ),
+    (
+        "Joint angles",
+        "The shape travels from the head (top) to the tail (bottom). What remains between asked "
+        "and measured is servo lag, a clamp, or ground that does not give way.",
+        joints_figure,
+    ),
+    (
+        "Attitude",
+        "The link of the robot's IMU. Roll and pitch come from gravity; the heading begins "
+        "anywhere and drifts with the gyro's bias.",
+        attitude_figure,
+    ),
+    (
+        "The walk",
+        "Each decision appends a part of the next state to the angles along the way.",
+        walk_figure,
+    ),
+    (
+        "Effort",
+        "In a long run a curve is a mean, its pale band reaches from least to largest. Torque, "
+        "where its constant is known, is current times constant, gear losses included.",
+        effort_figure,
+    ),
+    (
+        "Time on the bus",
+        "A cycle has to fit into its period; a deadline that was missed is skipped, never made up.",
+        timing_figure,
+    ),
+    (
+        "Safety",
+        "Every command goes through the limits below the controller: a clamp changes it, a veto "
+        "stops the run.",
+        safety_figure,
+    ),
+)
+
+
+def sections(record: RunRecord) -> list[Section]:
+    """Draw what the log has something for; what the curves have as well is folded."""
+    with style():
+        drawn = [(title, caption, draw(record)) for title, caption, draw in _ALL]
+        return [
+            Section(title, caption, data_uri(figure), is_folded=title in _IN_CURVES)
+            for title, caption, figure in drawn
+            if figure is not None
+        ]

@@ -1,0 +1,63 @@
+"""The walk over the library of shapes: which, how many, and how well they fitted the aim."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from snakewalk.controller.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    RED,
+    canvas,
+    legend_above,
+)
+from snakewalk.controller.runlog.record import RunRecord
+
+
+def walk_figure(record: RunRecord) -> Figure | None:
+    """Draw states over decisions, and heading errors; None without a decision."""
+    walk = record.walk
+    steps = len(walk.time_s)
+    if steps == 0:
+        return None
+    many = len(np.unique(walk.state)) > 1
+    number = np.arange(1, steps + 1)
+    figure, panels = canvas(2 if many else 1, 5.4 if many else 3.0)
+    if many:
+        states = panels[0]
+        _, first = np.unique(walk.state, return_index=True)
+        new = np.isin(number - 1, first)
+        states.plot(number, walk.state, color="#dbe3ea", linewidth=0.8, zorder=1)
+        size = float(np.clip(1800 / steps, 6, 26))
+        for chosen, colour, label in ((new, GREEN, "new state"), (~new, GREY, "seen before")):
+            states.scatter(
+                number[chosen], walk.state[chosen], s=size, color=colour, label=label, zorder=2
+            )
+        states.set_ylabel("state")
+        states.set_title("States of the walk")
+        legend_above(states)
+        count = states.twinx()
+        count.plot(number, walk.visited, color=BLUE, linewidth=1.4)
+        count.set_ylabel("distinct states visited", color=BLUE)
+        count.tick_params(axis="y", colors=BLUE)
+        count.set_ylim(bottom=0)
+        count.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
+        count.grid(visible=False)
+    aim = panels[-1]
+    aim.axhline(0.0, color=GREY, linewidth=0.8)
+    aim.plot(number, walk.heading_error_rad, color=BLUE, linewidth=1.0, marker=".", markersize=4,
+             label="heading error of the chosen shape")  # fmt: skip
+    aim.plot(number, walk.ramp_rad, color=AMBER, linewidth=1.0, label="bend added against it")
+    none = walk.candidates == 0
+    if many and none.any():
+        aim.scatter(number[none], walk.heading_error_rad[none], s=28, facecolor="none",
+                    edgecolor=RED, label="no shape within the tolerance", zorder=3)  # fmt: skip
+    aim.set_ylabel("angle (rad)")
+    aim.set_title("Aim")
+    aim.set_xlabel("decision")
+    aim.set_xlim(0, steps + 1)
+    aim.xaxis.set_major_locator(MaxNLocator(integer=True))
+    legend_above(aim)
+    return figure

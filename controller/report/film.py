@@ -1,0 +1,182 @@
+"""Film of a run, from the head pose and the joint angles in its log; on metal too."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.ground import build_ground
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
+from snakewalk.controller.metrics.path_error import waypoint_times_s
+from snakewalk.controller.runlog.record import Header, RunRecord
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import SkinLook
+
+FPS, FINE_FPS = 15, 25
+SIZE, FINE_SIZE = (800, 450), (1280, 720)
+_LONGEST_S: Final = 27.0
+"""Of the film: a longer run is shown faster."""
+
+
+def film_run(
+    record: RunRecord,
+    path: Path,
+    *,
+    look: "SkinLook | None" = None,
+    fine: bool = False,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Draw the film of a run into ``path`` (.mp4); the number of its frames.
+
+    Args:
+        record: the run.
+        path: of the film; its folder is made.
+        look: the body's skin; None is a capsule a link.
+        fine: larger, smoother, and eight times slower to draw.
+        on_progress: called with (frames done, of).
+
+    Raises:
+        InputError: the simulator or PyAV is not installed, nothing draws here without a screen, or
+            the log holds no two poses.
+
+    """
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+
+    header = record.header
+    time_s, qpos = body_qpos(record)
+    if len(time_s) < 2:
+        raise InputError("the log holds no two poses: there is nothing to film")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plan = header.plan
+    return render_film(
+        header.robot,
+        header.world,
+        _ground(header),
+        time_s,
+        qpos,
+        path,
+        fps=FINE_FPS if fine else FPS,
+        speed_up=speed_up(float(time_s[-1] - time_s[0])),
+        size=FINE_SIZE if fine else SIZE,
+        waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
+        waypoint_radius_m=plan.waypoint_radius_m,
+        reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
+        paths=record.paths,
+        title=header.run.name,
+        look=look,
+        fine=fine,
+        on_frame=on_progress,
+    )
+
+
+def film_motion(
+    motion: BoneMotion,
+    path: Path,
+    *,
+    look: "SkinLook",
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    waypoints_m: Sequence[tuple[float, float]] = (),
+    waypoint_radius_m: float = 0.3,
+    reached_s: Sequence[float] = (),
+    paths: Sequence[tuple[float, Floats]] = (),
+    title: str = "",
+    on_progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Draw the film of a skin that no robot moves into ``path`` (.mp4); the number of its frames.
+
+    Args:
+        motion: its bones.
+        path: of the film; its folder exists.
+        look: free, of as many bones.
+        robot: for the size of the body.
+        world: where.
+        ground: its height field, None if flat.
+        waypoints_m: drawn as rings.
+        waypoint_radius_m: of these rings.
+        reached_s: when they turn green.
+        paths: each the time from when on it is in force and (P, 2) points.
+        title: shown in the caption.
+        on_progress: called with (frames done, of).
+
+    Raises:
+        InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
+
+    """
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+
+    frames, bones = motion.front_m.shape[:2]
+    turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    poses = np.concatenate([motion.front_m, turns.reshape(frames, bones, 4)], axis=2)
+    return render_film(
+        robot,
+        world,
+        ground,
+        motion.time_s,
+        poses.reshape(frames, -1),
+        path,
+        fps=FPS,
+        speed_up=speed_up(float(motion.time_s[-1])),
+        size=SIZE,
+        waypoints_m=waypoints_m,
+        waypoint_radius_m=waypoint_radius_m,
+        reached_s=reached_s,
+        paths=paths,
+        title=title,
+        look=look,
+        on_frame=on_progress,
+    )
+
+
+def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
+    """Times (n,) and MuJoCo's coordinates (n, 7 + J) wherever head and joints are known.
+
+    Coordinates that the log holds as such come first; else the head pose, then the joints, measured
+    in the same cycle.
+    """
+    if len(record.qpos.time_s) > 1:
+        return record.qpos.time_s, record.qpos.qpos
+    pose = record.pose
+    rows = min(len(pose.time_s), len(record.cycle.time_s))
+    head, turn = pose.head_m[:rows], pose.rotation[:rows].reshape(-1, 9)
+    joints = record.cycle.measured_rad[:rows]
+    known = np.isfinite(np.hstack([head, turn, joints])).all(axis=1)
+    if not known.any():
+        return np.zeros(0), np.zeros((0, 7 + joints.shape[1]))
+    quaternion = Rotation.from_matrix(turn[known].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    return pose.time_s[:rows][known], np.hstack([head[known], quaternion, joints[known]])
+
+
+def film_times(record: RunRecord) -> tuple[float, float]:
+    """Time of the run at which its film begins, and how many times faster it is."""
+    time_s, _ = body_qpos(record)
+    if len(time_s) < 2:
+        return 0.0, 1.0
+    return float(time_s[0]), speed_up(float(time_s[-1] - time_s[0]))
+
+
+def speed_up(duration_s: float) -> float:
+    """How many times faster than its run a film is: whole, and 1 for a short run."""
+    return float(max(1, np.ceil(duration_s / _LONGEST_S)))
+
+
+def _ground(header: Header) -> HeightField | None:
+    """The world's own height field where its source is at hand, else the log's coarser copy."""
+    if header.ground is None:
+        return None
+    try:
+        return build_ground(header.world)
+    except InputError:
+        return header.ground

@@ -1,0 +1,1 @@
+"""The command that holds a robot for a ROS 2 graph."""

@@ -1,0 +1,124 @@
+"""``snakewalk ros``: a robot in a ROS 2 graph."""
+
+import re
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Force,
+    Json,
+    Robot,
+    RunFolder,
+    RunPort,
+    Set,
+    View,
+    ViewAt,
+    World,
+    key_values,
+    show_run,
+)
+from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.run.commands.gait import Param, parameters
+
+_WEEK_S = 604_800.0
+
+
+def ros(
+    robot: Robot = None,
+    world: World = None,
+    port: RunPort = None,
+    gait: Annotated[
+        str | None,
+        typer.Option(help="gait to begin with; default: hold", autocompletion=completion.GAITS),
+    ] = None,
+    param: Param = None,
+    domain: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=232, help="default: ROS_DOMAIN_ID of the environment", show_default=False
+        ),
+    ] = None,
+    namespace: Annotated[str, typer.Option(help="of all topics and services")] = "",
+    network: Annotated[
+        bool,
+        typer.Option(
+            "--network",
+            help="seen by other machines; default: as ROS_AUTOMATIC_DISCOVERY_RANGE says, else by "
+            "this one only",
+        ),
+    ] = False,
+    timeout: Annotated[
+        float,
+        typer.Option(help="s: joints on their way hold when no joint goals come; inf: they go on"),
+    ] = 1.0,
+    seconds: Annotated[
+        float, typer.Option(help="then torque goes off", show_default="a week")
+    ] = _WEEK_S,
+    set_: Set = None,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
+    out: RunFolder = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
+    from snakewalk.controller.cli.watchers import Watchers  # noqa: PLC0415  heavy
+    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
+    from snakewalk.controller.exchange.body_frames import joint_names  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.motion.commanded import Commanded  # noqa: PLC0415
+    from snakewalk.controller.ros.ros_link import open_ros  # noqa: PLC0415
+    from snakewalk.controller.ros.ros_options import RosOptions  # noqa: PLC0415
+    from snakewalk.controller.run.execute import execute  # noqa: PLC0415
+    from snakewalk.controller.run.factory import gait_by_name, prepare_commanded  # noqa: PLC0415
+    from snakewalk.controller.view.live_view import open_view  # noqa: PLC0415
+
+    if not timeout > 0.0:
+        raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
+    if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):
+        raise InputError(f"--namespace {namespace}: expected a name as snake or lab/snake")
+    options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
+    begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
+    with open_ros(options) as link, open_view(view, view_at) as page:
+        assert link is not None, "it is asked for"
+        prepared = prepare_commanded(
+            lambda body, on_event: Commanded(
+                body,
+                joint_names(body),
+                link.commands,
+                on_event,
+                timeout_s=timeout,
+                gait=begun,
+            ),
+            robot=robot,
+            world=world,
+            seconds=seconds,
+            name="ros",
+            keys=key_values("--set", set_),
+        )
+        if begun is not None:
+            begun.check(prepared.robot)
+        with (
+            run_folder(f"ros-{prepared.robot.name}", out) as folder,
+            TimeBar("ros", seconds) as bar,
+        ):
+            finished = execute(
+                prepared,
+                folder,
+                port,
+                force=force,
+                view=Watchers(page, link),
+                on_progress=bar.on_progress if port else in_real_time(bar.on_progress),
+                on_event=bar.on_event,
+            )
+    facts = {
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "tripped": finished.outcome.tripped,
+        "peak_current_a": finished.summary.peak_current_a,
+    }
+    show_run(finished, folder, facts, as_json, film=False)

@@ -1,0 +1,59 @@
+"""The run's end of its ROS node: rows of the log out, commands in; it never waits for either."""
+
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.motion.command import Command, Refused
+from snakewalk.controller.ros.command_codec import decode_command
+from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.run.watcher import WatcherProcess
+
+
+class RosLink(WatcherProcess):
+    """Serves a run's ROS node from a process of its own; use it in a ``with``.
+
+    Raises:
+        InputError: rclpy is not installed, or the node cannot be.
+
+    """
+
+    def __init__(self, options: RosOptions) -> None:
+        require_extra("ROS needs", "rclpy")
+        super().__init__(_serve, options, fault="ROS")
+        self.name = str(self.said["name"])
+        """Of the node, with its namespace."""
+        self.domain = int(self.said["domain"])
+
+    def commands(self) -> list[Command]:
+        """Return what has been commanded since the last call; returns at once."""
+        return [_decoded(line) for line in self._end.commands()]
+
+
+@contextmanager
+def open_ros(options: RosOptions | None) -> Iterator[RosLink | None]:
+    """Serve the ROS node of a run where it is asked for, and print its name."""
+    if options is None:
+        yield None
+        return
+    with RosLink(options) as link:
+        print(f"ROS: {link.name} in domain {link.domain}", file=sys.stderr, flush=True)
+        yield link
+
+
+def _decoded(line: str) -> Command:
+    try:
+        return decode_command(line)
+    except InputError as error:
+        return Refused(error.faults[0])
+
+
+def _serve(line: socket.socket, options: RosOptions) -> None:
+    os.environ.update(options.environ(os.environ))
+    from snakewalk.controller.ros.ros_node import serve  # noqa: PLC0415  rclpy stays here
+
+    serve(line, options)

@@ -1,0 +1,400 @@
+"""The process that is a run's ROS node: rows of the log in, topics out, and the stop service."""
+
+import array
+import json
+import signal
+import socket
+import threading
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.exchange.ros_messages import ERROR, OK, WARNING, RosMessages
+from snakewalk.controller.motion.command import (
+    POINTS_MAX,
+    Command,
+    HoldStill,
+    JointGoals,
+    JointTrajectory,
+    Refused,
+    StartGait,
+)
+from snakewalk.controller.ros.command_codec import encode_command
+from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.runlog.tables import record_of
+from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.safety.stop_button import PressedButton
+
+NAME: Final = "snakewalk"
+_WAIT_S: Final = 0.05
+_DIAGNOSTICS_S: Final = 1.0
+_OFFSET_SPAN_S: Final = 2.0
+_STOP_S: Final = 1.0
+"""How long the stop service waits for the run to say that torque is off."""
+_LOOK_S: Final = 1e-3
+_LAST_S: Final = 0.2
+"""For the last messages to leave."""
+_PENDING_MAX: Final = 16
+"""Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that
+newer ones of the same joints follow."""
+_QUEUE: Final = QoSProfile(depth=10)
+_LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_TOPICS: Final = {
+    "/joint_states": ("robot_joint_states", "sensor_msgs/msg/JointState", _QUEUE),
+    "/joint_goals": ("robot_joint_goals", "sensor_msgs/msg/JointState", _QUEUE),
+    "/head_pose": ("head_pose", "geometry_msgs/msg/PoseStamped", _QUEUE),
+    "/imu": ("imu", "sensor_msgs/msg/Imu", _QUEUE),
+    "/path": ("path", "nav_msgs/msg/Path", _LATCHED),
+    "/diagnostics": ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", _QUEUE),
+}
+"""Topic of a bag to name, type and quality of service of a node's; diagnostics are everybody's."""
+
+
+def serve(line: socket.socket, options: RosOptions) -> None:
+    """Be the node until the run closes the line."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        node = _make_node(options)
+    except Exception as fault:  # rclpy's own, or of whatever middleware the environment names
+        rclpy.try_shutdown()
+        text = " ".join(str(fault).split())
+        line.sendall(json.dumps({"fault": text or type(fault).__name__}).encode() + b"\n")
+        return
+    domain = node.context.get_domain_id()
+    hello = {"name": node.get_fully_qualified_name(), "domain": domain}
+    line.sendall(json.dumps(hello).encode() + b"\n")
+    robot = RobotNode(node, WatcherEnd(line), options)
+    with _spinning(node):
+        with suppress(EOFError, OSError):
+            while True:
+                robot.step(_WAIT_S)
+        robot.end()
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def _make_node(options: RosOptions) -> Node:
+    # what a run says is printed by the run; here it goes to /rosout alone
+    quiet = ["--ros-args", "--disable-stdout-logs", "--disable-external-lib-logs"]
+    rclpy.init(
+        args=quiet,
+        domain_id=options.domain,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+    return Node(NAME, namespace=options.namespace)
+
+
+@contextmanager
+def _spinning(node: Node) -> Iterator[None]:
+    """Have a thread of its own carry out what others call and send."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+
+    def spin() -> None:
+        with suppress(ExternalShutdownException):
+            executor.spin()
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        executor.shutdown()
+        thread.join()
+
+
+class ClockOffset:
+    """ROS time over the run's clock: rows come late by chance, so the earliest of late counts."""
+
+    def __init__(self, span_s: float = _OFFSET_SPAN_S) -> None:
+        self._span_s = span_s
+        self._seen: deque[tuple[float, float]] = deque()
+
+    def add(self, ros_s: float, run_s: float) -> None:
+        """Take a row of ``run_s`` that came at ``ros_s``."""
+        offset_s = ros_s - run_s
+        while self._seen and self._seen[-1][1] >= offset_s:
+            self._seen.pop()
+        self._seen.append((ros_s, offset_s))
+        while self._seen[0][0] < ros_s - self._span_s:
+            self._seen.popleft()
+
+    def ros_s(self, run_s: float) -> float:
+        """ROS time of a time of the run."""
+        return run_s + (self._seen[0][1] if self._seen else 0.0)
+
+
+class RobotNode:
+    """Topics and services of one run."""
+
+    def __init__(self, node: Node, end: WatcherEnd, options: RosOptions) -> None:
+        self._node, self._end, self._options = node, end, options
+        self._clock = WallClock()
+        self._offset = ClockOffset()
+        self._messages = RosMessages(
+            _message, _doubles, lambda value: bytes([value]), self._offset.ros_s
+        )
+        self._publishers: dict[str, Any] = {}
+        self._header: Header | None = None
+        self._newest: dict[str, Mapping[str, Any]] = {}
+        self._button: PressedButton | None = None
+        self._cycles = 0
+        self._told_s = -_DIAGNOSTICS_S
+        self._said: dict[str, tuple[int, str]] = {}
+        self._pending: deque[Command] = deque(maxlen=_PENDING_MAX)
+        self._lock = threading.Lock()
+        node.create_service(_type("std_srvs/srv/Trigger"), "~/stop", self._stop)
+        if options.commands:
+            for kind, topic, take in (
+                ("sensor_msgs/msg/JointState", "robot_joint_command", self._goals),
+                ("trajectory_msgs/msg/JointTrajectory", "robot_joint_trajectory", self._trajectory),
+                ("std_msgs/msg/String", "robot_gait", self._gait),
+            ):
+                node.create_subscription(_type(kind), topic, take, _QUEUE)
+
+    def step(self, wait_s: float) -> None:
+        """Take the rows that have come, publish them, and hand the run what was commanded."""
+        for topic, row in self._end.rows(wait_s):
+            self._take(topic, row)
+            if topic == "/pose":
+                self._publish_cycle()
+                self._send()
+        self._publish_diagnostics()
+
+    def end(self) -> None:
+        """Say how the run ended."""
+        if self._button is not None and self._button.end is None:
+            self._said["run"] = ERROR, "the run is gone without a word: is torque off?"
+        elif self._said.get("run", (OK, ""))[0] == OK:
+            self._said["run"] = OK, "it has come to its end"
+        self._told_s = -_DIAGNOSTICS_S
+        self._publish_diagnostics()
+        self._clock.sleep_until_s(self._clock.now_s() + _LAST_S)
+
+    def _take(self, topic: str, row: Mapping[str, Any]) -> None:
+        if topic == "/button":
+            self._button = PressedButton(Path(row["path"]))
+        elif topic == "/config":
+            self._begin(record_of({topic: [row]}, complete=False, note=""))
+        elif topic == "/path":
+            self._publish(self._messages.paths(self._record({topic: [row]})), skip=1)
+        elif topic == "/event":
+            self._log_event(row)
+        else:
+            self._newest[topic] = row
+
+    def _begin(self, record: RunRecord) -> None:
+        self._header = record.header
+        for topic in ("/joint_states", "/joint_goals", "/head_pose", "/diagnostics"):
+            self._publisher(topic)  # others find them before the first cycle
+        self._end.ask()
+        if record.header.run.waypoints_m:
+            self._publish(self._messages.paths(record))
+
+    def _publish_cycle(self) -> None:
+        rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == "/slow"}
+        if self._header is None or "/cycle" not in rows:
+            return
+        self._cycles += 1
+        self._offset.add(self._ros_now_s(), rows["/cycle"]["time_s"])
+        record = self._record({topic: [row] for topic, row in rows.items()})
+        self._publish(self._messages.joints(record))
+        self._publish(self._messages.head_poses(record))
+        self._publish(self._messages.imu(record))
+        self._said["cycle"] = OK, f"late by {1e3 * rows['/cycle']['lateness_s']:.1f} ms"
+
+    def _record(self, rows: Mapping[str, list[Mapping[str, Any]]]) -> RunRecord:
+        return record_of(rows, complete=False, note="", header=self._header)
+
+    def _publish(self, rows: Iterator[tuple[float, str, Any]], skip: int = 0) -> None:
+        for number, (_, topic, message) in enumerate(rows):
+            if number >= skip:
+                self._publisher(topic).publish(message)
+
+    def _publisher(self, topic: str) -> Any:
+        if topic not in self._publishers:
+            name, kind, quality = _TOPICS[topic]
+            self._publishers[topic] = self._node.create_publisher(_type(kind), name, quality)
+        return self._publishers[topic]
+
+    def _publish_diagnostics(self) -> None:
+        now_s = self._clock.now_s()
+        if self._header is None or now_s - self._told_s < _DIAGNOSTICS_S:
+            return
+        self._told_s = now_s
+        ros_s = self._ros_now_s()
+        run_s = ros_s - self._offset.ros_s(0.0)
+        status = [
+            self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, {})
+            for name, (level, text) in self._said.items()
+        ]
+        if "/slow" in self._newest:
+            status += self._messages.servos(self._record({"/slow": [self._newest["/slow"]]}), 0)
+        self._publisher("/diagnostics").publish(self._messages.diagnostics(run_s, status))
+
+    def _log_event(self, row: Mapping[str, Any]) -> None:
+        kind, text = row["kind"], row["text"]
+        log = self._node.get_logger()
+        if row["level"] == "error":
+            log.error(f"{kind}: {text}")
+        elif row["level"] == "warning" or kind in ("refused", "stale"):
+            log.warning(f"{kind}: {text}")
+        else:
+            log.info(f"{kind}: {text}")
+        if kind in ("command", "refused", "stale"):
+            self._said["commands"] = OK if kind == "command" else WARNING, f"{kind}: {text}"
+        elif kind in ("trip", "interrupt"):
+            self._said["run"] = ERROR, text
+        elif kind == "start":
+            self._said["run"] = OK, text
+        self._told_s = -_DIAGNOSTICS_S
+
+    def _send(self) -> None:
+        """Hand over what was commanded since the last cycle, and ask for the next."""
+        with self._lock:
+            commands = list(self._pending)
+            self._pending.clear()
+        for command in commands:
+            self._end.command(encode_command(command))
+        self._end.ask()
+
+    def _ros_now_s(self) -> float:
+        return float(self._node.get_clock().now().nanoseconds) * 1e-9
+
+    def _stop(self, request: Any, response: Any) -> Any:
+        """Press the run's stop button, and answer when torque is off."""
+        button = self._button
+        if button is None:
+            response.success, response.message = False, "there is no run to stop yet"
+            return response
+        began_s = self._clock.now_s()
+        button.press(f"ROS service {self._node.get_fully_qualified_name()}/stop")
+        while button.end is None and self._clock.now_s() < began_s + _STOP_S:
+            self._clock.sleep_until_s(self._clock.now_s() + _LOOK_S)
+        after_ms = 1e3 * (self._clock.now_s() - began_s)
+        said = button.end
+        response.success = said is not None and "torque off failed" not in said
+        response.message = (
+            f"requested; the run has not answered in {_STOP_S:g} s: switch the supply off"
+            if said is None
+            else f"{said}; after {after_ms:.0f} ms"
+        )
+        return response
+
+    def _goals(self, message: Any) -> None:
+        if message.name and not message.position:
+            why = "joint goals: no positions; velocities and efforts alone are not taken"
+            self._command(Refused(why), None, "joint goals")
+            return
+        goals = JointGoals(list(message.name), list(message.position))
+        self._command(goals, message.header.stamp, "joint goals")
+
+    def _trajectory(self, message: Any) -> None:
+        stamp, points = message.header.stamp, message.points
+        if not points:
+            self._command(HoldStill(), stamp, "trajectory")
+            return
+        if len(points) > POINTS_MAX:
+            why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are taken"
+            self._command(Refused(why), stamp, "trajectory")
+            return
+        times = [each.time_from_start for each in points]
+        time_s = np.array([each.sec + 1e-9 * each.nanosec for each in times])
+        try:
+            values = (
+                _rows([each.positions for each in points]),
+                _rows([each.velocities for each in points]),
+                _rows([each.accelerations for each in points]),
+            )
+        except ValueError:
+            why = "trajectory: its points have different numbers of values"
+            self._command(Refused(why), stamp, "trajectory")
+            return
+        positions, velocities, accelerations = values
+        if positions is None:
+            self._command(Refused("trajectory: its points have no positions"), stamp, "trajectory")
+            return
+        names = list(message.joint_names)
+        command = JointTrajectory(names, time_s, positions, velocities, accelerations)
+        self._command(command, stamp, "trajectory")
+
+    def _gait(self, message: Any) -> None:
+        words = message.data.split()
+        if not words:
+            self._command(HoldStill(), None, "gait")
+            return
+        from snakewalk.controller.run.factory import gait_by_name, is_gait  # noqa: PLC0415
+
+        command: Command
+        try:
+            if not is_gait(words[0]):
+                raise InputError(f"gait: {words[0]}: no such gait; snakewalk gait list")
+            values = dict(_value(word) for word in words[1:])
+            command = StartGait(gait_by_name(words[0], values)[0])
+        except InputError as error:
+            command = Refused(error.faults[0])
+        self._command(command, None, "gait")
+
+    def _command(self, command: Command, stamp: Any, what: str) -> None:
+        """Keep a command for the run; a stamp of 0 says nothing."""
+        if not self._cycles:
+            command = Refused(f"{what}: the run has not begun")
+        elif stamp is not None and (stamp.sec or stamp.nanosec):
+            age_s = self._ros_now_s() - (stamp.sec + 1e-9 * stamp.nanosec)
+            if abs(age_s) > self._options.timeout_s:
+                when = "ago" if age_s > 0.0 else "ahead"
+                command = Refused(
+                    f"{what}: stamped {abs(age_s):.1f} s {when}; at most "
+                    f"{self._options.timeout_s:g} s is taken, and 0 for now"
+                )
+        with self._lock:
+            last = self._pending[-1] if self._pending else None
+            newer = isinstance(command, JointGoals) and isinstance(last, JointGoals)
+            if newer and last.joints == command.joints:  # type: ignore[union-attr]
+                self._pending.pop()
+            self._pending.append(command)
+
+
+def _rows(values: list[Any]) -> Floats | None:
+    """(N, K) array of a trajectory's points; None where none has any."""
+    return np.array([list(each) for each in values], dtype=float) if any(values) else None
+
+
+def _value(word: str) -> tuple[str, Any]:
+    key, equals, text = word.partition("=")
+    if not (key and equals and text):
+        raise InputError(f"gait: {word}: expected PARAM=VALUE")
+    try:
+        return key, parse_json(text)
+    except ValueError:
+        return key, text
+
+
+def _doubles(values: Floats) -> Any:
+    return array.array("d", np.ascontiguousarray(values, dtype=float).tobytes())
+
+
+@cache
+def _type(kind: str) -> Any:
+    package, folder, name = kind.split("/")
+    return getattr(import_module(f"{package}.{folder}"), name)
+
+
+def _message(kind: str, fields: Mapping[str, Any]) -> Any:
+    return _type(kind)(**fields)

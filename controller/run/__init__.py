@@ -1,0 +1,1 @@
+"""One run from configuration to log; joins controller, drivers and simulation."""

@@ -1,0 +1,257 @@
+"""What answers on the bus: simulated servos in the same process, or metal on a serial port.
+
+Everything above the byte port is the same object for both.
+"""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Final
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import with_keys
+from snakewalk.config.robot import SIMULATED, RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.run.deviation import Deviation
+from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
+from snakewalk.controller.walk.twin_rollout import Twin
+from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.segmented_bus import SegmentedBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.clock import Clock, WallClock
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.port.network_port import NetworkPort, open_port
+from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text
+from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.types import BodyPose, JointState
+
+FILE_PORTS: Final = "robot"
+"""``--port`` of a robot whose file names the ports of its segments."""
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """A chain of servos, its clock, and what else can be known about it."""
+
+    name: str
+    chain: ServoChain
+    clock: Clock
+    pose: Callable[[], BodyPose] | None
+    """Measures the head link; None where nothing does."""
+    qpos: Callable[[], Floats] | None
+    """The simulator's coordinates, for the film."""
+    wire_busy_s: Callable[[], float]
+    """Time that bytes have spent on the wire so far; NaN where nobody counts."""
+    energy: Callable[[], MotorEnergy] = MotorEnergy
+    """What the motors have taken in and done so far."""
+    twin: Callable[[], Twin] | None = None
+    """Makes a second body, on which motion is tried; None where time does not wait for it."""
+
+
+def simulated(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    initial_pose: InitialPose,
+    deviation: Deviation | None = None,
+) -> Backend:
+    """Servos on a simulated line that turn a MuJoCo body with its head at the start.
+
+    Args:
+        run: start and physics step.
+        robot: the body and its servos.
+        world: friction and ground.
+        ground: the world's height field, where it has one.
+        initial_pose: heading of the head link, and joint angles to begin with, as servos say them.
+        deviation: in what the simulated robot and its ground differ from ``robot`` and ``world``;
+            None is the run's.
+
+    """
+    require_extra("simulated runs need", "mujoco")
+    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
+    from snakewalk.sim.physics.twin import PlantTwin  # noqa: PLC0415
+    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
+    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
+
+    if deviation is None:
+        deviation = Deviation.of_run(run.deviation, robot)
+    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
+    joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
+    plant.reset(run.start_m, initial_pose.heading_rad, joint_rad)
+    servo = robot.servo
+    line = SimLine(
+        ServoBank(robot.servo_ids, robot.servo_models, servo.baud),
+        plant,
+        baud=servo.baud,
+        mounting=deviation.mounting(robot),
+        motors=motors_of(robot),
+        supply_and_ambient=SupplyAndAmbient.of(robot),
+        imu=plant_imu(robot, plant, servo.baud, run.seed),
+    )
+    chain = ServoChain(
+        DynamixelBus(line, robot.models_by_id),
+        robot.model_copy(update={"ports": ()}),  # here they are on one wire
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+    )
+    drive = line.firmware.drive
+    if deviation.torque is not None:
+        drive.torque_constant_n_m_a[:] *= deviation.torque
+    return Backend(
+        "sim",
+        chain,
+        line.clock,
+        plant.head_pose,
+        lambda: plant.qpos,
+        lambda: line.busy_s,
+        lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
+        lambda: PlantTwin(robot, world, ground),
+    )
+
+
+def on_ports(robot: RobotConfig, port: str | None) -> RobotConfig:
+    """Return the robot with its segments on the ports that ``--port`` means.
+
+    Args:
+        robot: whose ``[[ports]]`` are meant by ``robot``.
+        port: a device or a URL, ``1-8=PORT,9-16=PORT``, ``robot``; None: the simulator.
+
+    Raises:
+        InputError: the robot's file names no ports, or what is named does not fit its servos.
+
+    """
+    if port is None:
+        return robot
+    if port == FILE_PORTS:
+        if not robot.ports:
+            raise InputError(
+                f"--port {FILE_PORTS}: the file of {robot.name} has no [[ports]]; name them by "
+                "--port 1-8=PORT,9-16=PORT"
+            )
+        return robot
+    found = parse_port_map(port) if is_port_map(port) else []
+    return with_keys(
+        robot, {"ports": [{"port": name, "ids": ids} for name, ids in found]}, f"--port {port}"
+    )
+
+
+def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
+    """Real servos on ``port``, a device or a URL, or on the robot's ports; nothing measures a pose.
+
+    Raises:
+        PortError: a port is not there, is taken, or may not be opened.
+
+    """
+    if robot.ports:
+        bus: ChainBus = _bus_on_ports(robot, WallClock())
+    else:
+        bus = _bus_on(robot, open_port(port, robot.servo.baud))
+    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+    name = port_map_text((each.port, each.ids) for each in robot.ports) or port
+    return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
+
+
+def split(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    initial_pose: InitialPose,
+) -> Backend:
+    """Real servos on the robot's ports, the others on a simulated line, in real time.
+
+    The joints of the simulated body that have real servos follow what those measure, so that the
+    others feel their weight and friction; the body's pose is the simulator's.
+
+    Raises:
+        PortError: a port is not there, is taken, or may not be opened.
+
+    """
+    require_extra("simulated servos need", "mujoco")
+    from snakewalk.sim.line.clock import RealTimeClock  # noqa: PLC0415
+    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
+    from snakewalk.sim.physics.split_plant import SplitPlant  # noqa: PLC0415
+    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
+    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
+    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
+    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
+
+    (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
+    rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
+    deviation = Deviation.of_run(run.deviation, robot)
+    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
+    plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
+    motors = motors_of(robot)
+    body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
+    baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
+    imu = plant_imu(robot, plant, baud, run.seed)
+    bank = ServoBank(
+        [robot.servo_ids[row] for row in rows], [robot.servo_models[row] for row in rows], baud
+    )
+    line = SimLine(
+        bank,
+        body,
+        clock,
+        baud=baud,
+        mounting=Mounting(mounting.sign[rows], mounting.zero_rad[rows]),
+        motors=[motors[row] for row in rows],
+        supply_and_ambient=SupplyAndAmbient(supply_v=robot.servo.supply_v),
+        imu=imu if imu is not None and imu.config.id in here else None,
+    )
+    if deviation.torque is not None:
+        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[rows]
+    bus = _bus_on_ports(robot, clock, line)
+    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+
+    def follow(state: JointState) -> None:
+        body.follow(state.time_s - state.age_s, state.position_rad, state.velocity_rad_s)
+
+    chain.on_state = follow
+    return Backend(
+        port_map_text((each.port, each.ids) for each in robot.ports),
+        chain,
+        clock,
+        plant.head_pose,
+        lambda: plant.qpos,
+        lambda: float("nan"),
+    )
+
+
+def is_split(robot: RobotConfig) -> bool:
+    """Whether some of the robot's servos are simulated, beside real ones."""
+    return any(each.port == SIMULATED for each in robot.ports)
+
+
+def real_ports(robot: RobotConfig) -> list[str]:
+    """Ports of the robot's segments, without that of simulated servos."""
+    return [each.port for each in robot.ports if each.port != SIMULATED]
+
+
+def _bus_on(robot: RobotConfig, line: SerialPort | NetworkPort) -> DynamixelBus:
+    return DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s)
+
+
+def _bus_on_ports(
+    robot: RobotConfig, clock: Clock, simulated_line: BytePort | None = None
+) -> SegmentedBus:
+    """A bus for each segment; what is open is closed where another port cannot be opened."""
+    parts = []
+    with ExitStack() as opened:
+        for each in robot.ports:
+            if each.port == SIMULATED and simulated_line is not None:
+                bus = DynamixelBus(simulated_line, robot.models_by_id)
+            else:
+                bus = _bus_on(robot, open_port(each.port, robot.servo.baud, clock))
+            opened.callback(bus.port.closePort)
+            parts.append((bus, each.ids))
+        opened.pop_all()
+    return SegmentedBus(parts)

@@ -1,0 +1,1 @@
+"""Commands of one run, one command per file."""

@@ -1,0 +1,151 @@
+"""``snakewalk gait fit``: joint angles that lay the robot on a curve in space."""
+
+import csv
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.archive import why_no_file
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.options import Force, Json, Robot, show
+from snakewalk.controller.console.result_files import check_picture
+
+if TYPE_CHECKING:
+    from snakewalk.controller.gaits.backbone import BackboneFit
+
+COLUMNS = ("x_m", "y_m", "z_m")
+
+
+def fit_gait(
+    curve: Annotated[
+        Path, typer.Argument(help="table with the columns x_m, y_m, z_m: a curve, head first")
+    ],
+    robot: Robot = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw curve and chain here (.png, .svg, .pdf)")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="joint angles and places (.npz)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Lay the robot on a curve in space: joint angles, and how far the joints are from it."""
+    import numpy as np  # noqa: PLC0415  heavy; --help stays quick
+
+    from snakewalk.config.loader import load_robot  # noqa: PLC0415
+    from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite  # noqa: PLC0415
+    from snakewalk.controller.gaits.backbone import fit_backbone  # noqa: PLC0415
+
+    check_picture(picture)
+    if output is not None and output.suffix.lower() != ".npz":
+        raise InputError(f"{output}: joint angles go to a file that ends in .npz")
+    refuse_to_overwrite([output, picture], force)
+    body = load_robot(robot or "alternating16")
+    points_m = _read(curve)
+    try:
+        fit = fit_backbone(body, points_m)
+    except InputError as error:
+        raise InputError([f"{curve}: {line}" for line in error.faults]) from None
+    if output is not None:
+        with atomic_write(output) as part:
+            np.savez(
+                part,
+                joint_rad=fit.joint_rad,
+                head_m=fit.head_m,
+                head_rotation=fit.head_rotation,
+                points_m=fit.points_m,
+                distance_m=fit.distance_m,
+                robot=np.array(body.name),
+            )
+    if picture is not None:
+        _draw(fit, points_m, body.name, picture)
+    limit = np.array(body.limit_rad)
+    found: dict[str, object] = {
+        "curve": str(curve),
+        "robot": body.name,
+        "residual_m": round(fit.residual_m, 6),
+        "mean_distance_m": round(float(fit.distance_m.mean()), 6),
+        "joints_at_limit": int(np.count_nonzero(np.abs(fit.joint_rad) >= limit - 1e-9)),
+        "joint_rad": [round(float(angle), 5) for angle in fit.joint_rad],
+    }
+    if output is not None:
+        found["output"] = str(output)
+    if picture is not None:
+        found["picture"] = str(picture)
+    if not as_json:
+        found["joint_rad"] = " ".join(f"{angle:.3f}" for angle in fit.joint_rad)
+    show(found, as_json)
+
+
+def _read(path: Path) -> list[list[float]]:
+    """Points (N, 3) of a table; other columns are left alone.
+
+    Raises:
+        InputError: no such file, a column is missing, or a value is no number.
+
+    """
+    if not path.is_file():
+        raise InputError(why_no_file(path))
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            table = csv.DictReader(stream, skipinitialspace=True)
+            names = [name.strip() for name in table.fieldnames or []]
+            table.fieldnames = names
+            if missing := [name for name in COLUMNS if name not in names]:
+                raise InputError(
+                    f"{path}: no column {', '.join(missing)}; the first line names the columns "
+                    f"{', '.join(COLUMNS)}, the points follow from the head backwards"
+                )
+            return [
+                [_number(path, table.line_num, name, row[name]) for name in COLUMNS]
+                for row in table
+            ]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: not a table of text ({error})") from None
+
+
+def _number(path: Path, line: int, name: str, text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{path}, line {line}: {name} is {text or 'empty'}; expected a number")
+    return value
+
+
+def _draw(fit: "BackboneFit", curve_m: list[list[float]], robot: str, path: Path) -> None:
+    """Curve and chain in space on the left, joint angles on the right."""
+    import numpy as np  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
+
+    from snakewalk.controller.figures.style import (  # noqa: PLC0415
+        AMBER,
+        BLUE,
+        INK,
+        RED,
+        save_picture,
+        style,
+    )
+
+    points = np.array(curve_m)
+    with style():
+        figure = Figure(figsize=(11.0, 5.0), layout="constrained")
+        space = figure.add_subplot(1, 2, 1, projection="3d")
+        space.plot(*points.T, color=AMBER, linewidth=2.0, label="curve")
+        space.plot(*fit.points_m.T, "o-", color=BLUE, markersize=3.5, label="chain")
+        space.plot(*fit.points_m[:1].T, "o", color=RED, label="head")
+        space.set(xlabel="x, m", ylabel="y, m", zlabel="z, m")
+        space.set_box_aspect(np.maximum(np.ptp(points, axis=0), 0.1 * np.ptp(points)))
+        space.locator_params(nbins=4)
+        space.legend(loc="upper left")
+        angles = figure.add_subplot(1, 2, 2)
+        angles.bar(np.arange(1, len(fit.joint_rad) + 1), fit.joint_rad, color=BLUE)
+        angles.axhline(0.0, color=INK, linewidth=0.5)
+        angles.set(xlabel="joint, from the head", ylabel="angle, rad")
+        title = f"{robot}: at most {1000.0 * fit.residual_m:.1f} mm from the curve"
+        figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
+        save_picture(figure, path, dpi=110)

@@ -1,0 +1,102 @@
+"""``snakewalk init``: a run, a robot and a world of one's own to begin with."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import Force, Json, Robot, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+_USED_FIRST = ("flat-square", "jacksboro-traverse")
+"""Runs that are the start where several would do."""
+
+_RUN = """A run: what is to be done, by which robot, where.
+  snakewalk plan run.toml     judges it on paper
+  snakewalk run run.toml      runs it in the simulator: film, page and log; on servos with --port
+A line behind # shows a key with its default; take the # away to change it."""
+_ROBOT = """The robot: links, joints and servos, from the head to the tail.
+  snakewalk robot show robot.toml
+A line behind # shows a key with its default. IDs, signs and zeros are found out by
+snakewalk calibrate."""
+_WORLD = """The world: what the robot moves on.
+A line behind # shows a key with its default. Another ground: replace the table [ground]."""
+
+
+def init(
+    folder: Annotated[
+        Path, typer.Argument(file_okay=False, help="it is made if it is not there")
+    ] = Path(),
+    robot: Robot = None,
+    from_: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            help="run to begin with, shipped or a TOML file",
+            autocompletion=completion.RUNS,
+        ),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write run.toml, robot.toml and world.toml to change, with their schemas for editors."""
+    from snakewalk.config.document import json_schema  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.loader import load_robot, load_run, load_world, shipped  # noqa: PLC0415
+    from snakewalk.config.template import template  # noqa: PLC0415
+
+    if from_ is None:
+        known = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
+        fitting = (name for name, body in known.items() if body == (robot or "yaw16"))
+        from_ = next(fitting, _USED_FIRST[0])
+    run = load_run(from_)
+    beside = Path(from_).parent if from_.endswith(".toml") else None
+    body = load_robot(run.robot if robot is None else robot, beside if robot is None else None)
+    if body.limbs:
+        raise InputError(
+            f"robot {body.name}: has legs, which walk by gaits: snakewalk gait run trot --robot "
+            f"{robot or run.robot}"
+        )
+    if run.motion in {"gait", "playback", "source", "repertoire"}:
+        raise InputError(f"run {run.name}: a {run.motion} is no walk; --from takes a walk's run")
+    track = Path(run.track) if beside is None else beside / run.track
+    texts = {
+        "run.toml": template(
+            run.model_copy(
+                update={
+                    "name": "my-run",
+                    "robot": "robot.toml",
+                    "world": "world.toml",
+                    "track": str(track.resolve()) if track.is_file() else run.track,
+                }
+            ),
+            _RUN,
+            without={"gait", "playback", "repertoire"},
+        ),
+        "robot.toml": template(body.model_copy(update={"name": "my-robot"}), _ROBOT),
+        "world.toml": template(
+            load_world(run.world, beside).model_copy(update={"name": "my-world"}), _WORLD
+        ),
+    }
+    schemas = {f"schema/{kind}.json": json_schema(kind) for kind in ("run", "robot", "world")}
+    try:
+        (folder / "schema").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {error.strerror}") from None
+    refuse_to_overwrite([folder / name for name in (*texts, *schemas)], force)
+    for name, text in texts.items():
+        with atomic_write(folder / name) as part:
+            part.write_text(f"#:schema schema/{name[:-5]}.json\n{text}", encoding="utf-8")
+    for name, described in schemas.items():
+        with atomic_write(folder / name) as part:
+            part.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
+    show(
+        {
+            "files": [str(folder / name) for name in (*texts, *schemas)],
+            "like": f"{run.name}: {body.name} on {run.world}",
+            "next": f"snakewalk plan {folder / 'run.toml'}",
+        },
+        as_json,
+    )

@@ -1,0 +1,55 @@
+"""``snakewalk schema``: JSON Schema of the TOML files."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import Force
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+
+KINDS: Final = (
+    *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal", "schedule"),
+    *("faults", "policy"),
+)
+"""Of ``models``, known before they are built."""
+
+
+def schema(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            help=f"{', '.join(KINDS[:-1])} or {KINDS[-1]}",
+            autocompletion=completion.words(*KINDS),
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="write it here")] = None,
+    force: Force = False,
+) -> None:
+    """Print the JSON Schema of a TOML file, with which editors complete and check it."""
+    from snakewalk.config.document import json_schema  # noqa: PLC0415  --help stays quick
+
+    if kind not in KINDS:
+        raise InputError(f"{kind}: no such file; there are {', '.join(KINDS)}")
+    refuse_to_overwrite([out], force)
+    text = json.dumps(json_schema(kind, models()[kind]), indent=2)
+    if out is None:
+        print(text)
+        return
+    with atomic_write(out) as part:
+        part.write_text(text + "\n", encoding="utf-8")
+
+
+def models() -> "dict[str, type[BaseModel]]":
+    """Model of each kind of file."""
+    from snakewalk.config.document import SCHEMAS  # noqa: PLC0415  --help stays quick
+    from snakewalk.controller.motion.policy import Policy  # noqa: PLC0415
+
+    return {**SCHEMAS, "policy": Policy}

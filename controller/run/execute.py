@@ -1,0 +1,369 @@
+"""Carry out a prepared run: folder, log, link, loop, summary."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import DeviationConfig, RunConfig
+from snakewalk.config.world import FlatGround, WaterGround
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
+from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.motion.compliance import chatters
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.pose.pose_provider import PoseProvider, pose_faults, pose_provider
+from snakewalk.controller.report.artifacts import write_summary
+from snakewalk.controller.run.backend import (
+    Backend,
+    is_split,
+    metal,
+    on_ports,
+    real_ports,
+    simulated,
+    split,
+)
+from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
+from snakewalk.controller.run.prepared_run import PathRun, PreparedRun, pose_with
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
+from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.controller.runtime.friction_monitor import (
+    FrictionMonitor,
+    OnPaper,
+    OnTwin,
+    SlideModel,
+)
+from snakewalk.controller.studies.shadow.diagnosis import check_level
+from snakewalk.controller.studies.shadow.run_shadow import RunShadow
+from snakewalk.controller.walk.course import OnCourse
+from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
+from snakewalk.controller.walk.pilot import UsesFriction
+from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.errors import DriverError
+from snakewalk.drivers.priority import raised_priority
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.recovery import Recovery
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.stop_button import StopButton
+
+if TYPE_CHECKING:
+    from snakewalk.controller.run.watcher import Watcher
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """What a run left behind."""
+
+    outcome: Outcome
+    log: Path
+    record: RunRecord
+    """The log, read back once: for the summary, the report and whoever asks more of it."""
+    summary: RunSummary
+    pose: PoseProvider
+    """What measured the pose, and how well where this is known."""
+    map: MapProvider
+    """What mapped the ground on the way, and how well, where something did."""
+    source: MotionSource
+    """The motion that ran, at its end."""
+
+
+def execute(
+    prepared: PreparedRun,
+    folder: Path,
+    port: str | None = None,
+    *,
+    force: bool = False,
+    stoppable: bool = True,
+    view: "Watcher | None" = None,
+    shadow: bool = False,
+    confirm: Callable[[str], bool] | None = None,
+    stop_requested: Callable[[], str | None] = lambda: None,
+    waypoint_commands: Callable[[], Iterable[str]] | None = None,
+    on_progress: OnProgress = lambda progress: None,
+    on_event: OnEvent = lambda kind, text: None,
+) -> Finished:
+    """Run on ``port``, or on the simulator where it is None; nothing else differs.
+
+    ``port`` is a device or a URL, ``1-8=PORT,9-16=PORT`` where segments of the chain are on ports
+    of their own, or ``robot``, whose file says so; a port ``sim`` has simulated servos.
+
+    The folder is made; one that holds a run's files is refused without ``force``, which deletes
+    them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
+    the simulated runs of a study have none. ``view`` looks on: a page that shows the run, a ROS
+    node that tells of it. With ``shadow`` a simulated chain follows the same goals, and log and
+    ``on_event`` tell what differs.
+    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
+    ``stop_requested``, asked in every read and write, why torque goes off, or None;
+    ``waypoint_commands``, asked in every cycle, what a person sets of the waypoints, as
+    ``LiveCourse`` takes it: the run then holds at the last one until it is ended;
+    ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
+    a slower rate, an operator's change.
+
+    Raises:
+        InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
+            the folder holds a run, or a shadow is asked for on ground where it means nothing.
+        KeyboardInterrupt: of an operator; its notes tell what became of torque, and the log's path.
+
+    """
+    refuse_another_run(folder, force)
+    robot = on_ports(prepared.robot, port)
+    body_simulated = port is None or is_split(robot)
+    _check(prepared, metal=not body_simulated, shadow=shadow)
+    plan = prepared.check_plan()
+    initial_pose = prepared.initial_pose() if body_simulated else None
+    if initial_pose is None:
+        backend = metal(prepared.run, robot, port or "")
+    else:
+        make = simulated if port is None else split
+        backend = make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
+    log_path = folder / LOG
+    clear_run(folder)
+    LOGGER.debug(
+        "%s on %s; the plan keeps the limits; log: %s", prepared.robot.name, backend.name, log_path
+    )
+    torque_constant_n_m_a, winding = _motor(prepared.robot)
+    ports = None if port is None else real_ports(robot) or [port]
+    made = StopButton(prepared.run.name, ports, folder) if stoppable else nullcontext()
+    with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
+        if view is not None and button is not None:
+            view.on_button(button.path)
+        log.config(
+            prepared.run,
+            robot,
+            prepared.world,
+            backend=backend.name,
+            plan=plan,
+            ground=prepared.ground,
+            initial_pose=initial_pose,
+            torque_constant_n_m_a=torque_constant_n_m_a,
+            winding=winding,
+        )
+        safety, clock = prepared.run.safety, backend.clock
+        recovery = Recovery(
+            backend.chain,
+            policy=safety.recovery,
+            patience_s=safety.recovery_time_s,
+            overload_reboots=safety.overload_reboots,
+            confirm=confirm,
+            on_event=lambda text: warn("recovery", text),
+        )
+        backend.chain.on_event = lambda text: warn("bus", text)
+
+        def warn(kind: str, text: str) -> None:
+            log.event(clock.now_s(), kind, text, "warning")
+            LOGGER.warning("%s", text)
+
+        def log_event(kind: str, text: str) -> None:
+            log.event(clock.now_s(), kind, text)
+            on_event(kind, text)
+
+        shown = {} if view is None else {"on_picture": view.on_picture}
+        with (
+            pose_provider(prepared, backend, log_event, **shown) as pose,
+            map_provider(prepared, backend, pose.measure, folder, log_event) as mapped,
+        ):
+            source = prepared.make_source(log_event)
+            friction = _second_body(prepared, source, backend)
+            if waypoint_commands is not None:
+                source = _live(prepared, source, waypoint_commands, log_event)
+            link = SafeLink(
+                backend.chain,
+                SafetyLimits.from_config(robot, safety),
+                clock,
+                recovery,
+                lambda: stop_requested() or (None if button is None else button.pressed()),
+                lambda text: warn("safety", text),
+            )
+            beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
+            drive = Drive(
+                link=link,
+                clock=clock,
+                pose=mapped.measure,
+                motion=source,
+                log=log,
+                robot=prepared.robot,
+                run=prepared.run,
+                gain=prepared.gain,
+                wire_busy_s=backend.wire_busy_s,
+                energy=backend.energy,
+                observer=beside,
+                friction=friction,
+                on_progress=on_progress,
+                on_event=on_event,
+            )
+            with _end_told(link, log, clock):
+                with raised_priority() if port is not None else nullcontext():
+                    outcome = drive.run()
+                if button is not None:
+                    button.end(outcome.tripped or "it had come to its end")
+                if beside is not None:
+                    beside.end(clock.now_s())
+    LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
+    record, numbers = _read_back(log_path)
+    return Finished(outcome, log_path, record, numbers, pose, mapped, source)
+
+
+def _live(
+    prepared: PreparedRun,
+    source: MotionSource,
+    commands: Callable[[], Iterable[str]],
+    on_event: OnEvent,
+) -> LiveCourse:
+    """Put a person in charge of the waypoints.
+
+    Raises:
+        InputError: the motion goes along no course.
+
+    """
+    if not isinstance(prepared, PathRun) or not isinstance(source, OnCourse):
+        raise InputError(f"run {prepared.run.name}: its motion has no waypoints that can be set")
+    return LiveCourse(cast(MotionOnCourse, source), commands, prepared.check_waypoint, on_event)
+
+
+def _second_body(
+    prepared: PreparedRun, source: MotionSource, backend: Backend
+) -> FrictionMonitor | None:
+    """Let a bare snake that walks ground that is known use a second body, where there is one.
+
+    Returns:
+        What finds the friction under a walk: on a level floor on paper, elsewhere on that body.
+        None where the pose tells nothing of it: by the joints or an IMU it takes friction as known.
+
+    """
+    run, world, robot = prepared.run, prepared.world, prepared.robot
+    if run.mapping is not None or robot.limb_joints:
+        return None
+    twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None
+    tries = run.walk.tries > 0 and prepared.ground is not None
+    if twin is not None and tries and isinstance(source, UsesTwin):
+        source.use_twin(TwinRollout(robot, twin, world.friction))
+    finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
+    measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
+    if not finds or not measured or isinstance(world.ground, WaterGround):
+        return None
+    if isinstance(world.ground, FlatGround) and world.obstacle is None:
+        model: SlideModel = OnPaper()  # moves no second body in every walk
+    elif twin is not None:
+        model = OnTwin(robot, twin)
+    else:
+        return None
+    use = cast(UsesFriction, source).use_friction
+    return FrictionMonitor(world.friction, model, 1.0 / run.cycle_hz, use)
+
+
+@contextmanager
+def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
+    """Note what became of torque and log when a signal, a full disk or a dead port ends a run."""
+    try:
+        yield  # the link is closed when an error comes out of it
+    except DriverError as fault:  # says itself what it knows of torque
+        if link.tripped is not None:
+            log.event(clock.now_s(), "interrupt", str(fault), "warning")
+            fault.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
+        raise
+    except (KeyboardInterrupt, SystemExit, OSError) as stop:
+        failed = getattr(stop, "__notes__", [])
+        torque = "torque is off" if link.was_enabled else "torque was not switched on"
+        stop.add_note(torque if not failed else "torque may be on: switch the supply off")
+        if not isinstance(stop, OSError):
+            text = "; ".join(failed) if failed else torque
+            log.event(clock.now_s(), "interrupt", text, "warning")
+            stop.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
+        raise
+
+
+def _read_back(log: Path) -> tuple[RunRecord, RunSummary]:
+    """Read the log of a run that is over, and write its summary beside it."""
+    try:
+        record = read_log(log)
+        return record, write_summary(summary(record), log.parent)
+    except KeyboardInterrupt as stop:
+        stop.add_note(f"the run is whole: {log}; its page: snakewalk report {log}")
+        raise
+
+
+def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
+    """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
+    if metal and prepared.run.deviation != DeviationConfig():
+        raise InputError(
+            f"run {prepared.run.name}: deviation: a robot on a port is as it is; take the table out"
+        )
+    pose_faults(prepared.run, prepared.robot, prepared.world, metal=metal)
+    map_faults(prepared, metal=metal)
+    check_compliance(prepared.run, prepared.robot)
+    if shadow:
+        require_extra("a shadow needs", "mujoco")
+        check_level(prepared.world)
+
+
+def _shadow(
+    prepared: PreparedRun, initial_pose: InitialPose | None, log: RunLog, on_event: OnEvent
+) -> RunShadow:
+    """Return the shadow of a run; on servos it begins at the angles that are measured first."""
+
+    def pose(measured_rad: Floats) -> InitialPose:
+        if initial_pose is not None:
+            return initial_pose
+        return pose_with(prepared.robot, prepared.start_heading_rad, measured_rad)
+
+    run, robot, world = prepared.run, prepared.robot, prepared.world
+    return RunShadow(run, robot, world, prepared.ground, pose, log, on_event)
+
+
+def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
+    """Refuse a compliance that safety would clamp, or that would chatter against a blocked shaft.
+
+    Raises:
+        InputError: one line for each fault.
+
+    """
+    config = run.compliance
+    if config is None:
+        return
+    faults, allowed = [], run.safety.goal_rate_rad_s - robot.joint_speed_limit_rad_s
+    if config.yield_rate_rad_s > allowed:
+        faults.append(
+            f"run {run.name}: compliance.yield_rate_rad_s {config.yield_rate_rad_s:g}: together "
+            f"with the robot's joint_speed_limit_rad_s {robot.joint_speed_limit_rad_s:g} it is "
+            f"over safety.goal_rate_rad_s {run.safety.goal_rate_rad_s:g}; at most {allowed:g}"
+        )
+    chatter = chatters(config, _current_gain_a_rad(robot), 1.0 / run.cycle_hz)
+    if chatter is not None:
+        faults.append(f"run {run.name}: {chatter}")
+    if faults:
+        raise InputError(faults)
+
+
+def _current_gain_a_rad(robot: RobotConfig) -> float:
+    """Current of the stiffest joint per radian of lead; 0 where no motor is known."""
+    from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad  # noqa: PLC0415  figures only
+
+    gains_a_rad = [0.0]
+    for motor, gain in zip(known_motors(robot), robot.position_p_gains, strict=True):
+        if motor is not None:
+            per_rad = float(p_gain_per_rad(gain, motor))
+            gains_a_rad.append(per_rad * robot.servo.supply_v / motor.resistance_ohm)
+    return max(gains_a_rad)
+
+
+def _motor(robot: RobotConfig) -> tuple[float, Winding | None]:
+    """Torque constant (N m/A) and winding of the robot's servos.
+
+    NaN and None where the simulator has no such model, or the servos are of several.
+    """
+    from snakewalk.sim.servo.motor import known_motors  # noqa: PLC0415  only for these figures
+
+    motors = set(known_motors(robot))
+    motor = motors.pop()
+    if motor is None or motors:
+        return float("nan"), None
+    return motor.torque_constant_n_m_a, Winding(motor.resistance_ohm, motor.back_emf_v_s)

@@ -1,0 +1,60 @@
+"""Joint angles over time of a recording, for one robot."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.archive import read_arrays
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.track.readers.load import load_track
+from snakewalk.controller.track.slowing import CUT_CYCLES
+from snakewalk.controller.track.wave import measure_wave
+
+
+def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
+    """Read times (T,) and joint angles (T, J): of the file itself, or of its midlines.
+
+    Midlines shake from frame to frame; their joints are smoothed, well above the wave's frequency.
+
+    Raises:
+        InputError: no such recording, or made for another robot.
+
+    """
+    stored = _stored_joints(track, robot)
+    if stored is not None:
+        return stored
+    recording = load_track(track)
+    if recording.frames < 2:
+        raise InputError(f"{track}: one frame is no motion")
+    joints = Retarget(robot).joints_rad(recording.angles_rad)
+    known_s = recording.time_s - recording.time_s[0]
+    time_s = np.arange(0.0, known_s[-1] + 0.5 / recording.rate_hz, 1.0 / recording.rate_hz)
+    even = np.stack([np.interp(time_s, known_s, column) for column in joints.T], axis=1)
+    wave_hz = measure_wave(recording).frequency_hz
+    if wave_hz > 0.0:
+        width = recording.rate_hz / (2.0 * np.pi * CUT_CYCLES * wave_hz)
+        even = gaussian_filter1d(even, width, axis=0, mode="nearest")
+    return time_s, even
+
+
+def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
+    """Joint angles that a synthesis wrote beside its midlines; None where there are none."""
+    if Path(track).suffix != ".npz" or not Path(track).is_file():
+        return None
+    try:
+        held, _ = read_arrays(Path(track), {"joints_rad", "rate_hz", "robot"})
+        if len(held) < 3:
+            return None
+        joints = np.asarray(held["joints_rad"], dtype=float)
+        rate_hz, name = float(held["rate_hz"]), str(held["robot"])
+    except (TypeError, ValueError, OSError):
+        return None  # load_track raises with the reason
+    if name != robot.name or joints.ndim != 2 or len(joints) < 2:
+        return None
+    if not (np.isfinite(joints).all() and 0.0 < rate_hz < np.inf):
+        raise InputError(f"{track}: joints_rad and rate_hz must be finite, and the rate above 0 Hz")
+    return np.arange(len(joints)) / rate_hz, joints

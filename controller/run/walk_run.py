@@ -1,0 +1,336 @@
+"""A run of the snake walk: recording, library of shapes, path, pilot, forecast and margins."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.kinematics.roll_compensation import RollCompensation
+from snakewalk.controller.mechanics.ground_step import bridged
+from snakewalk.controller.mechanics.pitch_fit import PitchFitter
+from snakewalk.controller.mechanics.rollout import Rollout
+from snakewalk.controller.mechanics.traction import quasi_static_gain
+from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.run.prepared_run import PathRun, pose_with
+from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
+from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
+from snakewalk.controller.terrain.growing_map import GrowingMap
+from snakewalk.controller.terrain.map_planner import MapPlanner
+from snakewalk.controller.track.readers.load import load_track
+from snakewalk.controller.walk.course import Course, PathPlanner
+from snakewalk.controller.walk.joint_track import JointTrack
+from snakewalk.controller.walk.map_walk import MapWalk
+from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
+from snakewalk.controller.walk.predictive_walker import PredictiveWalker
+from snakewalk.controller.walk.serpenoid import Serpenoid
+from snakewalk.controller.walk.shape_filters import MADE, passes_all, shape_filters
+from snakewalk.controller.walk.side_roll import RollPlanner, SideRolls
+from snakewalk.controller.walk.steering import Steering
+from snakewalk.controller.walk.time_law import TimeLaw
+from snakewalk.controller.walk.walker import Walker
+
+POINTS = 100
+_BRIDGED_LINKS = 4.0
+"""Radius of the ball that bridges the ground, over a link's length (ours): steps of 4 cm are passed
+in 41 s with 4, in 49 s with 1, by one of eight bodies not with 0."""
+
+_ROLLING_A = 0.3
+"""Goal current of pitch joints that roll a body up a slope of 18 degrees (ours, decision 37)."""
+
+
+@dataclass(frozen=True)
+class WalkRun(PathRun):
+    """A ``PreparedRun`` of the snake walk, or of the serpenoid, along a path."""
+
+    @cached_property
+    def bridged(self) -> HeightField | None:
+        """The ground as far as a chain of stiff links can follow it."""
+        return None if self.ground_ahead is None else self._bridged(self.ground_ahead)
+
+    def _bridged(self, ground: HeightField) -> HeightField:
+        return bridged(ground, _BRIDGED_LINKS * self.robot.mean_link_length_m)
+
+    @cached_property
+    def ground_map(self) -> GrowingMap | None:
+        """The map that a run over unknown ground makes; each run begins with an empty one."""
+        if self.run.mapping is None or self.ground is None:
+            return None
+        return GrowingMap.over(self.ground, self.run.mapping.spacing_m)
+
+    @cached_property
+    def retarget(self) -> Retarget:
+        """Skeleton to joints."""
+        return Retarget(self.robot, POINTS)
+
+    @cached_property
+    def shape_filters(self) -> dict[str, ShapeFilter]:
+        """Tests of a shape: turn, joints in range, no self-contact, traction."""
+        return shape_filters(self.robot, self.world.friction, self.run.states, POINTS)
+
+    @cached_property
+    def library(self) -> StateLibrary:
+        """Shapes that this robot can make, that do not touch themselves, and that push."""
+        states = self.run.states
+        return build_library(
+            load_track(self.run.track).angles_rad,
+            self.shape_filters,
+            coefficients=states.coefficients,
+            random_count=states.random_count,
+            curvature=self.run.behaviour.curvature,
+            rng=np.random.default_rng(self.run.seed),
+        )
+
+    @cached_property
+    def pitch_fitter(self) -> PitchFitter:
+        """Fits the pitch joints to the ground; on a level floor they stay at 0."""
+        return PitchFitter(self.robot, self.bridged, self.run.walk.pitch.fit_gain)
+
+    @cached_property
+    def gain(self) -> float:
+        """Predicted speed over pulse speed: the quasi-static gain, mean over the shapes used.
+
+        On level ground the simulated body makes 0.91 to 0.99 of it, on hills 0.67 to 0.77 (measured
+        over the shipped runs, docs/method.md).
+        """
+        if self.run.motion == "serpenoid":
+            shape = self._chooser().track.body_rad(float(POINTS))
+            return float(quasi_static_gain(shape, self.world.friction)[0])
+        some = self.library.shapes_rad[:: max(1, len(self.library.shapes_rad) // 50)]
+        return float(quasi_static_gain(some, self.world.friction).mean())
+
+    @property
+    def pulse_segments_s(self) -> float:
+        """How fast the shape shall travel along the body."""
+        behaviour = self.run.behaviour
+        return behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * POINTS
+
+    def initial_pose(self) -> InitialPose:
+        """Return the pose in which a simulated robot is put on the ground.
+
+        It is straight on a flat floor. On a slope a straight body, round below, rolls like a log,
+        so there it has its first shape.
+        """
+        if self.ground is None:
+            return InitialPose(self.start_heading_rad, np.zeros(self.robot.joint_count))
+        return pose_with(self.robot, self.start_heading_rad, self.pilot(level=True).goal_rad())
+
+    def pilot(self, *, level: bool = False) -> Pilot:
+        """Make a fresh pilot; the same configuration and seed give the same one.
+
+        ``level`` leaves the pitch joints at 0, whatever the ground.
+        """
+        return self._pilot(self._chooser(), level=level)
+
+    def _pilot(
+        self,
+        chooser: ShapeChooser,
+        *,
+        level: bool = False,
+        planner: PathPlanner | None = None,
+        fitter: PitchFitter | None = None,
+    ) -> Pilot:
+        run, robot = self.run, self.robot
+        time_law = TimeLaw(
+            JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
+            self.pulse_segments_s,
+            speed_limit_rad_s=robot.joint_speed_limit_rad_s,
+            acceleration_limit_rad_s2=robot.joint_acceleration_limit_rad_s2,
+        )
+        return Pilot(
+            chooser,
+            time_law,
+            pace=Pace.limit(robot),
+            course=Course(
+                planner or self.planner,
+                run.waypoints_m,
+                start_m=np.array(run.start_m),
+                radius_m=run.waypoint_radius_m,
+                length_m=robot.length_m,
+                travel_per_body=chooser.track.points,
+                travel=time_law.head,
+                feedback=run.motion != "walk-blind",
+            ),
+            pitch_fitter=None if level or self.ground is None else fitter or self.pitch_fitter,
+            pitch_lead_s=robot.servo.pitch_lead_s,
+            roll=None if level or not robot.pitch_joints else RollCompensation(robot),
+            fall_back=(
+                chooser.fall_back
+                if isinstance(chooser, PredictiveWalker) and run.walk.fallback
+                else None
+            ),
+            length_m=robot.length_m,
+            carrot_m=run.walk.carrot_m,
+            feedback=run.motion != "walk-blind",
+            aim_at_waypoint=run.motion == "walk-printed",
+        )
+
+    def forecast(self) -> Forecast:
+        """Run the plan on paper, and refuse it if a joint would be driven beyond its limits.
+
+        Raises:
+            InputError: one line per joint and limit.
+
+        """
+        plan = forecast(
+            self.pilot(level=True),
+            self.robot,
+            self.world.friction,
+            start_m=np.array(self.run.start_m),
+            heading_rad=self.start_heading_rad,
+            ground=self.ground_ahead,
+            limit_s=self.run.time_limit_s,
+        )
+        faults = margin_faults(plan, self.robot)
+        if faults:
+            raise InputError(faults)
+        return plan
+
+    def check_plan(self) -> PlanSummary:
+        """Forecast the run and summarise it for the log.
+
+        Raises:
+            InputError: the plan drives a joint beyond its limits, one line per joint and limit.
+
+        """
+        ahead = self.forecast()
+        return PlanSummary(
+            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
+            waypoints_m=np.array(self.run.waypoints_m),
+            waypoint_radius_m=self.run.waypoint_radius_m,
+            predicted_speed_m_s=self.gain * ahead.pulse_m / ahead.duration_s,
+            states=None if self.run.motion == "serpenoid" else self.library.counts,
+        )
+
+    def make_source(self, on_event: OnEvent) -> MotionSource:
+        """Return a fresh pilot; it warns where the recording has no part in the walk."""
+        for line in self.warnings:
+            on_event("shapes", line)
+        if self.ground_map is not None:
+            return self._map_walk(self.ground_map)
+        chooser = self._chooser()
+        pilot = self._pilot(chooser)
+        if not isinstance(chooser, PredictiveWalker) or self.bridged is None or not self._rolls:
+            return pilot
+        relief = self.planner.relief
+        return SideRolls(
+            pilot,
+            chooser,
+            self.robot,
+            RollPlanner(
+                self.robot,
+                self.bridged,
+                lambda point_m: relief is None or bool(relief.safe(*point_m)),
+            ),
+            climb_progress=self.run.walk.climb_progress,
+            pulse_m_s=self.pulse_segments_s * self.robot.length_m / POINTS,
+            on_event=on_event,
+        )
+
+    def _map_walk(self, ground_map: GrowingMap) -> MapWalk:
+        """A walk on the map as it is, and as it grows."""
+        planner = MapPlanner(self.world.planner)
+        ground = ground_map.height_field()
+        rollout = self._rollout()
+        if ground is not None:
+            planner.update(ground)
+        fitter = PitchFitter(self.robot, None, self.run.walk.pitch.fit_gain)
+        pilot = self._pilot(self._chooser(rollout), planner=planner, fitter=fitter)
+
+        def change_ground(ground: HeightField) -> None:
+            smooth = self._bridged(ground)
+            rollout.change_ground(smooth)
+            fitter.change_ground(smooth)
+
+        if ground is not None:
+            change_ground(ground)
+        assert self.run.mapping is not None
+        return MapWalk(
+            pilot,
+            ground_map,
+            planner,
+            change_ground=change_ground,
+            replan_m=self.run.mapping.replan_bodies * self.robot.length_m,
+        )
+
+    def _rollout(self) -> Rollout:
+        return Rollout(self.robot, self.world.friction, self.bridged, POINTS)
+
+    @property
+    def _rolls(self) -> bool:
+        """Whether the body may roll sideways: it has to be round, on joints that carry it.
+
+        A mast would lie under it.
+        """
+        robot = self.robot
+        if not robot.pitch_joints or robot.belly.shape == "rails" or robot.stereo_head is not None:
+            return False
+        carried_a = min(robot.current_limits_a[joint] for joint in robot.pitch_joints)
+        return self.run.walk.rolls and carried_a >= _ROLLING_A
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user would not expect of the path and the shapes, one line each."""
+        behaviour, lines = self.run.behaviour, []
+        pulse_m_s = behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * self.robot.length_m
+        if self.path.length_m > pulse_m_s * self.run.time_limit_s:
+            lines.append(
+                f"a path of {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s takes "
+                f"{self.path.length_m / pulse_m_s:.0f} s at least, but time_limit_s is "
+                f"{self.run.time_limit_s:g}: it will not be walked to its end"
+            )
+        if self.run.mapping is not None:
+            lines.append(
+                "the ground is not known before the run: the plan on paper is that of a level floor"
+            )
+        if self.run.motion == "serpenoid":
+            return tuple(lines)
+        if self.run.behaviour.curvature is None and self.library.curvature > 1.0:
+            lines.append(
+                f"every bend is {self.library.curvature:g} times as wide as recorded: this "
+                "ground's friction leaves narrower ones no hold (behaviour.curvature)"
+            )
+        if not self.library.recorded:
+            lines.append(self._no_recorded)
+        return tuple(lines)
+
+    @property
+    def _no_recorded(self) -> str:
+        """Why no shape is the animal's."""
+        return (
+            f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
+            f"walk is made of {len(self.library.shapes_rad)} random ones "
+            f"(why: snakewalk track {self.run.track})"
+        )
+
+    def walker(self, library: StateLibrary, filters: Mapping[str, ShapeFilter]) -> Walker:
+        """Make a fresh walk by the graph alone over a library, as this run sets it."""
+        walk = self.run.walk
+        if self.run.motion == "walk-printed":
+            walk = walk.model_copy(update={"decision_fraction": 1.0, "ramp_limit_rad": 0.0})
+        return Walker(self._shuffled(library), walk, passes_all(filters))
+
+    def _shuffled(self, library: StateLibrary) -> Floats:
+        """Shapes (S, N) in an order that is the seed's: W settles ties by the order."""
+        order = np.random.default_rng(self.run.seed).permutation(len(library.shapes_rad))
+        return np.asarray(library.shapes_rad[order])
+
+    def _chooser(self, rollout: Rollout | None = None) -> ShapeChooser:
+        if self.run.motion == "serpenoid":
+            return Aimed(Serpenoid(POINTS))
+        if self.run.motion != "walk":
+            return Aimed(self.walker(self.library, self.shape_filters))
+        predicts = rollout or self._rollout()
+        return PredictiveWalker(
+            self._shuffled(self.library),
+            self.run.walk,
+            lambda track: Steering(predicts, track, self.pulse_segments_s),
+            len(self.robot.yaw_joints),
+            passes_all({name: self.shape_filters[name] for name in MADE}),
+        )

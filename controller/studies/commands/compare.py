@@ -1,0 +1,102 @@
+"""``snakewalk compare``: several runs side by side, from their logs."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Column, Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+
+if TYPE_CHECKING:
+    from snakewalk.controller.studies.run_comparison import ComparedRun
+
+_LONGEST = 44
+"""Characters of a value in the table."""
+
+
+def compare(
+    logs: Annotated[list[Path], typer.Argument(help="log.mcap of two runs or more")],
+    picture: Annotated[
+        Path | None, typer.Option(help="tracks and curves over each other: .png, .svg or .pdf")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Put runs side by side: their numbers, and what differs in run, robot and world."""
+    if len(logs) < 2:
+        raise InputError(f"{logs[0]}: one log is compared with nothing; give two or more")
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+    from snakewalk.controller.studies.run_comparison import (  # noqa: PLC0415  heavy; --help stays quick
+        compared_run,
+        differing,
+        log_names,
+    )
+
+    runs = []
+    for log, name in zip(logs, log_names(logs), strict=True):
+        record = read_log(log)
+        if record.note:
+            LOGGER.warning("%s: %s", log, record.note)
+        runs.append(compared_run(record, name))
+    if picture is not None:
+        from snakewalk.controller.studies.plots.run_comparison import (  # noqa: PLC0415  an extra
+            draw_comparison,
+        )
+
+        draw_comparison(runs, picture)
+    changed = differing(runs)
+    if as_json:
+        told = zip(logs, runs, strict=True)
+        summaries = [{"log": str(log)} | run.summary.to_dict() for log, run in told]
+        drawn = None if picture is None else str(picture)
+        print(json.dumps({"summaries": summaries, "differing": changed, "picture": drawn}))
+        return
+    _print_tables(runs, changed)
+
+
+def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> None:
+    """What differs in the configurations, then the numbers that at least one run has."""
+    settings = Table(
+        "setting", *_columns(runs), box=None, title="What differs", title_justify="left"
+    )
+    for key, values in changed.items():
+        settings.add_row(key, *map(_text, values))
+    if changed:
+        console.print(settings, "")
+    else:
+        console.print("Run, robot and world are the same.\n")
+    numbers = Table(
+        "number", *_columns(runs), box=None, title="What came of it", title_justify="left"
+    )
+    for key in runs[0].summary.to_dict():
+        values = [run.summary.to_dict()[key] for run in runs]
+        told = any(value not in (None, "") for value in values)
+        if told and not isinstance(values[0], dict) and key not in {"config_hash", "software"}:
+            numbers.add_row(key.replace("_", " "), *map(_text, values))
+    console.print(numbers)
+
+
+def _columns(runs: "list[ComparedRun]") -> list[Column]:
+    """Columns of the runs, whose names are not cut: they differ at their ends."""
+    return [Column(run.name, overflow="fold") for run in runs]
+
+
+def _text(value: Any) -> str:
+    """A value for a reader; numbers to five digits, a long list cut."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, list | tuple):
+        text = f"[{', '.join(map(_text, value))}]"
+        return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
+    return str(value)

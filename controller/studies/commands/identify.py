@@ -1,0 +1,390 @@
+"""``snakewalk identify``: constants of a servo from recordings, friction of the belly from runs."""
+
+import json
+import math
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json, Robot, World, check_files, console
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+if TYPE_CHECKING:
+    from snakewalk.config.robot import RobotConfig
+    from snakewalk.config.world import FrictionConfig, WorldConfig
+    from snakewalk.controller.studies.identification.friction_fit import (
+        Found,
+        FrictionFit,
+        FrictionLog,
+    )
+    from snakewalk.controller.studies.identification.servo_constants import ServoConstants
+
+
+class _RobotFile(NamedTuple):
+    """A robot to be written with what is found of it."""
+
+    before: "RobotConfig"
+    out: Path
+
+
+class _Outs(NamedTuple):
+    """Files for what logs of runs tell: of the ground, and of the robot."""
+
+    world: Path | None
+    robot: Path | None
+
+
+def identify(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="recordings of one servo with a pendulum (BAM's raw JSON), or logs of one robot's "
+            "runs (.mcap)"
+        ),
+    ],
+    judge: Annotated[
+        list[Path] | None, typer.Option(help="a recording only to be judged on; again for more")
+    ] = None,
+    start: Annotated[
+        Path | None, typer.Option(help="constants to begin with, as BAM writes them")
+    ] = None,
+    fit: Annotated[
+        bool, typer.Option("--fit/--no-fit", help="fit, or only judge the constants of --start")
+    ] = True,
+    seed: Annotated[int, typer.Option(min=0, help="of the search")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="write constants as BAM's JSON, or friction as a world's TOML",
+        ),
+    ] = None,
+    world: World = None,
+    robot: Robot = None,
+    robot_out: Annotated[
+        Path | None,
+        typer.Option(
+            help="write the robot with what is found of it, for its next runs: --robot with a "
+            "servo's constants, or the robot of a run's log with its mass"
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="processes, for logs of runs")] = 2,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Find a servo's constants from its pendulum, or friction and mass from logs of runs.
+
+    Of a servo: resistance, torque constant, friction, inertia and P unit. Of runs: friction along
+    and across the body, on the ground --world (default: the logs'), and with --robot-out the mass
+    of the links, from gaits that lift them. All with 95 % intervals.
+    """
+    judge = judge or []
+    of_runs = [path for path in (*logs, *judge) if _is_run(path)]
+    if of_runs:
+        if len(of_runs) < len(logs) + len(judge):
+            raise InputError(
+                "logs of runs (.mcap) and recordings of a pendulum tell different things: give one "
+                "kind at a time"
+            )
+        if start is not None or not fit:
+            raise InputError("--start and --no-fit are of pendulums; for a run's log take --world")
+        if robot is not None:
+            raise InputError(
+                "--robot is whose servo swings a pendulum; the robot of a run is in its log (.mcap)"
+            )
+        outs = _Outs(out, robot_out)
+        _friction(logs, judge, world, outs, force=force, workers=workers, as_json=as_json)
+        return
+    if world is not None:
+        raise InputError("--world is the ground of a run's log (.mcap); a pendulum has none")
+    robot_file = _robot_file(robot, robot_out)
+    _servo(logs, judge, start, out, robot_file, fit=fit, seed=seed, force=force, as_json=as_json)
+
+
+def _is_run(path: Path) -> bool:
+    return ".mcap" in path.suffixes
+
+
+def _robot_file(robot: str | None, out: Path | None) -> _RobotFile | None:
+    if robot is None and out is None:
+        return None
+    if robot is None or out is None:
+        raise InputError(
+            "--robot ROBOT and --robot-out FILE go together: the robot, and the file to write it "
+            "to with the constants"
+        )
+    _check_robot_out(out)
+    from snakewalk.config.loader import load_robot  # noqa: PLC0415  heavy; --help stays quick
+
+    return _RobotFile(load_robot(robot), out)
+
+
+def _check_robot_out(out: Path | None) -> None:
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: --robot-out is a robot's file; end its name with .toml")
+
+
+def _read_runs(
+    paths: list[Path], judge: list[Path], given: "WorldConfig | None", *, lifting: bool
+) -> "dict[Path, FrictionLog]":
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+    from snakewalk.controller.studies.identification.friction_fit import FrictionLog  # noqa: PLC0415  heavy
+
+    logs = {}
+    for path in (*paths, *judge):
+        record = read_log(path)
+        if record.note:
+            LOGGER.warning("%s: %s", path, record.note)
+        try:
+            logs[path] = FrictionLog.of(record, given)
+            if lifting and path in paths:
+                logs[path].check_lifts()
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    first = next(iter(logs.values())).goals
+    for path, log in logs.items():
+        if log.goals.robot != first.robot or log.goals.world.friction != first.world.friction:
+            raise InputError(
+                f"{path}: is of another robot or another friction than {paths[0]}; give logs of "
+                "one robot, and --world WORLD if their worlds differ"
+            )
+    return logs
+
+
+def _friction(
+    paths: list[Path],
+    judge: list[Path],
+    world: str | None,
+    outs: _Outs,
+    *,
+    force: bool,
+    workers: int,
+    as_json: bool,
+) -> None:
+    from snakewalk.config.loader import checked, load_world  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.config.template import template  # noqa: PLC0415
+    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
+    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.studies.identification.friction_fit import fit_friction  # noqa: PLC0415
+
+    require_extra("friction from a run's log needs", "mujoco")
+    refuse_to_overwrite(outs, force)
+    _check_robot_out(outs.robot)
+    out = outs.world
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: friction is written as a world's file; end its name with .toml")
+    check_files(None, None, world)
+    given = None if world is None else load_world(world)
+    logs = _read_runs(paths, judge, given, lifting=outs.robot is not None)
+    first = logs[paths[0]].goals
+    name = first.world.name if out is None else out.stem
+    ground = checked(WorldConfig, first.world.model_dump() | {"name": name}, str(out))
+    with ProgressBar("friction", transient=True) as bar:
+        found = fit_friction(
+            [logs[path] for path in paths],
+            mass=outs.robot is not None,
+            workers=workers,
+            on_progress=bar.update,
+        )
+    if out is not None:
+        with atomic_write(out) as part:
+            text = template(found.world(ground), "\n".join(found.comment(paths)))
+            part.write_text(text, encoding="utf-8")
+    if found.mass is not None and outs.robot is not None:
+        _write_mass(outs.robot, first.robot, found.mass, paths)
+    kept = found.world(ground).friction
+    _tell_friction(found, kept, logs, paths, outs, as_json=as_json)
+
+
+def _tell_friction(
+    found: "FrictionFit",
+    kept: "FrictionConfig",
+    logs: "dict[Path, FrictionLog]",
+    paths: list[Path],
+    outs: _Outs,
+    *,
+    as_json: bool,
+) -> None:
+    first, out = logs[paths[0]].goals, outs.world
+    told = first.world.friction
+    errors = {str(path): (log.errors(told), log.errors(kept)) for path, log in logs.items()}
+    settings = [
+        f"world.friction.{key}={getattr(kept, key):.4g}"
+        for key in ("along", "across", "back")
+        if key in found.found
+    ]
+    fitted = {str(path) for path in paths}
+    if as_json:
+        result = {
+            "friction": {key: one.value for key, one in found.found.items()},
+            "interval_95": {key: [one.low, one.high] for key, one in found.found.items()},
+            "not_told": [key for key, one in found.found.items() if not one.determined],
+            "settings": settings,
+            "errors": {
+                log_name: {
+                    "way_mm": [round(1e3 * way_m, 3) for way_m, _ in both],
+                    "turn_deg": [round(math.degrees(turn_rad), 3) for _, turn_rad in both],
+                }
+                for log_name, both in errors.items()
+            },
+            "fitted": [log_name for log_name in errors if log_name in fitted],
+            "out": out and str(out),
+        }
+        if found.mass is not None:
+            mass = found.mass.times(_spine_kg(first.robot))
+            result |= {"mass_kg": mass.value, "mass_interval_95_kg": [mass.low, mass.high]}
+            result["robot_out"] = str(outs.robot)
+        print(json.dumps(result))
+        return
+    table = Table("friction", "value", "95 % interval", "", box=None)
+    for key, one in found.found.items():
+        note = "" if one.determined else "these logs do not tell it"
+        interval = f"{one.low:.4g} to {one.high:.4g}"
+        table.add_row(key.replace("_", " "), f"{one.value:.4g}", interval, note)
+    console.print(table)
+    for log_name, ((before_m, before_rad), (after_m, after_rad)) in errors.items():
+        console.print(
+            f"{log_name}: in a second {1e3 * before_m:.1f} mm and {math.degrees(before_rad):.1f} "
+            f"degrees off with the friction of {first.world.name}, {1e3 * after_m:.1f} mm and "
+            f"{math.degrees(after_rad):.1f} degrees with this"
+            f"{'' if log_name in fitted else ' (not fitted)'}"
+        )
+    console.print(" ".join(f"--set {one}" for one in settings), soft_wrap=True)
+    if found.mass is not None:
+        mass = found.mass.times(_spine_kg(first.robot))
+        console.print(
+            f"{outs.robot}: the links weigh {mass.value:.4g} kg, 95 % of {mass.low:.4g} to "
+            f"{mass.high:.4g}; {first.robot.name} has {_spine_kg(first.robot):.4g}",
+            soft_wrap=True,
+        )
+
+
+def _spine_kg(robot: "RobotConfig") -> float:
+    return robot.mean_link_mass_kg * robot.link_count
+
+
+def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path]) -> None:
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.studies.identification.friction_fit import with_mass  # noqa: PLC0415
+
+    after = with_mass(robot, float(f"{mass.value:.4g}")).model_copy(update={"name": out.stem})
+    comment = (
+        f"Mass found by `snakewalk identify` from {', '.join(map(str, paths))}:\n"
+        f"{mass.value:.4g} times that of {robot.name}, 95 % of {mass.low:.4g} to {mass.high:.4g}"
+    )
+    with atomic_write(out) as part:
+        part.write_text(robot_toml(after, comment), encoding="utf-8")
+
+
+def _servo(
+    logs: list[Path],
+    judge: list[Path],
+    start: Path | None,
+    out: Path | None,
+    robot_file: _RobotFile | None,
+    *,
+    fit: bool,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.studies.identification.pendulum_fit import (  # noqa: PLC0415  heavy; --help stays quick
+        error_deg,
+        fit_pendulum,
+        robot_error_deg,
+    )
+    from snakewalk.controller.studies.identification.pendulum_log import read_pendulum_log  # noqa: PLC0415
+    from snakewalk.controller.studies.identification.servo_constants import (  # noqa: PLC0415
+        CONSTANTS,
+        bam_text,
+        check_servo,
+        read_bam,
+    )
+
+    if not fit and start is None:
+        raise InputError("--no-fit judges constants: give them with --start FILE")
+    refuse_to_overwrite([out, robot_file and robot_file.out], force)
+    fitted = [read_pendulum_log(path) for path in logs]
+    judged = [read_pendulum_log(path) for path in judge]
+    found = None if start is None else read_bam(start)
+    if len({log.actuator for log in (*fitted, *judged)}) > 1:
+        names = ", ".join(sorted({log.actuator or "?" for log in (*fitted, *judged)}))
+        raise InputError(f"the recordings are of several servos: {names}; give those of one")
+    if robot_file is not None:  # before a minute of fits, whether the servo is the robot's
+        check_servo(robot_file.before, fitted[0].actuator if found is None else found.actuator)
+    if fit or found is None:
+        with ProgressBar("fits", transient=True) as bar:
+            found = fit_pendulum(fitted, found, seed=seed, on_progress=bar.update)
+    if out is not None:
+        with atomic_write(out) as part:
+            part.write_text(bam_text(found), encoding="utf-8")
+    forecasts = {}
+    if robot_file is not None:
+        after = _write_robot(robot_file, found, logs)
+        forecasts = {
+            str(log.path): [
+                round(robot_error_deg(robot, log, found), 3) for robot in (robot_file.before, after)
+            ]
+            for log in (*fitted, *judged)
+        }
+    errors = {
+        str(log.path): (round(error_deg(found, log), 3), fit and k < len(fitted))
+        for k, log in enumerate((*fitted, *judged))
+    }
+    mean_deg = round(fmean(error for error, _ in errors.values()), 3)
+    rows = list(zip(CONSTANTS, found.values, found.low, found.high, strict=True))
+    if as_json:
+        result = {
+            "actuator": found.actuator,
+            "constants": {c.name: float(value) for c, value, _, _ in rows},
+            "interval_95": {
+                c.name: [float(low), float(high)] for c, _, low, high in rows if math.isfinite(low)
+            },
+            "mean_error_deg": mean_deg,
+            "errors_deg": {path: error for path, (error, _) in errors.items()},
+            "fitted": [path for path, (_, used) in errors.items() if used],
+            "out": out and str(out),
+        }
+        if robot_file is not None:
+            result |= {"robot_out": str(robot_file.out), "robot_errors_deg": forecasts}
+        print(json.dumps(result))
+        return
+    table = Table("constant", "value", "95 % interval", box=None)
+    for constant, value, low, high in rows:
+        interval = f"{low:.4g} to {high:.4g}" if math.isfinite(low) else "-"
+        table.add_row(constant.name.replace("_", " "), f"{value:.4g}", interval)
+    console.print(table)
+    for path, (error, used) in errors.items():
+        console.print(
+            f"{path}: {error:.2f} degrees off on average{'' if used else ' (not fitted)'}"
+        )
+    console.print(f"mean {mean_deg:.2f} degrees")
+    if robot_file is not None:
+        before_deg, after_deg = (fmean(each) for each in zip(*forecasts.values(), strict=True))
+        console.print(
+            f"{robot_file.out}: its simulated servo is {after_deg:.2f} degrees off on average, "
+            f"that of {robot_file.before.name} {before_deg:.2f}",
+            soft_wrap=True,
+        )
+
+
+def _write_robot(file: _RobotFile, found: "ServoConstants", logs: list[Path]) -> "RobotConfig":
+    from snakewalk.config.loader import with_keys  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.config.template import robot_toml  # noqa: PLC0415
+    from snakewalk.controller.studies.identification.servo_constants import (  # noqa: PLC0415
+        robot_comment,
+        robot_with,
+    )
+
+    after = with_keys(robot_with(file.before, found), {"name": file.out.stem}, str(file.out))
+    with atomic_write(file.out) as part:
+        part.write_text(robot_toml(after, robot_comment(found, logs)), encoding="utf-8")
+    return after

@@ -1,0 +1,54 @@
+"""``snakewalk replay``: a log run again on the simulator, and where it differs."""
+
+import json
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.result_files import refuse_to_overwrite
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on metal")],
+    tolerance_rad: Annotated[
+        float, typer.Option(min=0.0, help="of a measured joint; default: one encoder step")
+    ] = 0.0016,
+    tolerance_m: Annotated[
+        float, typer.Option(min=0.0, help="of the head, where its pose was measured")
+    ] = 0.002,
+    out: Annotated[Path | None, typer.Option(help="keep the replay's log here")] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Send a log's commands to simulated servos again; exit code 1 where the answers differ."""
+    if out is not None and out.resolve() == log.resolve():
+        raise InputError(f"{out}: is the log itself; give another name")
+    refuse_to_overwrite([out], force)
+
+    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+    from snakewalk.controller.studies import replay as replaying  # noqa: PLC0415  heavy
+
+    require_extra("a replay needs", "mujoco")
+    record = read_log(log)
+    if record.note:
+        LOGGER.warning("%s: %s", log, record.note)
+    with TemporaryDirectory() as folder, ProgressBar("replay") as bar:
+        file = Path(folder) / "replay.mcap" if out is None else out
+        again = read_log(replaying.replay(record, file, on_progress=bar.update))
+    comparison = replaying.differences(record, again, tolerance_rad, tolerance_m)
+    if as_json:
+        print(
+            json.dumps({"log": str(log), "backend": record.header.backend} | comparison.to_dict())
+        )
+    else:
+        for line in comparison.lines():
+            console.print(line)
+    if not comparison.same:
+        raise SystemExit(1)

@@ -1,0 +1,44 @@
+"""``snakewalk shadow``: what differs between a robot, by its log, and the simulator."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Json, World, check_files, console
+
+
+def shadow(
+    log: Annotated[Path, typer.Argument(help="log.mcap of a run, on metal or simulated")],
+    world: World = None,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Send a log's goals to a simulated robot, and name the cause of what differs; 1 if one is."""
+    from snakewalk.config.loader import load_world  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+    from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of  # noqa: PLC0415
+
+    require_extra("a shadow needs", "mujoco")
+    check_files(None, None, world)
+    record = read_log(log)
+    if record.note:
+        LOGGER.warning("%s: %s", log, record.note)
+    robot = record.header.robot
+    goals, measured = goals_of(record, None if world is None else load_world(world))
+    with ProgressBar("shadow", transient=True) as bar:
+        found = diagnose(goals, measured, workers=workers, on_progress=bar.update)
+    if as_json:
+        print(json.dumps({"log": str(log), "text": found.text(robot)} | found.to_dict(robot)))
+    else:
+        console.print(found.text(robot))
+        for cause in found.causes[1:4] if found.named else ():
+            console.print(
+                f"  less likely by e^{found.evidence_over(cause):.0f}: {cause.text(robot)}"
+            )
+    if found.named is not None:
+        raise SystemExit(1)

@@ -1,0 +1,120 @@
+"""``snakewalk sweep``: gaits on the physics over many parameters."""
+
+import json
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json, Set, console, key_values
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+
+_HEADS = {
+    "points": "n",
+    "default_bl_cycle": "BL a\ncycle",
+    "most_bl_cycle": "most",
+    "default_pace": "pace",
+    "most_pace": "most",
+    "pace": "",
+    "default_cost": "cost",
+    "least_cost": "least",
+    "peak_torque_n_m": "N m",
+    "default_slip": "slip",
+}
+"""Columns of the printed table, units under the names; the JSON has them all."""
+
+
+def sweep(
+    gaits: Annotated[
+        list[str] | None,
+        typer.Argument(help="default: all", metavar="GAIT", autocompletion=completion.GAITS),
+    ] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="may be given again; default: yaw16 and alternating16",
+            autocompletion=completion.ROBOTS,
+        ),
+    ] = None,
+    set_: Set = None,
+    points: Annotated[int, typer.Option(min=1, max=100_000, help="of each gait and robot")] = 30,
+    seconds: Annotated[float, typer.Option(min=4.0, max=3600.0, help="of each run")] = 12.0,
+    seed: Annotated[int, typer.Option(min=0, help="of the choice of points")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    dask: Annotated[
+        str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="table; what it holds is not run again")
+    ] = Path("sweep.csv"),
+    picture: Annotated[
+        Path | None, typer.Option(help="draw the table here (.png, .svg, .pdf)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+    refuse_to_overwrite([out], force=True)  # a table grows
+    keys = key_values("--set", set_)
+
+    from snakewalk.controller.console.pool import each  # noqa: PLC0415
+    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
+    from snakewalk.controller.studies.sweep_measure import measure  # noqa: PLC0415
+    from snakewalk.controller.studies.sweep_points import plan_sweep  # noqa: PLC0415
+    from snakewalk.controller.studies.sweep_table import Table as Sweep  # noqa: PLC0415
+    from snakewalk.controller.studies.sweep_table import digest, read_table  # noqa: PLC0415
+
+    require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
+    planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds, keys=keys)
+    for line in () if as_json else planned.left_out:
+        console.print(f"left out: {line}", style="dim")
+    table = Sweep(out)
+    refused: Counter[str] = Counter()
+    missing = table.missing(planned.points)
+    with table:
+        for point, row in show_progress(
+            each(measure, missing, workers=workers, dask=dask),
+            str(out),
+            len(planned.points),
+            done=len(planned.points) - len(missing),
+            transient=False,
+        ):
+            table.add(point, row)
+            LOGGER.debug("%s", row)
+            if row.ended.startswith("refused"):
+                refused[row.ended] += 1
+    for why, times in refused.items():
+        LOGGER.warning("%d of %d points %s", times, len(missing), why)
+    held = read_table(out) if out.exists() else []
+    rows = [asdict(one) for one in digest(held)]
+    if picture is not None:
+        from snakewalk.controller.studies.plots.sweep import draw_sweep  # noqa: PLC0415
+
+        draw_sweep(held, picture)
+    if as_json:
+        found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
+        print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))
+    else:
+        _show(out, rows)
+    if missing and refused.total() == len(missing):
+        raise SystemExit(1)
+
+
+def _show(out: Path, rows: list[dict[str, Any]]) -> None:
+    console.print(str(out))
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    grid.add_column("gait, robot")
+    for key, head in _HEADS.items():
+        grid.add_column(head, justify="left" if key == "pace" else "right", no_wrap=True)
+    for one in rows:
+        named = f"{one['gait']} {one['robot']} {one['keys']}".rstrip()
+        grid.add_row(named, *["" if one[key] is None else str(one[key]) for key in _HEADS])
+    console.print(grid)

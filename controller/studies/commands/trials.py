@@ -1,0 +1,215 @@
+"""``snakewalk trials``: runs over seeds, motions, robots, worlds and steepnesses."""
+
+import json
+from contextlib import nullcontext
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import (
+    DEFAULT_RUN,
+    FirstSeed,
+    Force,
+    Json,
+    TrackFile,
+    console,
+)
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+
+_HEADS = {
+    "run": "run",
+    "robot": "robot",
+    "world": "world",
+    "motion": "motion",
+    "compliance": "com-\npliance",
+    "relief": "relief",
+    "slope_deg": "slope\ndeg",
+    "complete": "com-\nplete",
+    "first_pass": "first\npass",
+    "passed_by": "mis-\nses",
+    "truly_complete": "truly\nthere",
+    "head_error_m": "head\noff m",
+    "duration_s": "time\ns",
+    "speed_m_s": "speed\nm/s",
+    "speed_sd_m_s": "sd",
+    "path_error_m": "error\nm",
+    "path_error_max_m": "worst\nm",
+    "eta": "eta",
+    "cost_of_transport": "cost",
+    "in_air": "in\nair",
+    "roll_max_deg": "roll\ndeg",
+    "why": "why",
+}
+"""Columns of the table: the units stand under the names, so that the table stays narrow."""
+_TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
+
+
+def trials(
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help=f"shipped runs, RUN.toml, or gaits; default: {DEFAULT_RUN}",
+            metavar="RUN",
+            autocompletion=completion.RUNS_OR_GAITS,
+        ),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 20,
+    first_seed: FirstSeed = 0,
+    start_spread: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="of the start in x and y, m; 0: not moved")
+    ] = 0.04,
+    motion: Annotated[
+        list[str] | None,
+        typer.Option(help="may be given again; default: all", autocompletion=completion.MOTIONS),
+    ] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="may be given again; default: the run's", autocompletion=completion.ROBOTS
+        ),
+    ] = None,
+    relief: Annotated[
+        list[float] | None,
+        typer.Option(min=0.0, max=5.0, help="factor on the ground's heights; may be given again"),
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="values that a key of the run, robot or world takes, e.g. "
+            "run.cycle_hz=25,50; given again: every combination",
+            metavar="KEY=V1,V2",
+        ),
+    ] = None,
+    compliance: Annotated[
+        list[str] | None,
+        typer.Option(help="on, off: joints yield to current; may be given again"),
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=5.0, help="of a gait; default: 20")] = None,
+    world: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="may be given again; default: the run's", autocompletion=completion.WORLDS
+        ),
+    ] = None,
+    track: TrackFile = None,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="CSV of all runs; what it holds is not run again"),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="draw what was complete and why not (.png, .svg, .pdf)"),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Simulate runs or gaits over seeds; tabulate what was reached, and why not.
+
+    Each seed moves the start, so that its runs differ also where the motion takes no chances. A run
+    is the same for the same files: after an update of the program begin a new --out.
+    """
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+    refuse_to_overwrite([out], force=True)  # a table grows
+
+    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
+    from snakewalk.controller.run.factory import moves_by_gait  # noqa: PLC0415
+    from snakewalk.controller.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.studies.trials_table import TrialsTable  # noqa: PLC0415
+
+    require_extra("trials need", "mujoco")
+    motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
+    overs = [study.parse_over(text) for text in over or ()]
+    keys, axes = [key for key, _ in overs], [values for _, values in overs]
+    _check_keys(keys)
+    for word in compliance or ():
+        if word not in {"on", "off"}:
+            raise InputError(f"--compliance {word}: expected on or off")
+    moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs or [DEFAULT_RUN]}
+    cases = [
+        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c, w)
+        for run in runs or [DEFAULT_RUN]
+        for r in (robot if robot else (None,))
+        for w in (world if world else (None,))
+        for k in (relief if relief else (1.0,))
+        for m in moved_by[run]
+        for c in ([word == "on" for word in compliance] if compliance else (None,))
+        for values in product(*axes)
+    ]
+    cases = list(dict.fromkeys(cases))  # what is given twice is run once
+    if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
+        raise InputError(f"--track {track}: is of walks, and none is tried")
+    if seconds is not None and not any(case.is_gait for case in cases):
+        raise InputError(f"--seconds {seconds:g}: is of gaits; a run has run.time_limit_s (--over)")
+    changes = {"track": track, "seconds": seconds}
+    seen = range(first_seed, first_seed + seeds)
+    planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
+    table = None
+    if out is not None:
+        configs = {case: study.config_digest(case, changes) for case in cases}
+        table = TrialsTable(out, configs, start_spread)
+    found = table.finished(planned) if table else []
+    done = {(trial.case, trial.seed) for trial in found}
+    missing = [item for item in planned if item not in done]
+    with table or nullcontext():
+        some = study.trials(missing, workers, spread_m=start_spread, changes=changes)
+        for trial in show_progress(
+            some, str(out or "trials"), len(planned), done=len(found), transient=False
+        ):
+            found.append(trial)
+            LOGGER.debug("%s", trial)
+            if table:
+                table.add(trial)
+    summaries = study.table(found, cases)
+    if picture is not None:
+        from snakewalk.controller.studies.plots.trials import draw_trials  # noqa: PLC0415
+
+        draw_trials(summaries, picture)
+    rows = [asdict(one) for one in summaries]
+    if as_json:
+        settings = {"seeds": list(seen), "start_spread_m": start_spread}
+        print(json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in found]}))
+    else:
+        _print(rows, [key for key, values in overs if len(values) > 1])
+    if all(trial.cause == "refused" for trial in found):
+        raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _check_keys(keys: list[str]) -> None:
+    """Refuse a key that stands twice: its last value would replace the others.
+
+    Raises:
+        InputError: one does.
+
+    """
+    for place, key in enumerate(keys):
+        if key in keys[:place]:
+            raise InputError(f"--over {key}: given twice; put its values in one: {key}=V1,V2")
+
+
+def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
+    """Print the table; ``varied``: keys that become columns of their own."""
+    shown = [key for key in _HEADS if any(row[key] not in {"", None} for row in rows)]
+    if len({row["relief"] for row in rows}) == 1:
+        shown.remove("relief")
+    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    for key in varied:
+        grid.add_column("\n".join(key.split(".")[-2:]), justify="right", no_wrap=True)
+    for key in shown:
+        text = key in _TEXT
+        grid.add_column(
+            _HEADS[key], justify="left" if text else "right", no_wrap=not text, overflow="fold"
+        )
+    for row in rows:
+        values = [row["keys"][key] for key in varied] + [row[key] for key in shown]
+        grid.add_row(*["" if value is None else str(value) for value in values])
+    console.print(grid)

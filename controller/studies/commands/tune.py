@@ -1,0 +1,87 @@
+"""``snakewalk tune``: better parameters of a gait, found on the physics."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import Json, Robot, Set, key_values, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+
+def tune(
+    gait: Annotated[
+        str, typer.Argument(help="one of: snakewalk gait list", autocompletion=completion.GAITS)
+    ],
+    aim: Annotated[
+        Literal["speed", "efficiency"], typer.Option("--for", help="what to make better")
+    ] = "speed",
+    robot: Robot = None,
+    set_: Set = None,
+    budget: Annotated[int, typer.Option(min=16, help="runs of the search")] = 120,
+    seeds: Annotated[int, typer.Option(min=1, help="other grounds to compare on")] = 5,
+    seconds: Annotated[float, typer.Option(min=4.0, help="of each run")] = 10.0,
+    seed: Annotated[int, typer.Option(min=0, help="of the search")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="set of parameters for gait run (.toml)")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite")] = False,
+    as_json: Json = False,
+) -> None:
+    """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: a set of parameters ends in .toml")
+    refuse_to_overwrite([out], force)
+    keys = key_values("--set", set_)
+
+    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
+    from snakewalk.controller.gaits.gait import fitting_robot  # noqa: PLC0415
+    from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415
+    from snakewalk.controller.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
+    from snakewalk.controller.studies.sweep_points import robot_file  # noqa: PLC0415
+
+    require_extra("tuning needs", "mujoco")
+    body = robot or fitting_robot([make_gait(gait).needs])
+    body = robot_file(body) or body  # the set may lie in another folder
+    with ProgressBar(f"{gait} for {aim}", budget) as bar:
+        result = search.tune(
+            gait,
+            body,
+            aim,
+            budget=budget,
+            seeds=seeds,
+            seconds=seconds,
+            seed=seed,
+            workers=workers,
+            keys=keys,
+            on_progress=bar.update,
+        )
+        bar.update(budget)
+    facts: dict[str, object] = {
+        "gait": gait,
+        "robot": body,
+        "for": aim,
+        "runs": result.tried,
+        "default": [round(value, 4) for value in result.default],
+        "tuned": [round(value, 4) for value in result.best],
+        "better_by": f"{result.margin:.0%}",
+        "better_on": f"{result.wins} of {seeds} grounds",
+        "parameters": result.parameters,
+    }
+    if out is not None:
+        lines = [
+            f"# tuned for {aim}: {result.margin:+.0%} on {seeds} grounds",
+            *(f"# with {key} = {json.dumps(value)}" for key, value in keys.items()),
+            f"name = {json.dumps(out.stem, ensure_ascii=False)}",
+        ]
+        lines += [f"gait = {json.dumps(gait)}", f"robot = {json.dumps(body)}", "", "[parameters]"]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in result.parameters.items()]
+        with atomic_write(out) as part:
+            part.write_text("\n".join(lines) + "\n")
+        facts["set"] = str(out)
+    show(facts, as_json)

@@ -1,0 +1,109 @@
+"""``snakewalk walk``: rules of walking compared on graphs of states."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+
+if TYPE_CHECKING:
+    from snakewalk.controller.studies.graph_study import StudyResult
+
+
+def walk(
+    graph: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED, kp:TRACK[:THRESHOLD] or a file; "
+            "may be given again; default: er:1000:9"
+        ),
+    ] = None,
+    rule: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="snake, snake-printed, frontier, stack, random or degree; may be given again; "
+            "default: all"
+        ),
+    ] = None,
+    repeats: Annotated[int, typer.Option(min=1, max=100_000, help="graphs of each kind")] = 30,
+    seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw states seen over steps here (.png, .svg, .pdf)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Walk graphs of states until all are seen: how many steps, and how soon states come again."""
+    check_picture(picture)
+    refuse_to_overwrite([picture], force)
+
+    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
+    from snakewalk.controller.shape.walks import RULES, check_rule  # noqa: PLC0415
+    from snakewalk.controller.studies.graph_study import graph_source, run_study  # noqa: PLC0415
+
+    graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
+    for spec in graphs:  # refuse bad input before any work starts
+        graph_source(spec)
+    for name in rules:
+        check_rule(name)
+    cases = [(spec, name) for spec in dict.fromkeys(graphs) for name in dict.fromkeys(rules)]
+    results = [
+        run_study(spec, name, repeats, seed)
+        for spec, name in show_progress(cases, "walks", len(cases))
+    ]
+    if picture is not None:
+        from snakewalk.controller.studies.plots.walk import draw  # noqa: PLC0415
+
+        draw(results, picture)
+    if as_json:
+        print(json.dumps([result.to_dict() for result in results]))
+        return
+    console.print(_table(results))
+
+
+def _table(results: "list[StudyResult]") -> Table:
+    title = f"Steps until all states are seen, over |V|; {results[0].repeats} graphs of each kind"
+    table = Table(
+        title=title, title_justify="left", box=None, collapse_padding=True, pad_edge=False
+    )
+    for name in ("graph", "|V|", "degree", "rule"):
+        table.add_column(
+            name, justify="right" if name in {"|V|", "degree"} else "left", no_wrap=True
+        )
+    for name in (
+        "mean",
+        "95 %",
+        "worst",
+        "seen\nat |V|",
+        "back in\n< |V|/20",
+        "of all\nsteps",
+        "over\n|V|",
+    ):
+        table.add_column(name, justify="right")
+    last = ""
+    for result in results:
+        row = result.to_dict()
+        first = result.graph != last
+        if first and last:
+            table.add_row()
+        last = result.graph
+        table.add_row(
+            *(
+                [result.graph, f"{row['states']:.0f}", f"{row['mean_degree']:.2f}"]
+                if first
+                else ["", "", ""]
+            ),
+            result.rule,
+            "never" if row["cover_mean"] is None else f"{row['cover_mean']:.3f}",
+            "" if row["cover_ci95"] is None else f"±{row['cover_ci95']:.3f}",
+            "" if row["cover_worst"] is None else f"{row['cover_worst']:.2f}",
+            f"{row['seen_at_v']:.0%}",
+            f"{row['short_returns']:.1%}",
+            f"{row['short_steps']:.1%}",
+            f"{row['short_per_state']:.3f}",
+        )
+    return table

@@ -1,0 +1,427 @@
+"""Friction of the belly, along and across (and backward), and mass, from logs of a robot's runs.
+
+The simulator follows a log's goals with other frictions until its body goes and turns as the
+measured one did, and its joints need the measured currents. How the body moves on a level floor
+tells the ratio of the frictions alone: without inertia their common factor cancels. The currents
+tell that factor, as well as the servos' torque for a current is known. What robots differ in beside
+(masses, servos, horns) is fitted along, held near the robot's file by priors (Gauss-Newton's steps
+to the most probable values; intervals from the curvature there, by Laplace's approximation).
+
+The mass is fitted on demand, from runs in which pitch joints lift: what they lift they need current
+for, and friction has little part in it. Without lifts weight and friction act together only.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import FrictionConfig, WorldConfig
+from snakewalk.controller.console.pool import each
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.studies.shadow.diagnosis import (
+    SETTLED_S,
+    Constants,
+    Goals,
+    answers_and_links,
+    features,
+    goals_of,
+)
+
+RATIO: Final = "across_over_along"
+MASS: Final = "mass"
+_LIFTED_RAD: Final = 0.1
+"""Pitch joints that turn by less than this in a log lift nothing (ours)."""
+WINDOW_S: Final = 1.0
+"""The body's motion is compared over this, from the place where each window begins (ours)."""
+MOVED_M: Final = 0.02
+"""A body that goes less than this in all windows tells no friction (ours)."""
+_FLOORS: Final = (1.0, 1.0, 1e-3**2, 2e-3**2)
+"""Least variance of what the model misses: of currents and angles (in steps of registers), of a
+window's way (m) and turn (rad) (ours)."""
+_PER_SAMPLE: Final = (40.0, 40.0, 4.0, 4.0)
+"""Values of each kind that count as one: those of 4 s, as what the model misses comes again with
+each cycle of a gait (ours)."""
+_PRIOR: Final = 1.5
+"""Standard deviation of a friction's logarithm before anything is known: a factor of 4.5 (ours)."""
+_COMMON: Final = 0.05
+"""The same of the torque for a current of all servos alike: their data sheet's tolerance (ours)."""
+_STEP: Final = 0.1
+"""By which logarithms are changed to see what they do (ours)."""
+_MOST: Final = 0.7
+"""Longest step of a logarithm: a factor of two (ours)."""
+_ALONE, _TOGETHER = 4, 2
+"""Steps with friction alone, then with all that robots differ in (ours)."""
+_DETERMINED: Final = 0.35
+"""Standard deviation of a logarithm from which on a friction counts as not told: 95 % would reach
+from half to twice the value (ours)."""
+_NORMAL_95: Final = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionLog:
+    """What a log tells of friction: goals, answers, and where the body went."""
+
+    goals: Goals
+    answers: Floats
+    """(2, T, J) currents in A, angles in rad."""
+    motion: Floats
+    """(W, 3) of each window: m ahead and to the left, rad turned."""
+
+    @staticmethod
+    def of(record: RunRecord, world: WorldConfig | None = None) -> "FrictionLog":
+        """Take what a run's log tells.
+
+        Args:
+            record: a run with a measured pose.
+            world: the ground that it was on; the log's where it is None.
+
+        Raises:
+            InputError: the log tells no friction, and why.
+
+        """
+        header, pose = record.header, record.pose
+        told = header.run.pose
+        true = header.backend == "sim" and header.run.pose_is_true
+        measured = told == "camera" or true
+        if not measured:
+            way = told or "the IMU or the joints"
+            raise InputError(
+                f"the pose of this run was estimated by {way}, which takes friction as known; "
+                "friction needs a pose measured by a camera (or a simulated run)"
+            )
+        goals, answered = goals_of(record, world)
+        cycle = record.cycle
+        stop = cycle.verdict.index("veto") if "veto" in cycle.verdict else None
+        time_s = cycle.time_s[:stop][-len(goals.since_start_s) :]
+        known = np.isfinite(pose.links_m).all(axis=(1, 2))
+        pose_s = pose.time_s[known]
+        if not ((pose_s < time_s[0] + WINDOW_S).any() and (pose_s > time_s[-1] - WINDOW_S).any()):
+            raise InputError(
+                "the log does not hold where the body was in its last seconds: friction is found "
+                "from how it moves"
+            )
+        places = _places(pose.links_m[known])
+        at = np.stack([np.interp(time_s, pose_s, column) for column in places.T], axis=1)
+        motion = _motion(goals, at)
+        if np.hypot(motion[:, 0], motion[:, 1]).max() < MOVED_M:
+            raise InputError(
+                f"the body goes less than {1e3 * MOVED_M:g} mm in any second of the log: that "
+                "tells no friction; take a log of a run that goes somewhere"
+            )
+        return FrictionLog(goals, answered, motion)
+
+    @staticmethod
+    def simulated(
+        goals: Goals,
+        deviation: Deviation,
+        seen: Callable[[Floats], Floats] = lambda links_m: links_m,
+    ) -> "FrictionLog":
+        """Return what a simulated robot would have logged.
+
+        Args:
+            goals: what is sent.
+            deviation: in what the robot differs from its file and its world.
+            seen: makes of its links (T, L, 3) what is measured of them.
+
+        """
+        answers, links_m = answers_and_links(goals, deviation)
+        return FrictionLog(goals, answers, _motion(goals, _places(seen(links_m))))
+
+    def vector(self) -> Floats:
+        """All that is compared (N,)."""
+        return np.concatenate([features(self.goals, self.answers), self.motion.ravel()])
+
+    def check_lifts(self) -> None:
+        """Refuse a log that tells no mass.
+
+        Raises:
+            InputError: nothing is lifted in it; says what to run instead.
+
+        """
+        robot = self.goals.robot
+        joints = list(robot.pitch_joints)
+        if not joints:
+            raise InputError(
+                f"robot {robot.name} has no pitch joints: on a level floor its weight and the "
+                "friction act together only, so no run of it tells its mass; weigh it"
+            )
+        if np.ptp(self.answers[1][:, joints], axis=0).max() < _LIFTED_RAD:
+            raise InputError(
+                f"the pitch joints turn less than {_LIFTED_RAD:g} rad: nothing is lifted, which "
+                "tells no mass; take a log of a gait that lifts the body (snakewalk gait run "
+                f"sidewinding --robot {robot.name}, or rectilinear)"
+            )
+
+    def with_friction(self, friction: FrictionConfig) -> Goals:
+        """Return the same goals on ground of another friction."""
+        world = self.goals.world.model_copy(update={"friction": friction})
+        return replace(self.goals, world=world)
+
+    def errors(self, friction: FrictionConfig) -> tuple[float, float]:
+        """Root mean square error of a window's way (m) and turn (rad) of a body with a friction."""
+        again = FrictionLog.simulated(self.with_friction(friction), NO_DEVIATION)
+        off = self.motion - again.motion
+        way_m = math.sqrt(float((off[:, :2] ** 2).sum(axis=1).mean()))
+        return way_m, math.sqrt(float((off[:, 2] ** 2).mean()))
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A number with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @staticmethod
+    def of_log(mean: float, deviation: float) -> "Found":
+        """Of a normal distribution of the logarithm."""
+        reach = _NORMAL_95 * deviation
+        return Found(math.exp(mean), math.exp(mean - reach), math.exp(mean + reach))
+
+    def times(self, factor: float) -> "Found":
+        """Return it in another unit."""
+        return Found(factor * self.value, factor * self.low, factor * self.high)
+
+    @property
+    def determined(self) -> bool:
+        """Whether the logs say it: the interval is narrower than from half to twice the value."""
+        return self.high < self.value * math.exp(_NORMAL_95 * _DETERMINED)
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionFit:
+    """Friction that makes the simulator move as the logs say."""
+
+    friction: FrictionConfig
+    found: dict[str, Found]
+    """``along``, ``across``, perhaps ``back``, and the ratio of the first two."""
+    mass: Found | None = None
+    """Of the spine's links over the robot's file; None where it was not looked for."""
+
+    def world(self, world: WorldConfig) -> WorldConfig:
+        """Return a world with this friction; what the logs do not tell stays."""
+        told = [name for name, one in self.found.items() if one.determined and name != RATIO]
+        changes = {name: float(f"{getattr(self.friction, name):.4g}") for name in told}
+        friction = world.friction.model_copy(update=changes)
+        return world.model_copy(update={"friction": friction})
+
+    def comment(self, paths: Sequence[Path]) -> list[str]:
+        """Lines for the head of a world's file."""
+        lines = [f"Friction found by `snakewalk identify` from {', '.join(map(str, paths))}:"]
+        for name, one in self.found.items():
+            note = "" if one.determined else "; these logs do not tell it"
+            lines.append(
+                f"{name.replace('_', ' ')} {one.value:.4g}, 95 % of {one.low:.4g} to "
+                f"{one.high:.4g}{note}"
+            )
+        return lines
+
+
+def with_mass(robot: RobotConfig, share: float) -> RobotConfig:
+    """Return the robot with the mass of each link of its spine times ``share``."""
+    scaled_kg = [float(f"{share * mass_kg:.6g}") for mass_kg in robot.bare_link_masses_kg]
+    return robot.with_link_masses(scaled_kg)
+
+
+def fit_friction(
+    logs: Sequence[FrictionLog],
+    *,
+    mass: bool = False,
+    workers: int = 1,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> FrictionFit:
+    """Find the friction of runs of one robot on one ground; begins with the first log's world.
+
+    Args:
+        logs: of one robot.
+        mass: whether to find the mass of its links as well.
+        workers: processes that simulate.
+        on_progress: takes simulations done, and of how many.
+
+    Raises:
+        InputError: the mass is asked for, and a log does not tell it.
+
+    """
+    if mass:
+        for log in logs:
+            log.check_lifts()
+    return _Fit(logs, mass, workers, on_progress).run()
+
+
+class _Fit:
+    """Steps of Gauss and Newton; the vector is friction's logarithms, then what else differs."""
+
+    def __init__(
+        self,
+        logs: Sequence[FrictionLog],
+        mass: bool,
+        workers: int,
+        on_progress: Callable[[int, int], None],
+    ) -> None:
+        self._logs, self._workers, self._on_progress = logs, workers, on_progress
+        first = logs[0].goals
+        told = first.world.friction
+        frictions = ("along", "across") if told.back is None else ("along", "across", "back")
+        self._start = np.log([getattr(told, name) for name in frictions] + [1.0] * mass)
+        self._names = (*frictions, *[MASS] * mass)
+        constants = Constants(first.robot)
+        self._steps = constants.step[2:]
+        kinds = np.concatenate([_kinds(log) for log in logs])
+        measured = np.concatenate([log.vector() for log in logs])
+        self._known = np.isfinite(measured)  # a servo may not tell its current
+        self._measured, self._kinds = measured[self._known], kinds[self._known]
+        self._noise = np.array(_FLOORS)
+        links, joints = first.robot.link_count, first.robot.joint_count
+        covariance = np.diag(constants.healthy[2:] ** 2)
+        servos = slice(links, links + joints)
+        covariance[servos, servos] += _COMMON**2
+        k = len(self._names)
+        self._prior = np.zeros((k + len(covariance), k + len(covariance)))
+        self._prior[:k, :k] = np.eye(k) / _PRIOR**2
+        self._prior[k:, k:] = np.linalg.inv(covariance)
+        self._done = 0
+        self._total = (_ALONE + _TOGETHER) * (k + 1) + 1 + len(covariance)
+
+    def run(self) -> FrictionFit:
+        """Return the most probable friction, with intervals."""
+        k = len(self._names)
+        values = np.concatenate([self._start, np.zeros(len(self._steps))])
+        now = self._simulated(values)
+        others = np.zeros((len(now), 0))
+        for turn in range(_ALONE + _TOGETHER):
+            if turn == _ALONE:
+                others = self._columns(values, now, range(k, len(values)), self._workers)
+            effects = np.hstack([self._columns(values, now, range(k), 1), others])
+            count = effects.shape[1]
+            self._set_noise(self._measured - now, effects)
+            curvature, pull = self._normal(effects, self._measured - now)
+            away = values - np.concatenate([self._start, np.zeros(len(self._steps))])
+            pull -= self._prior[:count, :count] @ away[:count]
+            step = np.linalg.solve(curvature, pull)
+            step *= min(1.0, _MOST / np.abs(step[:k]).max())
+            values[:count] += step
+            now = self._simulated(values)
+        self._set_noise(self._measured - now, effects)
+        curvature, _ = self._normal(effects, self._measured - now)
+        return self._fit(values, np.asarray(np.linalg.inv(curvature)))
+
+    def _fit(self, values: Floats, covariance: Floats) -> FrictionFit:
+        def of(weights: Floats) -> Found:
+            spread = math.sqrt(float(weights @ covariance @ weights))
+            return Found.of_log(float(weights @ values), spread)
+
+        each = np.eye(len(values))
+        found = {name: of(each[i]) for i, name in enumerate(self._names)}
+        mass = found.pop(MASS, None)
+        if mass is not None:  # and what the links weigh more, each
+            k, robot = len(self._names), self._logs[0].goals.robot
+            each[k - 1, k : k + robot.link_count] = 1.0 / (robot.link_count * mass.value)
+            each[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
+            mass = of(each[k - 1])
+        found[RATIO] = of(each[1] - each[0])
+        return FrictionFit(_friction(self._names, values), found, mass)
+
+    def _simulated(self, values: Floats) -> Floats:
+        out: Floats = _simulated(self._logs, self._names, values)[self._known]
+        self._count()
+        return out
+
+    def _columns(self, values: Floats, now: Floats, which: range, workers: int) -> Floats:
+        """Effects (N, len(which)) of some of the values, by differences."""
+        steps = np.concatenate([np.full(len(self._names), _STEP), self._steps])
+        work = partial(_changed, self._logs, self._names, values, steps)
+        done = ((k, work(k)) for k in which) if workers <= 1 else each(work, which, workers=workers)
+        columns = {}
+        for k, changed in done:
+            columns[k] = (changed[self._known] - now) / steps[k]
+            self._count()
+        return np.stack([columns[k] for k in which], axis=1)
+
+    def _count(self) -> None:
+        self._done += 1
+        self._on_progress(self._done, self._total)
+
+    def _weights(self) -> Floats:
+        return np.asarray(1.0 / (self._noise * np.array(_PER_SAMPLE))[self._kinds])
+
+    def _normal(self, effects: Floats, rest: Floats) -> tuple[Floats, Floats]:
+        weighed = effects * self._weights()[:, np.newaxis]
+        count = effects.shape[1]
+        curvature: Floats = weighed.T @ effects + self._prior[:count, :count]
+        return curvature, np.asarray(weighed.T @ rest)
+
+    def _set_noise(self, rest: Floats, effects: Floats) -> None:
+        """Take the noise of each kind from what is left, less what the fit has taken up."""
+        curvature, _ = self._normal(effects, rest)
+        taken = np.einsum("ni,ij,nj->n", effects, np.linalg.inv(curvature), effects)
+        taken = taken * self._weights()
+        for kind, floor in enumerate(_FLOORS):
+            of = self._kinds == kind
+            spare = max(float(of.sum() - taken[of].sum()), 1.0)
+            self._noise[kind] = max(floor, float((rest[of] ** 2).sum()) / spare)
+
+
+def _friction(names: Sequence[str], logs: Floats) -> FrictionConfig:
+    values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # what a world takes
+    found = dict(zip(names, map(float, values), strict=True))
+    return FrictionConfig(**{name: value for name, value in found.items() if name != MASS})
+
+
+def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats) -> Floats:
+    """Answer and motion (N,) of all logs, simulated with these values."""
+    friction = _friction(names, values)
+    others = np.concatenate([np.zeros(2), values[len(names) :]])
+    deviation = Constants(logs[0].goals.robot).deviation(others)
+    goals = [log.with_friction(friction) for log in logs]
+    if MASS in names:
+        share = math.exp(float(values[list(names).index(MASS)]))
+        robot = with_mass(logs[0].goals.robot, share)
+        goals = [replace(each_goals, robot=robot) for each_goals in goals]
+    again = [FrictionLog.simulated(each_goals, deviation) for each_goals in goals]
+    return np.concatenate([each_log.vector() for each_log in again])
+
+
+def _changed(
+    logs: Sequence[FrictionLog], names: Sequence[str], values: Floats, steps: Floats, which: int
+) -> Floats:
+    """Simulate with one value changed by its step; a function of its own for a process."""
+    changed = values.copy()
+    changed[which] += steps[which]
+    return _simulated(logs, names, changed)
+
+
+def _kinds(log: FrictionLog) -> Ints:
+    """Which noise each value of a log's vector (N,) has."""
+    joints = log.goals.robot.joint_count
+    count = len(features(log.goals, log.answers))
+    answers = np.tile(np.repeat([0, 1], joints), count // (2 * joints))
+    return np.concatenate([answers, np.tile([2, 2, 3], len(log.motion))])
+
+
+def _places(links_m: Floats) -> Floats:
+    """Where a body is in plan (T, 3): its middle, m, and the heading from its rear to its front."""
+    half = links_m.shape[1] // 2
+    front, rear = links_m[:, :half, :2].mean(axis=1), links_m[:, half:, :2].mean(axis=1)
+    ahead = front - rear
+    heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    return np.column_stack([links_m[:, :, :2].mean(axis=1), heading])
+
+
+def _motion(goals: Goals, places: Floats) -> Floats:
+    """Way and turn (W, 3) of each window, in the body's frame at its start; places are (T, 3)."""
+    hz = goals.run.cycle_hz
+    edges = np.arange(round(SETTLED_S * hz), len(places), round(WINDOW_S * hz))
+    first, last = places[edges[:-1]], places[edges[1:]]
+    way, (c, s) = last[:, :2] - first[:, :2], (np.cos(first[:, 2]), np.sin(first[:, 2]))
+    ahead, left = c * way[:, 0] + s * way[:, 1], c * way[:, 1] - s * way[:, 0]
+    return np.column_stack([ahead, left, last[:, 2] - first[:, 2]])

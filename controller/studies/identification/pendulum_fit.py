@@ -1,0 +1,235 @@
+"""Constants of a servo fitted to recordings of a pendulum, each with an interval.
+
+The whole recording is computed from its first angle, and no measured angle helps on the way: what
+fits has the servo's motion, not its next sample. Many starts find the basin, steps from the best
+ones its ground; all chance comes from one seed.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.stats import t as student
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.studies.identification.pendulum_log import PendulumLog
+from snakewalk.controller.studies.identification.pendulum_swing import (
+    FINE_S,
+    robot_swing_rad,
+    swing_rad,
+)
+from snakewalk.controller.studies.identification.servo_constants import (
+    CONSTANTS,
+    FITTED,
+    HIGH,
+    LOW,
+    NAMES,
+    ServoConstants,
+)
+
+_LOW: Final = LOW[:FITTED]
+_HIGH: Final = HIGH[:FITTED]
+STARTS: Final = 24
+HOPS: Final = 60
+_COARSE_S: Final = 2e-3
+_COARSE_TURNS: Final = 25
+_FINE_TURNS: Final = 100
+_SPREAD: Final = 0.4
+"""Of the starts, as a factor's logarithm."""
+_FIRST: Final = 4
+"""Best fits that hops begin from."""
+_OUTLIER_RAD: Final = 0.02
+"""Errors above this count linearly, as in a mean absolute error."""
+_TURN: Final = 1e-3
+"""Of a constant's range: step of the search's derivatives."""
+_FINE_TURN: Final = 1e-4
+"""Of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
+constants trade against each other exactly, a long step's error would pass for knowledge."""
+_BLOCK_S: Final = 0.5
+"""Errors within this are not independent: they count as one in the intervals (ours)."""
+_COVERAGE: Final = 0.95
+_LEAST_SHARE: Final = 0.01
+"""No constant is known better than mass, arm and supply, which are given to a per cent (ours)."""
+_FACTOR: Final = 1.05
+"""Step along constants that move a servo alike (ours)."""
+_CHI_SQUARE: Final = 3.84
+"""Of one constant: what is less likely than 5 %."""
+_TORQUE_CONSTANT: Final = NAMES.index("torque_constant_n_m_a")
+_RESISTANCE: Final = NAMES.index("resistance_ohm")
+_P_UNIT: Final = NAMES.index("p_unit_per_rad")
+_SLOW_TERMS: Final = ("stribeck_n_m", "by_motor_slow", "by_load_slow")
+
+
+def error_deg(constants: ServoConstants, log: PendulumLog) -> float:
+    """Mean absolute error of the angle over a log, in degrees."""
+    return float(np.degrees(np.abs(swing_rad(constants.values, log) - log.position_rad).mean()))
+
+
+def robot_error_deg(robot: RobotConfig, log: PendulumLog, bench: ServoConstants) -> float:
+    """Mean absolute error of the angle of a robot's simulated servo over a log, in degrees."""
+    return float(np.degrees(np.abs(robot_swing_rad(robot, log, bench) - log.position_rad).mean()))
+
+
+def fit_pendulum(
+    logs: Sequence[PendulumLog],
+    start: ServoConstants | None = None,
+    *,
+    seed: int = 0,
+    starts: int = STARTS,
+    hops: int = HOPS,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> ServoConstants:
+    """Fit the constants to all logs; the squares of M6 stay as ``start`` has them.
+
+    Args:
+        logs: of one servo.
+        start: constants to begin with; by default the middle of what such servos have.
+        seed: of the starts and steps.
+        starts: fits from constants drawn around the start.
+        hops: fits from constants drawn around the best ones.
+        on_progress: takes the number of fits done, and of all.
+
+    """
+    rng = np.random.default_rng(seed)
+    given = np.array([c.start for c in CONSTANTS]) if start is None else start.values
+    first, squares = given[:FITTED], given[FITTED:]
+    width, total = _HIGH - _LOW, starts + hops + 1
+    pool: list[OptimizeResult] = []
+    for k in range(starts):
+        factor, shift = np.exp(rng.normal(0.0, _SPREAD, len(first))), rng.normal(size=len(first))
+        drawn = first if k == 0 else first * factor + 0.02 * width * shift
+        pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
+        on_progress(k + 1, total)
+    pool.sort(key=lambda fit: float(fit.cost))
+    for k in range(hops):
+        best = pool[rng.integers(min(_FIRST, len(pool)))].x if rng.random() < 0.3 else pool[0].x
+        other = pool[rng.integers(min(2 * _FIRST, len(pool)))].x
+        size = 0.15 * np.maximum(np.abs(best), 0.01 * width) * (rng.random(len(best)) < 0.4)
+        drawn = best + rng.normal(size=len(best)) * size
+        drawn = drawn + (rng.random() < 0.3) * 0.3 * (other - best)
+        pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
+        pool.sort(key=lambda fit: float(fit.cost))
+        on_progress(starts + k + 1, total)
+    values = np.asarray(_fit(logs, pool[0].x, squares, FINE_S, _FINE_TURNS).x)
+    on_progress(total, total)
+    least, most = _alike(logs, values, squares)
+    chosen = float(np.clip(first[_P_UNIT] / values[_P_UNIT], least, most))
+    smallest, greatest = _scaled(values, least), _scaled(values, most)
+    values = _scaled(values, chosen)
+    low, high = _intervals(logs, values, squares)
+    unknown = np.full(len(squares), np.nan)
+    low = np.append(np.minimum(low, smallest), unknown)
+    high = np.append(np.maximum(high, greatest), unknown)
+    return ServoConstants(np.append(values, squares), low, high, logs[0].actuator)
+
+
+def _errors(values: Floats, logs: Sequence[PendulumLog], squares: Floats, step_s: float) -> Floats:
+    """(M,) errors of all logs, one after the other."""
+    whole = np.append(values, squares)
+    return np.concatenate([swing_rad(whole, log, step_s) - log.position_rad for log in logs])
+
+
+def _fit(
+    logs: Sequence[PendulumLog], values: Floats, squares: Floats, step_s: float, turns: int
+) -> OptimizeResult:
+    width = _HIGH - _LOW
+    inside = np.clip(values, _LOW + 1e-6 * width, _HIGH - 1e-6 * width)
+    return least_squares(
+        _errors,
+        inside,
+        bounds=(_LOW, _HIGH),
+        args=(logs, squares, step_s),
+        x_scale=width,
+        diff_step=[_TURN],
+        loss="soft_l1",
+        f_scale=_OUTLIER_RAD,
+        max_nfev=turns,
+    )
+
+
+def _scaled(values: Floats, factor: float) -> Floats:
+    """Return the constants with torque constant and P unit times a factor, resistance its square.
+
+    Where the output never comes to its limit, such a servo moves in the same way: with less
+    current, by more volts.
+    """
+    out = values.copy()
+    out[[_TORQUE_CONSTANT, _P_UNIT]] *= factor
+    out[_RESISTANCE] *= factor**2
+    return out
+
+
+def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
+    """Least and greatest factor of ``_scaled`` that the recordings do not tell from 1."""
+
+    def cost(of: Floats) -> float:
+        errors = _errors(of, logs, squares, FINE_S) / _OUTLIER_RAD
+        return float((np.sqrt(1.0 + errors**2) - 1.0).sum())
+
+    blocks = sum(math.ceil(log.time_s[-1] / _BLOCK_S) for log in logs)
+    limit = cost(values) * (1.0 + _CHI_SQUARE / blocks)
+    ends = []
+    for step in (1.0 / _FACTOR, _FACTOR):
+        factor = 1.0
+        while True:
+            further = _scaled(values, factor * step)
+            inside = (further >= _LOW).all() and (further <= _HIGH).all()
+            if not inside or cost(further) > limit:
+                break
+            factor *= step
+        ends.append(factor)
+    return ends[0], ends[1]
+
+
+def _intervals(
+    logs: Sequence[PendulumLog], values: Floats, squares: Floats
+) -> tuple[Floats, Floats]:
+    """Ends of the 95 % intervals, by blocks of errors (a sandwich), within the ranges.
+
+    A model that is wrong leaves errors that last: within a block they count as one, so that the
+    intervals grow with the blocks' sums, not shrink with the number of samples. What the logs do
+    not tell has an interval as wide as its range.
+    """
+    width = _HIGH - _LOW
+    steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
+    jacobian = (
+        width
+        / (2.0 * steps)
+        * np.stack(
+            [
+                _errors(values + turn, logs, squares, FINE_S)
+                - _errors(values - turn, logs, squares, FINE_S)
+                for turn in np.diag(steps)
+            ],
+            axis=1,
+        )
+    )  # of each constant in units of its range
+    errors = _errors(values, logs, squares, FINE_S)
+    weight = 1.0 / np.sqrt(1.0 + (errors / _OUTLIER_RAD) ** 2)
+    blocks = np.concatenate(
+        [1000 * k + (log.time_s / _BLOCK_S).astype(int) for k, log in enumerate(logs)]
+    )
+    sums = np.stack(
+        [
+            (jacobian[at] * (weight[at] * errors[at])[:, None]).sum(axis=0)
+            for at in (blocks == block for block in np.unique(blocks))
+        ]
+    )
+    # a prior as wide as the range keeps what the logs do not tell from blowing the rest up
+    curvature = (jacobian * weight[:, None]).T @ jacobian
+    noise = float((weight * errors**2).mean())
+    bread = np.linalg.inv(curvature + noise * np.eye(len(values)))
+    degrees = max(len(sums) - len(values), 1)
+    meat = sums.T @ sums * len(sums) / degrees + noise * np.eye(len(values)) * noise
+    spread = np.sqrt(np.diag(bread @ meat @ bread)) * width
+    reach = float(student.ppf(0.5 + 0.5 * _COVERAGE, degrees)) * spread
+    reach = np.maximum(reach, _LEAST_SHARE * np.abs(values))
+    low, high = np.maximum(values - reach, _LOW), np.minimum(values + reach, _HIGH)
+    if not low[[NAMES.index(name) for name in _SLOW_TERMS]].any():
+        # whether friction grows when the shaft is slow is open, so how slow is open, too
+        shape = [NAMES.index(name) for name in ("stribeck_rad_s", "stribeck_exponent")]
+        low[shape], high[shape] = _LOW[shape], _HIGH[shape]
+    return low, high

@@ -1,0 +1,77 @@
+"""Recordings of a servo that swings a weight, as BAM's raw logs hold them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.studies.identification.servo_constants import read_json
+
+_COLUMNS: Final = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
+_ABOUT: Final = ("mass", "length", "kp")
+_LEAST_ROWS: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class PendulumLog:
+    """One recording of N samples; the weight hangs down at 0."""
+
+    path: Path
+    actuator: str
+    mass_kg: float
+    arm_m: float
+    p_gain: float
+    """Position P Gain(84)."""
+    time_s: Floats
+    """(N,) rising."""
+    goal_rad: Floats
+    """(N,)"""
+    position_rad: Floats
+    """(N,)"""
+    supply_v: Floats
+    """(N,)"""
+    torque_on: Floats
+    """(N,) 1 or 0"""
+
+
+def read_pendulum_log(path: Path) -> PendulumLog:
+    """Read a raw log of BAM: mass, length, kp, and entries of position, goal, volts and torque.
+
+    Raises:
+        InputError: it is no such file; says what is missing.
+
+    """
+    data = read_json(path)
+    entries = data.get("entries")
+    faults = [f"{path}: {key}: is missing" for key in (*_ABOUT, "entries") if key not in data]
+    if faults:
+        raise InputError(faults)
+    try:
+        mass_kg, arm_m, p_gain = (_number(data[key]) for key in _ABOUT)
+        rows: Any = entries
+        time_s, goal, position, volts, torque = (
+            np.array([_number(row[key]) for row in rows]) for key in _COLUMNS
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: is no log of a pendulum: {error}") from None
+    if len(time_s) < _LEAST_ROWS or not (np.diff(time_s) >= 0.0).all():
+        raise InputError(f"{path}: expected at least {_LEAST_ROWS} entries in the order of time")
+    if not (mass_kg > 0.0 and arm_m > 0.0 and p_gain >= 0.0):
+        raise InputError(f"{path}: mass and length are positive, kp is not negative")
+    actuator = str(data.get("motor", ""))
+    return PendulumLog(
+        *(path, actuator, mass_kg, arm_m, p_gain, time_s - time_s[0]),
+        *(goal, position, volts, (torque > 0.0).astype(float)),
+    )
+
+
+def _number(value: object) -> float:
+    if not isinstance(value, int | float):  # true and false count as 1 and 0
+        raise ValueError(f"{value!r} is no number")
+    number = float(value)
+    if not np.isfinite(number):
+        raise ValueError(f"{value} is not finite")
+    return number

@@ -1,0 +1,1 @@
+"""Figures of studies: sweeps, trials, comparisons of runs, and walks."""

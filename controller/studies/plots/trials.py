@@ -1,0 +1,86 @@
+"""Trials as a picture: a cell a case, its colour the share of complete runs, with the causes."""
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.patches import Rectangle
+
+from snakewalk.controller.figures.style import GREEN, INK, PALE, RED, save_picture
+from snakewalk.controller.studies.trials import CaseSummary
+
+matplotlib.use("Agg")
+
+_SHARE = LinearSegmentedColormap.from_list("share", [RED, "#f6e7c8", GREEN])
+_CAUSES = 3
+"""Most that a cell has room for."""
+
+
+def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
+    """Draw a map over the first two of what differs between the cases; a panel for all the rest.
+
+    Keys come first, then relief, world, robot, motion and run.
+    """
+    cells = [_place(row) for row in rows]
+    names = [name for name in cells[0] if len({cell[name] for cell in cells}) > 1]
+    values = {name: list(dict.fromkeys(cell[name] for cell in cells)) for name in names}
+    across, up, rest = names[:1], names[1:2], names[2:]
+    panels = list(product(*(values[name] for name in rest)))
+    columns, lines = (len(values[a[0]]) if a else 1 for a in (across, up))
+    wide = min(len(panels), max(1, 8 // columns))
+    figure, axes = plt.subplots(
+        -(-len(panels) // wide),
+        wide,
+        figsize=(wide * (1.25 * columns + 1.2), -(-len(panels) // wide) * (0.8 * lines + 1.1)),
+        squeeze=False,
+        layout="constrained",
+    )
+    for panel in axes.flat[len(panels) :]:
+        panel.axis("off")
+    for panel, fixed in zip(axes.flat, panels, strict=False):
+        some = [
+            (row, cell)
+            for row, cell in zip(rows, cells, strict=True)
+            if tuple(cell[name] for name in rest) == fixed
+        ]
+        for row, cell in some:
+            x, y = (values[a[0]].index(cell[a[0]]) if a else 0 for a in (across, up))
+            _draw_cell(panel, x, y, row)
+        panel.set_xlim(-0.5, columns - 0.5)
+        panel.set_ylim(-0.5, lines - 0.5)
+        panel.set_xticks(range(columns), values[across[0]] if across else [""])
+        panel.set_yticks(range(lines), values[up[0]] if up else [""])
+        panel.set_xlabel(_label(across))
+        panel.set_ylabel(_label(up))
+        panel.set_title("  ".join(fixed), fontsize=10, loc="left", color=INK)
+        panel.tick_params(length=0, labelsize=9)
+        panel.spines[:].set_visible(False)
+    save_picture(figure, path, dpi=110)
+    plt.close(figure)
+
+
+def _place(row: CaseSummary) -> dict[str, str]:
+    keys = {key: str(value) for key, value in row.keys.items()}
+    own = {"relief": f"{row.relief:g}", "world": row.world, "robot": row.robot}
+    return keys | own | {"motion": row.motion, "run": row.run}
+
+
+def _label(names: list[str]) -> str:
+    return names[0].replace("world.", "") if names else ""
+
+
+def _draw_cell(panel: Axes, x: int, y: int, row: CaseSummary) -> None:
+    complete = row.runs - sum(row.causes.values())
+    share = complete / row.runs if row.runs else 0.0
+    colour = _SHARE(share) if row.runs else PALE
+    panel.add_patch(Rectangle((x - 0.48, y - 0.48), 0.96, 0.96, color=colour, linewidth=0))
+    causes = [f"{count} {cause}" for cause, count in list(row.causes.items())[:_CAUSES]]
+    panel.text(
+        x, y + 0.3, f"{complete} of {row.runs}",
+        ha="center", va="center", fontsize=9, fontweight="bold", color=INK,
+    )  # fmt: skip
+    panel.text(x, y + 0.12, "\n".join(causes), ha="center", va="top", fontsize=7.5, color=INK)

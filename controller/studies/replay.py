@@ -1,0 +1,155 @@
+"""A log run again: the commands that were sent, at their times, to simulated servos.
+
+Nothing decides anew: no pilot, no safety. What differs from the log is the servos, the body and the
+ground; for a log of the simulator nothing may.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.metrics.comparison import Comparison, compare
+from snakewalk.controller.repertoire import repertoire_run
+from snakewalk.controller.run.backend import Backend, simulated
+from snakewalk.controller.run.factory import prepare_run
+from snakewalk.controller.runlog.record import Header, InitialPose, RunRecord
+from snakewalk.controller.runlog.writer import RunLog, VerdictKind
+from snakewalk.drivers.types import BodyPose, JointCommand
+
+
+def replay(
+    record: RunRecord, log: Path, on_progress: Callable[[int, int], None] | None = None
+) -> Path:
+    """Run a record's commands on the simulator and write what the servos then answer to ``log``.
+
+    The rows keep the record's times, commands and verdicts; angles, currents, temperatures and pose
+    are the simulator's. A record of metal begins with the joints as first measured.
+
+    Args:
+        record: a run, on metal or simulated; may be cut short.
+        log: to be written.
+        on_progress: takes cycles done, and of how many.
+
+    Raises:
+        InputError: the simulator is not installed, or the record holds no cycle.
+
+    """
+    cycle, header = record.cycle, record.header
+    if len(cycle.time_s) == 0:
+        raise InputError("the log holds no cycle: there is nothing to replay")
+    backend = _backend(record)
+    chain, clock, robot = backend.chain, backend.clock, header.robot
+    head_pose = cast(Callable[[], BodyPose], backend.pose)  # a simulated body always has one
+    period_s = 1.0 / header.run.cycle_hz
+    numbers = np.rint((cycle.deadline_s - cycle.deadline_s[0]) / period_s)
+    total = len(cycle.time_s)
+    with RunLog(log) as out:
+        out.config(
+            header.run,
+            robot,
+            header.world,
+            backend="sim",
+            plan=header.plan,
+            ground=header.ground,
+            torque_constant_n_m_a=header.torque_constant_n_m_a,
+            winding=header.winding,
+            initial_pose=header.initial_pose,
+        )
+        chain.enable()
+        wire_s, start_s = backend.wire_busy_s(), clock.now_s()
+        for k in range(total):
+            due_s = start_s + numbers[k] * period_s
+            clock.sleep_until_s(due_s)
+            late_s = clock.now_s() - due_s
+            state = chain.read()
+            pose = head_pose()
+            if cycle.verdict[k] != "veto":
+                chain.write(JointCommand(clock.now_s(), cycle.sent_rad[k]))
+            before_s, wire_s = wire_s, backend.wire_busy_s()
+            out.cycle(
+                cycle.time_s[k],
+                cycle.asked_rad[k],
+                cycle.sent_rad[k],
+                state,
+                deadline_s=cycle.deadline_s[k],
+                lateness_s=late_s,
+                wire_busy_s=wire_s - before_s,
+                energy=backend.energy(),
+                verdict=cast(VerdictKind, cycle.verdict[k]),
+                reason=cycle.reason[k],
+                joints=cycle.joints[k],
+            )
+            view = body_in_world(robot, pose, state.position_rad)
+            out.pose(
+                cycle.time_s[k],
+                pose.head_in_world_m,
+                pose.rotation,
+                links_m=view.link_m,
+                centre_m=view.centre_m,
+            )
+            if on_progress is not None:
+                on_progress(k + 1, total)
+            if cycle.verdict[k] == "veto":
+                break
+        chain.disable()
+    return log
+
+
+def differences(
+    original: RunRecord, again: RunRecord, tolerance_rad: float, tolerance_m: float
+) -> Comparison:
+    """Compare a run with its replay; joints and, where it was measured, the head decide.
+
+    Velocities and currents are reported but do not decide. Neither does the head of a run whose
+    pose was reckoned from the joints or measured by a camera. Angles that the original failed to
+    read are left out.
+    """
+    valid = original.cycle.valid
+    header = original.header
+    measured = header.backend == "sim" and header.run.pose_is_true
+    reported_only = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
+    limits = reported_only | {
+        "measured_rad": tolerance_rad,
+        "head_m": tolerance_m if measured else float("inf"),
+    }
+    return compare(_known(original, valid), _known(again, valid), tolerances=limits)
+
+
+def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
+    cycle, rows = record.cycle, len(record.cycle.time_s)
+    seen = replace(
+        cycle,
+        measured_rad=np.where(valid[:rows], cycle.measured_rad, np.nan),
+        velocity_rad_s=np.where(valid[:rows], cycle.velocity_rad_s, np.nan),
+        current_a=np.where(valid[:rows], cycle.current_a, np.nan),
+    )
+    return replace(record, cycle=seen)
+
+
+def _backend(record: RunRecord) -> Backend:
+    header = record.header
+    initial_pose = header.initial_pose
+    if initial_pose is None:
+        first = record.cycle.measured_rad[0]
+        known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
+        initial_pose = InitialPose(_start_heading_rad(header), known)
+    return simulated(
+        header.run, header.robot, header.world, build_ground(header.world), initial_pose
+    )
+
+
+def _start_heading_rad(header: Header) -> float:
+    """Mean heading of a run on servos, also where its log alone does not hold the whole motion."""
+    run = header.run
+    if run.motion == "source":
+        return run.start_heading_rad or 0.0
+    if run.motion == "repertoire":
+        return repertoire_run.start_heading_rad(run)
+    return prepare_run(run, header.robot, header.world).start_heading_rad

@@ -1,0 +1,476 @@
+"""Which cause explains how a robot's joints differ from those of its shadow.
+
+Of each thing that may be wrong (the ground's friction, a load on a link, a weaker servo, a slipped
+horn) the simulator tells how angles and currents of all joints would change. A robot that is well
+differs in all of them a little, as no servo is its data sheet; a cause differs much, alone. The
+causes are compared by their evidence, the small differences of all else integrated out (Bayesian
+model comparison: MacKay, "Information Theory, Inference, and Learning Algorithms", ch. 28).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final, Literal
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.ground import build_ground
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.pool import each
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.runlog.record import InitialPose, RunRecord
+from snakewalk.controller.studies.shadow.shadow import Shadow
+
+Cause = Literal["friction", "load", "weaker servo", "slipped horn"]
+NAMED_FROM: Final = 3.0
+"""Log of the evidence over that of a healthy robot from which on a cause is named (ours)."""
+_BIN_S: Final = 0.1
+"""Angles and currents are averaged over this: their steps average out, and the noise of a bin is
+nearly that of its own (ours)."""
+_CURRENT_STEP_A: Final = 2.69e-3
+_ANGLE_STEP_RAD: Final = 1.5e-3
+"""Units of the two: a step of the registers of most models."""
+_CORRELATED: Final = 4.0
+"""Bins of noise that count as one: what the model misses is not white (ours)."""
+_LEAST_NOISE: Final = 1.0 / 12.0
+"""Variance of a value that is rounded to whole steps, before averaging."""
+_REFINEMENTS: Final = 4
+_LEAST_STEP: Final = 0.01
+"""Of ``faulty``: less changes nothing (ours)."""
+_REFINED: Final[dict[Cause, int]] = {
+    **{"friction": 1, "load": 2, "weaker servo": 1, "slipped horn": 2}
+}
+"""How many of each kind, those that explain most at first, are followed on the simulator (ours)."""
+SETTLED_S: Final = 1.0
+"""From which on the shadow is compared: it begins at rest, wherever the robot was at (ours)."""
+MOST_S: Final = 12.0
+"""Length of the part that is looked at, the last one of the run (ours)."""
+LEAST_S: Final = 4.0
+"""Less tells too little (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goals:
+    """What was sent to a chain, and where it was then: what its shadow needs."""
+
+    run: RunConfig
+    robot: RobotConfig
+    world: WorldConfig
+    initial_pose: InitialPose
+    since_start_s: Floats
+    """(T,) when each cycle was due, from the first one."""
+    sent_rad: Floats
+    """(T, J)"""
+
+    @staticmethod
+    def of(
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        due_s: Floats,
+        sent_rad: Floats,
+        measured_rad: Floats,
+    ) -> "Goals":
+        """Return the last seconds of a run; their shadow begins where the joints were then.
+
+        Args:
+            run: the run.
+            robot: its chain.
+            world: a level floor: heading and place do not matter.
+            due_s: (T,) when the cycles were due.
+            sent_rad: (T, J) goals.
+            measured_rad: (T, J) angles.
+
+        """
+        rows = slice(-round(MOST_S * run.cycle_hz), None)
+        pose = InitialPose(run.start_heading_rad or 0.0, measured_rad[rows][0])
+        return Goals(run, robot, world, pose, due_s[rows] - due_s[rows][0], sent_rad[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class NamedCause:
+    """A cause, and how well it explains the difference."""
+
+    cause: Cause
+    at: int | None
+    """Index of the joint, or of the link that carries a load; None of the ground."""
+    evidence: float
+    """Log of its evidence over that of a healthy robot."""
+    values: tuple[float, ...]
+    """Friction along and across over the world's; kg; torque over the model's; rad."""
+
+    def text(self, robot: RobotConfig) -> str:
+        """Say it to a person."""
+        if self.at is None:
+            along, across = self.values
+            return (
+                f"the friction of the ground: {along:.2f} times the world's along the body, "
+                f"{across:.2f} times across it"
+            )
+        value = self.values[0]
+        if self.cause == "load":
+            return f"a load: link {self.at} of the body (0 is the head) weighs {value:.2f} kg more"
+        joint = robot.joint_name(self.at)
+        if self.cause == "weaker servo":
+            return f"a weaker servo: {joint} has {value:.2f} of its model's torque for a current"
+        return f"a slipped horn: {joint} is bent by {value:+.2f} rad more than its servo says"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What differs, the best explanation first; one of each kind of cause, and the next joints."""
+
+    causes: tuple[NamedCause, ...]
+    residual_a: Floats
+    """(J,) root mean square difference of the smoothed currents."""
+    residual_rad: Floats
+    """(J,) of the angles."""
+
+    @property
+    def named(self) -> NamedCause | None:
+        """The cause that explains the difference; None where the robot is as well as any."""
+        best = self.causes[0] if self.causes else None
+        return best if best is not None and best.evidence >= NAMED_FROM else None
+
+    def text(self, robot: RobotConfig) -> str:
+        """Say it to a person."""
+        named, most = self.named, int(np.argmax(self.residual_a))
+        if named is None:
+            return (
+                "nothing differs from the shadow more than between robots that are well; most "
+                f"does {robot.joint_name(most)}, by {self.residual_a[most]:.3f} A"
+            )
+        return (
+            f"what differs from the shadow is explained by {named.text(robot)} "
+            f"({self.probability:.0%} of what was looked at)"
+        )
+
+    def evidence_over(self, cause: NamedCause) -> float:
+        """Log of the best cause's evidence over that of another."""
+        return self.causes[0].evidence - cause.evidence
+
+    def to_dict(self, robot: RobotConfig) -> dict[str, object]:
+        """Return it for JSON."""
+        return {
+            "named": None if self.named is None else self.named.cause,
+            "at": None if self.named is None else self.named.at,
+            "causes": [
+                {
+                    "cause": one.cause,
+                    "at": one.at,
+                    "values": [round(value, 4) for value in one.values],
+                    "log_evidence": round(one.evidence, 2),
+                    "text": one.text(robot),
+                }
+                for one in self.causes
+            ],
+            "residual_a": [round(float(value), 5) for value in self.residual_a],
+            "residual_rad": [round(float(value), 5) for value in self.residual_rad],
+        }
+
+    @property
+    def probability(self) -> float:
+        """Of the best cause among all that were looked at, equally likely before."""
+        logs = np.array([each.evidence for each in self.causes])
+        return float(1.0 / np.exp(logs - logs[0]).sum())
+
+
+class Constants:
+    """All that may differ, as one vector: friction (2), loads (L), servos (J), slips (J)."""
+
+    def __init__(self, robot: RobotConfig) -> None:
+        links, joints = robot.link_count, robot.joint_count
+        self._links, self._joints = links, joints
+        mass_kg = robot.mean_link_mass_kg
+        sizes = (2, links, joints, joints)
+
+        def of_each(*values: float) -> Floats:
+            return np.repeat(values, sizes)
+
+        self.step = of_each(0.25, 0.5 * mass_kg, 0.3, 0.1)
+        """By which each is changed to see what it does."""
+        self.healthy = of_each(0.1, 0.03 * mass_kg, 0.05, 0.01)
+        """Standard deviation among robots and grounds that are well (ours)."""
+        self.faulty = of_each(0.5, 0.1 * mass_kg / 0.11, 0.5, 0.2)
+        """The same of one that is at fault (ours)."""
+        self.never_less = of_each(0, 1, 1, 0) > 0.0
+        """Loads and weakness are one-sided."""
+        self.causes: list[tuple[Cause, int | None, list[int]]] = [("friction", None, [0, 1])]
+        first = 2
+        kinds: tuple[tuple[Cause, int], ...] = (
+            *(("load", links), ("weaker servo", joints)),
+            ("slipped horn", joints),
+        )
+        for cause, count in kinds:
+            self.causes += [(cause, k, [first + k]) for k in range(count)]
+            first += count
+
+    def deviation(self, values: Floats) -> Deviation:
+        """Return what a vector means."""
+        load_kg, weakness, slip_rad = np.split(values[2:], np.cumsum([self._links, self._joints]))
+        return Deviation(
+            along=max(1.0 + values[0], 0.05),
+            across=max(1.0 + values[1], 0.05),
+            load_kg=load_kg if load_kg.any() else None,
+            torque=1.0 / (1.0 + weakness) if weakness.any() else None,
+            slip_rad=slip_rad if slip_rad.any() else None,
+        )
+
+    def spoken(self, cause: Cause, values: Floats) -> tuple[float, ...]:
+        """Return the numbers of a cause as people say them."""
+        if cause == "friction":
+            return tuple(float(1.0 + value) for value in values)
+        if cause == "weaker servo":
+            return (float(1.0 / (1.0 + values[0])),)
+        return (float(values[0]),)
+
+
+def check_level(world: WorldConfig) -> None:
+    """Refuse ground on which a shadow means nothing.
+
+    Raises:
+        InputError: it is no level, open floor.
+
+    """
+    if world.ground.kind != "flat" or world.obstacle is not None:
+        raise InputError(
+            f"world {world.name}: a shadow needs a level, open floor: elsewhere its body comes to "
+            "lie beside the robot's, and joints differ by that alone"
+        )
+
+
+def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals, Floats]:
+    """Return what a log's shadow needs, and what was measured (2, T, J), up to a veto.
+
+    Args:
+        record: the log.
+        world: the ground that the chain is believed to be on; the log's where it is None.
+
+    Raises:
+        InputError: the log is too short, or the ground is not level.
+
+    """
+    header, cycle = record.header, record.cycle
+    world = header.world if world is None else world
+    check_level(world)
+    count = next((k for k, verdict in enumerate(cycle.verdict) if verdict == "veto"), None)
+    due_s, measured_rad = cycle.deadline_s[:count], cycle.measured_rad[:count]
+    if len(due_s) < LEAST_S * header.run.cycle_hz:
+        raise InputError(f"the log holds less than {LEAST_S:g} s: too little to tell what differs")
+    goals = Goals.of(header.run, header.robot, world, due_s, cycle.sent_rad[:count], measured_rad)
+    rows = len(goals.since_start_s)
+    return goals, np.stack([cycle.current_a[:count], measured_rad])[:, -rows:]
+
+
+def answers(goals: Goals, deviation: Deviation) -> Floats:
+    """Return currents in A and angles in rad (2, T, J) that a shadow answers."""
+    return answers_and_links(goals, deviation)[0]
+
+
+def answers_and_links(goals: Goals, deviation: Deviation) -> tuple[Floats, Floats]:
+    """Return what a shadow answers, as ``answers``, and where its links (T, L, 3) are then, m."""
+    ground = build_ground(goals.world)
+    shadow = Shadow(goals.run, goals.robot, goals.world, ground, goals.initial_pose, deviation)
+    rows, joints = goals.sent_rad.shape
+    out = np.empty((2, rows, joints))
+    links_m = np.empty((rows, goals.robot.link_count, 3))
+    for k, (due_s, sent_rad) in enumerate(zip(goals.since_start_s, goals.sent_rad, strict=True)):
+        state = shadow.step(float(due_s), sent_rad)
+        out[0, k], out[1, k] = state.current_a, state.position_rad
+        links_m[k] = body_in_world(goals.robot, shadow.head_pose(), state.position_rad).link_m
+    return out, links_m
+
+
+def diagnose(
+    goals: Goals,
+    measured: Floats,
+    *,
+    workers: int = 1,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Diagnosis:
+    """Say what differs between a chain that answered ``measured`` (2, T, J) and its shadow."""
+    apart = features(goals, measured) - features(goals, answers(goals, NO_DEVIATION))
+    if np.abs(apart).max() < 1.0:  # a step of the registers: there is nothing to explain
+        return Diagnosis((), *_residuals(goals, apart))
+    return Signatures(goals, workers=workers, on_progress=on_progress).diagnose(measured)
+
+
+class Signatures:
+    """How the answers to some goals change with each thing that may be wrong.
+
+    Args:
+        goals: what was sent.
+        workers: processes that simulate.
+        on_progress: takes simulations done, and of how many.
+
+    """
+
+    def __init__(
+        self,
+        goals: Goals,
+        *,
+        workers: int = 1,
+        on_progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> None:
+        self._goals = goals
+        self._constants = constants = Constants(goals.robot)
+        count = len(constants.step)
+        self._plain = features(goals, answers(goals, NO_DEVIATION))
+        work = partial(_answer, goals)
+        columns: dict[int, Floats] = {}
+        on_progress(0, count)
+        todo = range(count)
+        done = ((k, work(k)) for k in todo) if workers <= 1 else each(work, todo, workers=workers)
+        for k, answer in done:
+            columns[k] = (features(goals, answer) - self._plain) / constants.step[k]
+            on_progress(len(columns), count)
+        self._effects = np.stack([columns[k] for k in todo], axis=1)
+
+    def diagnose(self, measured: Floats) -> Diagnosis:
+        """Say what differs, of measured currents and angles (2, T, J)."""
+        apart = features(self._goals, measured) - self._plain
+        constants = self._constants
+        likely = self._likelihood([apart])
+        first = [self._linear(likely, apart, parts) for _, _, parts in constants.causes]
+        order = sorted(range(len(first)), key=lambda k: -first[k][0])
+        well = likely.of(apart)
+        refined = {}
+        for cause, count in _REFINED.items():
+            for k in [k for k in order if constants.causes[k][0] == cause][:count]:
+                evidence, explained = first[k]
+                worth = evidence > well
+                parts = constants.causes[k][2]
+                refined[k] = self._refined(likely, apart, parts) if worth else explained
+        # what the best explanation leaves is noise: it judges all of them
+        likely = self._likelihood([apart, *(rest for _, rest, _ in refined.values())])
+        well, named = likely.of(apart), []
+        for k, (values, rest, slopes) in refined.items():
+            cause, at, parts = constants.causes[k]
+            evidence = likely.cause(rest, slopes, values, constants.faulty[parts]) - well
+            named.append(NamedCause(cause, at, evidence, constants.spoken(cause, values)))
+        named.sort(key=lambda one: -one.evidence)
+        return Diagnosis(tuple(named), *_residuals(self._goals, apart))
+
+    def _likelihood(self, rests: Sequence[Floats]) -> "_Likelihood":
+        """Likelihood with the noise that the best of some explanations leaves."""
+        effects = self._effects
+        spare = max(effects.shape[0] - effects.shape[1], 1)
+        left = [rest - effects @ np.linalg.lstsq(effects, rest)[0] for rest in rests]
+        noise = max(_LEAST_NOISE, min(float(one @ one) / spare for one in left))
+        return _Likelihood(effects, self._constants.healthy, _CORRELATED * noise)
+
+    def _linear(
+        self, likely: "_Likelihood", apart: Floats, parts: list[int]
+    ) -> tuple[float, tuple[Floats, Floats, Floats]]:
+        """Log evidence of a cause whose effects are taken as proportional; values, rest, slopes."""
+        constants = self._constants
+        slopes = self._effects[:, parts]
+        values = self._allowed(likely.best(apart, slopes, constants.faulty[parts]), parts)
+        rest = apart - slopes @ values
+        return likely.cause(rest, slopes, values, constants.faulty[parts]), (values, rest, slopes)
+
+    def _refined(
+        self, likely: "_Likelihood", apart: Floats, parts: list[int]
+    ) -> tuple[Floats, Floats, Floats]:
+        """Values of a cause, what they leave, and the slopes there, found on the simulator.
+
+        Gauss-Newton's steps; the slopes follow by Broyden's update.
+        """
+        constants = self._constants
+        slopes, faulty = self._effects[:, parts], constants.faulty[parts]
+        values, changed = np.zeros(len(parts)), np.zeros(len(apart))
+        best = (-math.inf, values, apart, slopes)
+        for _ in range(_REFINEMENTS):
+            target = apart - changed + slopes @ values
+            step = self._allowed(likely.best(target, slopes, faulty), parts) - values
+            if np.abs(step / faulty).max() < _LEAST_STEP:
+                break
+            values, before = values + step, changed
+            changed = self._changed(parts, values)
+            slopes = slopes + np.outer(changed - before - slopes @ step, step) / (step @ step)
+            rest = apart - changed
+            evidence = likely.cause(rest, slopes, values, faulty)
+            if evidence > best[0]:
+                best = (evidence, values, rest, slopes)
+        return best[1:]
+
+    def _allowed(self, values: Floats, parts: list[int]) -> Floats:
+        """Return values where loads and weakness are not negative."""
+        return np.where(self._constants.never_less[parts], np.maximum(values, 0.0), values)
+
+    def _changed(self, parts: list[int], values: Floats) -> Floats:
+        vector = np.zeros(len(self._constants.step))
+        vector[parts] = values
+        return (
+            features(self._goals, answers(self._goals, self._constants.deviation(vector)))
+            - self._plain
+        )
+
+
+def features(goals: Goals, values: Floats) -> Floats:
+    """Means over bins (B * 2 * J,) of currents and angles (2, T, J), in steps of the registers."""
+    hz = goals.run.cycle_hz
+    each_bin = max(round(_BIN_S * hz), 1)
+    rows = values[:, round(SETTLED_S * hz) :]
+    bins = rows.shape[1] // each_bin
+    means = rows[:, : bins * each_bin].reshape(2, bins, each_bin, -1).mean(axis=2)
+    means = means / np.array([_CURRENT_STEP_A, _ANGLE_STEP_RAD])[:, np.newaxis, np.newaxis]
+    return np.ascontiguousarray(means.transpose(1, 0, 2)).ravel()
+
+
+def _residuals(goals: Goals, apart: Floats) -> tuple[Floats, Floats]:
+    """Root mean squares (J,) in A and rad of a difference of features."""
+    rms = np.sqrt((apart.reshape(-1, 2, goals.robot.joint_count) ** 2).mean(axis=0))
+    return rms[0] * _CURRENT_STEP_A, rms[1] * _ANGLE_STEP_RAD
+
+
+class _Likelihood:
+    """Gaussian with small differences of all constants and noise integrated out.
+
+    ``log N(x; 0, noise I + E diag(healthy^2) E^T)``, by Woodbury's identity.
+    """
+
+    def __init__(self, effects: Floats, healthy: Floats, noise: float) -> None:
+        self._scaled = effects * healthy
+        self._noise = noise
+        inner = np.eye(effects.shape[1]) + self._scaled.T @ self._scaled / noise
+        self._factor = np.linalg.cholesky(inner)
+        self._log_det = 2.0 * float(np.log(np.diag(self._factor)).sum())
+
+    def weigh(self, x: Floats) -> Floats:
+        """Return the inverse covariance times ``x``."""
+        inside = np.linalg.solve(self._factor, self._scaled.T @ x)
+        back = np.linalg.solve(self._factor.T, inside)
+        weighed: Floats = (x - self._scaled @ back / self._noise) / self._noise
+        return weighed
+
+    def of(self, x: Floats) -> float:
+        """Return the log likelihood, up to a constant that only the noise changes."""
+        return -0.5 * float(x @ self.weigh(x)) - 0.5 * self._log_det
+
+    def best(self, x: Floats, slopes: Floats, faulty: Floats) -> Floats:
+        """Return the most probable values of a cause that changes the answers by slopes."""
+        weighed = self.weigh(slopes)
+        return np.asarray(
+            np.linalg.solve(slopes.T @ weighed + np.diag(faulty**-2.0), weighed.T @ x)
+        )
+
+    def cause(self, rest: Floats, slopes: Floats, values: Floats, faulty: Floats) -> float:
+        """Return the log evidence of a cause at its values, by Laplace's approximation."""
+        bend = slopes.T @ self.weigh(slopes) * np.outer(faulty, faulty) + np.eye(len(faulty))
+        prior = -0.5 * float(((values / faulty) ** 2).sum())
+        return self.of(rest) + prior - 0.5 * float(np.linalg.slogdet(bend)[1])
+
+
+def _answer(goals: Goals, constant: int) -> Floats:
+    """Answers with one constant changed by its step; a function of its own for a process."""
+    constants = Constants(goals.robot)
+    vector = np.zeros(len(constants.step))
+    vector[constant] = constants.step[constant]
+    return answers(goals, constants.deviation(vector))

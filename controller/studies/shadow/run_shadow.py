@@ -1,0 +1,133 @@
+"""The shadow of a run: a row for each cycle, an alarm while it lasts, and the cause at its end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.studies.shadow.diagnosis import LEAST_S, Goals, diagnose
+from snakewalk.controller.studies.shadow.shadow import Shadow
+from snakewalk.drivers.types import JointState
+
+ALARM_A: Final = 0.03
+"""Difference of a current over the last seconds at which the alarm names a joint (ours)."""
+ALARM_RAD: Final = 0.02
+"""The same of an angle (ours)."""
+_MEMORY_S: Final = 2.0
+"""Time constant of what the alarm looks at (ours)."""
+_SMOOTH_S: Final = 0.1
+"""Time constant that takes the encoder's and the current's steps out of a difference (ours)."""
+
+
+@dataclass
+class ShadowAlarm:
+    """Compares a chain with its shadow from cycle to cycle, and says once of a joint what differs.
+
+    A difference is smoothed over a tenth of a second, and its square over two seconds.
+    """
+
+    robot: RobotConfig
+    cycle_hz: float
+    named: set[int] = field(default_factory=set)
+    """Joints that have been named."""
+
+    def __post_init__(self) -> None:
+        """Begin without a difference."""
+        joints = self.robot.joint_count
+        self._smooth = np.zeros((2, joints))
+        self._square = np.zeros((2, joints))
+        self._cycles = 0
+
+    def update(self, state: JointState, shadow: JointState) -> tuple[str, ...]:
+        """Take a cycle; returns a sentence for each joint that differs from now on."""
+        now = np.stack(
+            [state.current_a - shadow.current_a, state.position_rad - shadow.position_rad]
+        )
+        quick, slow = 1.0 / (self.cycle_hz * _SMOOTH_S), 1.0 / (self.cycle_hz * _MEMORY_S)
+        self._smooth += min(quick, 1.0) * np.where(state.valid, now - self._smooth, 0.0)
+        self._square += min(slow, 1.0) * (self._smooth**2 - self._square)
+        self._cycles += 1
+        if self._cycles < self.cycle_hz * _MEMORY_S:
+            return ()
+        apart_a, apart_rad = np.sqrt(self._square)
+        over = np.maximum(apart_a / ALARM_A, apart_rad / ALARM_RAD)
+        found = [int(j) for j in np.argsort(-over) if over[j] > 1.0 and int(j) not in self.named]
+        self.named.update(found)
+        return tuple(
+            f"{self.robot.joint_name(j)} differs from its shadow: its current by "
+            f"{apart_a[j]:.3f} A, its angle by {apart_rad[j]:.3f} rad (over the last seconds)"
+            for j in found
+        )
+
+
+class RunShadow:
+    """The shadow of a run: begins where the run's joints are, logs each cycle, raises the alarm.
+
+    Args:
+        run: the run.
+        robot: its chain.
+        world: the ground that it is believed to be on.
+        ground: the world's height field, where it has one.
+        pose: initial pose for joint angles (J,) as first measured.
+        log: gets a row for each cycle, and the alarm.
+        on_event: gets the alarm.
+
+    Raises:
+        InputError: the simulator is not installed, or the body cannot be put there.
+
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None,
+        pose: Callable[[Floats], InitialPose],
+        log: RunLog,
+        on_event: Callable[[str, str], None],
+    ) -> None:
+        self._of = (run, robot, world, ground)
+        self._pose, self._log, self._on_event = pose, log, on_event
+        self._rows: list[tuple[float, Floats, Floats, Floats]] = []
+        self._alarm = ShadowAlarm(robot, run.cycle_hz)
+        self._shadow: Shadow | None = None
+        self._first_s: float | None = None
+
+    def begin(self, state: JointState) -> None:
+        """Put the shadow where the joints are; before the first cycle, as it takes a while."""
+        self._shadow = Shadow(*self._of, self._pose(state.position_rad))
+
+    def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
+        """Follow one cycle: its goals as sent, and the state that was read before."""
+        if self._shadow is None:
+            return
+        if self._first_s is None:
+            self._first_s = deadline_s
+        shadow = self._shadow.step(deadline_s - self._first_s, sent_rad)
+        self._rows.append((deadline_s, sent_rad, state.current_a, state.position_rad))
+        self._log.shadow(deadline_s, shadow.position_rad, shadow.current_a)
+        for text in self._alarm.update(state, shadow):
+            self._log.event(deadline_s, "shadow", text, "warning")
+            self._on_event("shadow", text)
+
+    def end(self, time_s: float) -> None:
+        """Say what explains the difference; torque is off by then, as this takes many seconds."""
+        run, robot, world, _ = self._of
+        if len(self._rows) < LEAST_S * run.cycle_hz:
+            return
+        due_s, sent_rad, current_a, measured_rad = (
+            np.array(each) for each in zip(*self._rows, strict=True)
+        )
+        goals = Goals.of(run, robot, world, due_s, sent_rad, measured_rad)
+        found = diagnose(goals, np.stack([current_a, measured_rad]))
+        self._log.event(time_s, "shadow", found.text(robot), "warning" if found.named else "info")
+        self._on_event("shadow", found.text(robot))

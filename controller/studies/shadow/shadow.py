@@ -1,0 +1,51 @@
+"""A simulated chain that gets the goals of another one, at the same times."""
+
+from collections.abc import Callable
+from typing import cast
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.run.backend import simulated
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.drivers.types import BodyPose, JointCommand, JointState
+
+
+class Shadow:
+    """A chain in the simulator, from a pose on.
+
+    Args:
+        run: start, rate and physics step.
+        robot: the chain's.
+        world: the ground that it is believed to be on.
+        ground: the world's height field, where it has one.
+        initial_pose: heading of the head link, and the joint angles to begin with.
+        deviation: in what it differs.
+
+    """
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None,
+        initial_pose: InitialPose,
+        deviation: Deviation = NO_DEVIATION,
+    ) -> None:
+        backend = simulated(run, robot, world, ground, initial_pose, deviation)
+        self._chain, self._clock = backend.chain, backend.clock
+        self.head_pose = cast(Callable[[], BodyPose], backend.pose)
+        """Pose of its head; a simulated body always has one."""
+        self._chain.enable()
+        self._start_s = self._clock.now_s()
+
+    def step(self, since_start_s: float, sent_rad: Floats) -> JointState:
+        """Read at a time since the start, as the other chain was read, then send its goals (J,)."""
+        self._clock.sleep_until_s(self._start_s + since_start_s)
+        state = self._chain.read()
+        self._chain.write(JointCommand(self._clock.now_s(), sent_rad))
+        return state

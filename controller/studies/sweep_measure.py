@@ -1,0 +1,118 @@
+"""One point of a sweep on the physics: through bus, safety layer and simulated servos."""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TypeVar
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.metrics.effort import effort
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.prepared_run import GroundedRun
+from snakewalk.controller.studies.sweep_points import Point
+
+P = TypeVar("P", bound=GroundedRun)
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A point's results, in five digits; None: not known. The fields are columns of a table."""
+
+    ended: str
+    """``ran to its end``, the trip, or ``refused: ...``: then nothing else is known."""
+    cycles: int | None = None
+    ran_hz: float | None = None
+    """Cycles a second that the joints could follow."""
+    forward_bl_cycle: float | None = None
+    left_bl_cycle: float | None = None
+    turn_rad_cycle: float | None = None
+    speed_m_s: float | None = None
+    climb_m_s: float | None = None
+    power_w: float | None = None
+    cost_of_transport: float | None = None
+    mechanical_cost: float | None = None
+    slip: float | None = None
+    peak_current_a: float | None = None
+    peak_torque_n_m: float | None = None
+    peak_temperature_c: float | None = None
+    tracking_max_rad: float | None = None
+    least_rate: float | None = None
+
+
+FRICTION_SPREAD = 0.15
+SUPPLY_SPREAD = 0.05
+
+
+def measure(point: Point, vary: int | None = None) -> Measurement:
+    """Run a point and return its results.
+
+    ``vary`` draws other friction (up to 15 % off) and another supply (5 %), by its seed.
+    """
+    try:
+        prepared = prepare_gait(
+            point.gait,
+            robot=point.robot,
+            world=point.world,
+            parameters=dict(point.parameters),
+            seconds=point.seconds,
+            seed=point.seed,
+            keys=dict(point.keys),
+        )
+        if vary is not None:
+            prepared = varied(prepared, np.random.default_rng(vary))
+        with TemporaryDirectory() as folder:
+            finished = execute(prepared, Path(folder), stoppable=False)
+    except InputError as error:
+        return Measurement(f"refused: {error.faults[0]}")
+    record = finished.record
+    moved, cost = gait_displacement(record), effort(record)
+    numbers = finished.summary
+    return Measurement(
+        ended=finished.outcome.tripped or "ran to its end",
+        cycles=moved.cycles,
+        ran_hz=_digits(moved.frequency_hz),
+        forward_bl_cycle=_digits(moved.forward_bl),
+        left_bl_cycle=_digits(moved.left_bl),
+        turn_rad_cycle=_digits(moved.turn_rad),
+        speed_m_s=_digits(moved.speed_m_s),
+        climb_m_s=_digits(cost.climb_m_s),
+        power_w=_digits(cost.power_w),
+        cost_of_transport=_digits(cost.cost_of_transport),
+        mechanical_cost=_digits(cost.mechanical_cost),
+        slip=_digits(cost.slip),
+        peak_current_a=_digits(numbers.peak_current_a),
+        peak_torque_n_m=_digits(numbers.peak_torque_n_m),
+        peak_temperature_c=_digits(numbers.peak_temperature_c),
+        tracking_max_rad=_digits(numbers.tracking_max_rad),
+        least_rate=_digits(finished.outcome.least_rate),
+    )
+
+
+def varied(prepared: P, rng: np.random.Generator) -> P:
+    """Return a run with other friction (up to 15 % off) and another supply (5 %)."""
+    world, robot = prepared.world, prepared.robot
+    slick, volts = rng.uniform(-1.0, 1.0, 2)
+    factor = 1.0 + FRICTION_SPREAD * slick
+    friction = world.friction.model_copy(
+        update={
+            "along": world.friction.along * factor,
+            "across": world.friction.across * factor,
+        }
+    )
+    supply = robot.servo.supply_v * (1.0 + SUPPLY_SPREAD * volts)
+    servo = robot.servo.model_copy(update={"supply_v": supply})
+    return replace(
+        prepared,
+        world=world.model_copy(update={"friction": friction}),
+        robot=robot.model_copy(update={"servo": servo}),
+    )
+
+
+def _digits(value: float | None) -> float | None:
+    """Five digits, and None for what is not known: a table is read by people too."""
+    return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

@@ -1,0 +1,184 @@
+"""Points of a sweep: a Sobol sequence over the parameters of gaits, as far as robots allow them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+from scipy.stats import qmc
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.gaits.gait import Gait, Range, ranges
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.run.factory import gait_keys, with_keys_of
+
+SLOWEST_HZ = 0.2
+_TRIES = 64
+"""Most draws for each point: a robot may refuse most of a range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One gait with its parameters on one robot; number 0 has the defaults."""
+
+    gait: str
+    robot: str
+    """Shipped name, or the path of a TOML file."""
+    world: str
+    number: int
+    seed: int
+    seconds: float
+    parameters: dict[str, Any] = field(default_factory=dict)
+    keys: tuple[tuple[str, Any], ...] = ()
+    """Values of run, robot and world that are replaced, as of ``prepare_gait``."""
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What tells it from other points of a table, as text."""
+        place = (self.gait, self.robot, self.world)
+        replaced = " ".join(f"{key}={value}" for key, value in self.keys)
+        return (*place, replaced, str(self.number), str(self.seed), f"{self.seconds:g}")
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """The parameters of a gait that can be varied, as a unit cube."""
+
+    gait: type[Gait]
+    spans: dict[str, Range]
+
+    @classmethod
+    def of(cls, gait: type[Gait]) -> "Space":
+        """All numbers of the gait; mirroring is no new gait."""
+        spans = {k: span for k, span in ranges(gait.model).items() if span.kind is not bool}
+        return cls(gait, spans)
+
+    def values(self, unit: Floats) -> dict[str, Any]:
+        """Parameters of a point (d,) of the unit cube."""
+        found: dict[str, Any] = {}
+        for (name, span), u in zip(self.spans.items(), unit, strict=True):
+            low = max(span.low, SLOWEST_HZ) if name == "frequency_hz" else span.low
+            value = low + float(np.clip(u, 0.0, 1.0)) * (span.high - low)
+            found[name] = round(value) if span.kind is int else float(f"{value:.4g}")
+        return found
+
+    def unit(self, values: dict[str, Any]) -> Floats:
+        """Return the point (d,) of the unit cube where parameters have these values."""
+        found = []
+        for name, span in self.spans.items():
+            low = max(span.low, SLOWEST_HZ) if name == "frequency_hz" else span.low
+            found.append((float(values[name]) - low) / (span.high - low))
+        return np.asarray(np.clip(np.array(found), 0.0, 1.0))
+
+
+def points_of(
+    gait: type[Gait],
+    robot: RobotConfig,
+    count: int,
+    *,
+    seed: int,
+    seconds: float,
+    file: str | None = None,
+    keys: Mapping[str, Any] | None = None,
+) -> tuple[list[Point], int]:
+    """Return up to ``count`` points that the robot's joints allow, and how many they did not.
+
+    ``file`` is where the robot stands if it is not shipped: a worker loads it again, with ``keys``,
+    which ``robot`` has already.
+
+    Raises:
+        InputError: the robot lacks joints that the gait needs.
+
+    """
+    gait().check(robot)
+    space = Space.of(gait)
+    place = (gait.name, file or robot.name, gait.world)
+    replaced = tuple((keys or {}).items())
+    found = [Point(*place, 0, seed, seconds, keys=replaced)]
+    refused = 0
+    sobol = qmc.Sobol(
+        len(space.spans), rng=np.random.default_rng([seed, crc32(gait.name.encode())])
+    )
+    draws = sobol.random_base2(int(np.ceil(np.log2(count * _TRIES))))
+    for unit in draws:
+        if len(found) >= count:
+            break
+        values = space.values(unit)
+        try:
+            gait.of(values).check(robot)
+        except InputError:
+            refused += 1
+            continue
+        number = len(found)
+        found.append(Point(*place, number, seed, seconds, values, replaced))
+    return found, refused
+
+
+def robot_file(name_or_path: str) -> str | None:
+    """Return the whole path of a robot's own file; None of a shipped robot."""
+    return str(Path(name_or_path).resolve()) if name_or_path.endswith(".toml") else None
+
+
+ROBOTS = ("yaw16", "alternating16")
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """What will be run."""
+
+    points: list[Point]
+    left_out: list[str]
+    """Gaits that a robot cannot make, and points that its joints do not allow."""
+
+
+def plan_sweep(
+    gaits: list[str] | None,
+    robots: list[str] | None,
+    count: int,
+    *,
+    seed: int,
+    seconds: float,
+    keys: Mapping[str, Any] | None = None,
+) -> Planned:
+    """Draw the points, once where a name stands twice; ``keys`` as of ``prepare_gait``.
+
+    Raises:
+        InputError: unknown gaits, robots or keys, or nothing that fits.
+
+    """
+    keys = gait_keys(keys)
+    unknown = [name for name in gaits or () if name not in GAITS]
+    if unknown:
+        raise InputError(
+            [f"{name}: no such gait; there are {', '.join(GAITS)}" for name in unknown]
+        )
+    bodies = [
+        (with_keys_of("robot", load_robot(name), keys), robot_file(name))
+        for name in dict.fromkeys(robots or ROBOTS)
+    ]
+    points: list[Point] = []
+    left_out: list[str] = []
+    for name in dict.fromkeys(gaits or GAITS):
+        for body, file in bodies:
+            try:
+                with_keys_of("world", load_world(GAITS[name].world), keys)
+                some, refused = points_of(
+                    GAITS[name], body, count, seed=seed, seconds=seconds, file=file, keys=keys
+                )
+            except InputError as error:
+                left_out.append(error.faults[0])
+                continue
+            points += some
+            if refused or len(some) < count:
+                left_out.append(
+                    f"{name} on {body.name}: {refused} draws that its joints do not allow"
+                    + (f"; only {len(some)} points" if len(some) < count else "")
+                )
+    if not points:
+        raise InputError(left_out)
+    return Planned(points, left_out)

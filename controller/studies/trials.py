@@ -1,0 +1,427 @@
+"""Runs and gaits over many seeds, motions, robots, grounds and frictions, on a process pool."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import digest
+from snakewalk.controller.console.pool import each
+from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.metrics.failure import failure
+from snakewalk.controller.metrics.ground_contact import ground_contact
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import (
+    is_gait,
+    prepare_gait,
+    prepare_job,
+    with_compliance,
+)
+from snakewalk.controller.run.gait_run import GaitRun
+from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.terrain.summary import path_relief
+from snakewalk.controller.track.readers.load import load_track
+
+Value = str | int | float | bool
+
+GAIT_SECONDS = 20.0
+_START_DRAWS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What distinguishes one row of the table; None leaves the run's own."""
+
+    run: str
+    motion: str
+    robot: str | None = None
+    relief: float = 1.0
+    """Factor on the heights of the ground."""
+    keys: tuple[tuple[str, Value], ...] = ()
+    """Values of the run's, robot's and world's files that are replaced; ``_deg`` for ``_rad``."""
+    compliance: bool | None = None
+    """Whether joints yield to measured current."""
+    world: str | None = None
+
+    @property
+    def is_gait(self) -> bool:
+        """Whether ``run`` names a gait, or a set of its parameters."""
+        return is_gait(self.run)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One simulated run."""
+
+    case: Case
+    seed: int
+    start_m: tuple[float, float] | None = None
+    """Where the head started; None where the run could not be prepared."""
+    waypoints: int = 0
+    complete: bool = False
+    reached: int = 0
+    missed: int = 0
+    """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
+    duration_s: float = math.nan
+    slope_median_deg: float = math.nan
+    """Of the surface in the strip along the path that the body stands on."""
+    path_error_m: float = math.nan
+    """Mean."""
+    path_error_max_m: float = math.nan
+    eta: float = math.nan
+    """Forward speed over pulse speed."""
+    cost_of_transport: float = math.nan
+    """Electrical."""
+    lead_max_rad: float = math.nan
+    """Largest difference between an asked and a measured joint angle."""
+    speed_m_s: float = math.nan
+    """Of a gait over the ground, net, at full rate."""
+    current_max_a: float = math.nan
+    roll_max_deg: float = math.nan
+    in_air: float = math.nan
+    """Share of links that do not touch the ground, mean."""
+    truly_reached: float = math.nan
+    """Waypoints that the body came to, where its pose was estimated; NaN of a measured one."""
+    head_error_m: float = math.nan
+    """How far the estimated head is off, root of the mean square; NaN of a measured one."""
+    alarms: int = 0
+    """For missing advance."""
+    cause: str = ""
+    """Of a run that is not complete: that of ``metrics.failure``, or ``refused`` or ``error``."""
+    why: str = ""
+    """The same in a sentence."""
+
+    @property
+    def first_pass(self) -> bool:
+        """Whether every waypoint was reached on the first path that was laid."""
+        return self.complete and self.missed == 0
+
+
+def prepare_case(
+    case: Case, seed: int, spread_m: float, changes: Mapping[str, object]
+) -> WalkRun | GaitRun:
+    """Prepare one trial's run; its start is moved by a normal deviate, drawn from the seed.
+
+    A walk's start on unsafe ground is drawn again, so that the moved start does not fail by itself.
+
+    Raises:
+        InputError: the run cannot be prepared, or there is no safe ground about its start.
+
+    """
+    found = _prepared(case, seed, changes)
+    found = replace(found, run=with_compliance(found.run, case.compliance))
+    if case.relief != 1.0:
+        found = replace(found, world=found.world.with_relief(case.relief))
+    if spread_m == 0.0:
+        return found
+    relief = found.planner.relief if isinstance(found, WalkRun) else None
+    start_m, rng = np.array(found.run.start_m), np.random.default_rng(seed)
+    for _ in range(_START_DRAWS):
+        x_m, y_m = start_m + spread_m * rng.standard_normal(2)
+        if relief is None or relief.safe(x_m, y_m):
+            moved = found.run.model_copy(update={"start_m": (float(x_m), float(y_m))})
+            return replace(found, run=moved)
+    raise InputError(
+        f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
+        f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
+    )
+
+
+def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun | GaitRun:
+    given = {"robot": case.robot, "world": case.world}
+    options: dict[str, Any] = dict(changes) | {k: v for k, v in given.items() if v is not None}
+    seconds = options.pop("seconds", None)
+    if not case.is_gait:
+        options |= {"motion": case.motion, "seed": seed}
+        return prepare_job(case.run, keys=dict(case.keys), **options)
+    return prepare_gait(
+        case.run,
+        robot=case.robot,
+        world=case.world,
+        seconds=float(str(seconds)) if seconds is not None else GAIT_SECONDS,
+        seed=seed,
+        keys=dict(case.keys),
+    )
+
+
+def parse_over(text: str) -> tuple[str, tuple[Value, ...]]:
+    """Read ``world.ground.slope_deg=5,10,15``: a key and the values it takes in turn.
+
+    Raises:
+        InputError: there is no key, or no value.
+
+    """
+    key, equals, values = (part.strip() for part in text.partition("="))
+    words = [word.strip() for word in values.split(",")]
+    if not (key and equals and all(words)):
+        raise InputError(f"--over {text}: must be KEY=VALUE,VALUE,...")
+    return key, tuple(dict.fromkeys(_value(word) for word in words))
+
+
+def _value(word: str) -> Value:
+    try:
+        value = parse_json(word)
+    except ValueError:
+        return word
+    return value if isinstance(value, int | float | bool) else word
+
+
+def config_digest(case: Case, changes: Mapping[str, object]) -> str:
+    """Tell the configuration of a case from every other: run, robot, world, but for seed and start.
+
+    Raises:
+        InputError: the case cannot be prepared.
+
+    """
+    found = prepare_case(case, 0, 0.0, changes)
+    return digest(found.run, found.robot, found.world)
+
+
+def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
+    """Whether all seeds give the same run, so that it counts once.
+
+    The seed draws the start, the walk's shapes, a camera's noise and an IMU's bias and noise, and
+    nothing of a serpenoid or of a gait.
+    """
+    run = prepare_case(case, 0, 0.0, changes).run
+    drawn = run.pose in {"camera", "imu"}
+    return spread_m == 0.0 and run.motion in {"serpenoid", "gait"} and not drawn
+
+
+def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> Trial:
+    """Simulate one run; its log is not kept. A run that ends in an exception is a trial as well."""
+    trial = Trial(case, seed)
+    try:
+        prepared = prepare_case(case, seed, spread_m, changes)
+        trial = replace(
+            trial, start_m=prepared.run.start_m, waypoints=len(prepared.run.waypoints_m)
+        )
+        if isinstance(prepared, WalkRun):
+            slope_rad = path_relief(prepared.planner, prepared.path).median_footprint_slope_rad
+            trial = replace(trial, slope_median_deg=float(np.degrees(slope_rad)))
+        return _measured(trial, prepared)
+    except InputError as error:
+        return replace(trial, cause="refused", why=f"refused: {error.faults[0]}")
+    except Exception as error:  # the other runs go on
+        return replace(trial, cause="error", why=f"{type(error).__name__}: {error}")
+
+
+def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
+    with TemporaryDirectory() as folder:
+        finished = execute(prepared, Path(folder), stoppable=False)
+        stood = ground_contact(finished.record, prepared.ground)
+    numbers, outcome, off = finished.summary, finished.outcome, finished.pose.error
+    complete = outcome.complete
+    ended = None if complete else failure(finished.record)
+    return replace(
+        trial,
+        complete=complete,
+        reached=outcome.reached,
+        missed=outcome.missed,
+        duration_s=outcome.duration_s,
+        speed_m_s=gait_displacement(finished.record).speed_m_s if trial.case.is_gait else math.nan,
+        path_error_m=_number(numbers.path_error_mean_m),
+        path_error_max_m=_number(numbers.path_error_max_m),
+        eta=_number(numbers.eta),
+        cost_of_transport=_number(numbers.electrical_cost_of_transport),
+        lead_max_rad=_number(numbers.tracking_max_rad),
+        current_max_a=_number(numbers.peak_current_a),
+        roll_max_deg=float(np.degrees(stood.roll_max_rad)),
+        in_air=stood.in_air,
+        truly_reached=math.nan if off is None else float(off.waypoints_reached),
+        head_error_m=math.nan if off is None else off.head_rms_m,
+        alarms=outcome.alarms,
+        cause="" if ended is None else ended.cause,
+        why="" if ended is None else ended.text,
+    )
+
+
+def plan_trials(
+    cases: Sequence[Case], seeds: Sequence[int], spread_m: float, changes: Mapping[str, object]
+) -> list[tuple[Case, int]]:
+    """List what is to be run, seed by seed: what is stopped has nearly as many runs of each case.
+
+    A case of which all seeds give the same run stands once.
+
+    Raises:
+        InputError: a case cannot be prepared, or the recording that its shapes come from not read.
+
+    """
+    shaped = [case for case in cases if case.motion not in {"serpenoid", "gait"}]
+    for track in dict.fromkeys(prepare_case(case, 0, 0.0, changes).run.track for case in shaped):
+        load_track(track)
+    fixed = {case: is_fixed(case, spread_m, changes) for case in cases}
+    return [(case, seed) for seed in seeds for case in cases if seed == seeds[0] or not fixed[case]]
+
+
+def trials(
+    planned: Sequence[tuple[Case, int]],
+    workers: int,
+    *,
+    spread_m: float,
+    changes: Mapping[str, object],
+) -> Iterator[Trial]:
+    """Yield the planned trials as they finish; ``changes`` replace fields of the runs."""
+    work = partial(_run_seed, spread_m=spread_m, changes=changes)
+    for _, trial in each(work, planned, workers=workers):
+        yield trial
+
+
+def _run_seed(item: tuple[Case, int], *, spread_m: float, changes: Mapping[str, object]) -> Trial:
+    return run_trial(*item, spread_m, changes)
+
+
+@dataclass(frozen=True, slots=True)
+class CaseSummary:
+    """The trials of one case, rounded for a reader; None: not known. The fields are columns."""
+
+    run: str
+    robot: str
+    motion: str
+    relief: float
+    keys: dict[str, Value]
+    """What was replaced in the files."""
+    runs: int
+    slope_deg: float | None
+    complete: str
+    """``n of m`` runs."""
+    complete_95: tuple[float, float]
+    """Interval of the share of complete runs (Wilson, 95 %)."""
+    first_pass: int
+    """Complete runs that passed no waypoint by."""
+    first_pass_95: tuple[float, float]
+    reached: float | None
+    passed_by: int
+    """In all runs, also in those that are not complete."""
+    duration_s: float | None
+    path_error_m: float | None
+    path_error_max_m: float | None
+    eta: float | None
+    cost_of_transport: float | None
+    lead_max_rad: float | None
+    current_max_a: float | None
+    roll_max_deg: float | None
+    in_air: float | None
+    alarms: int
+    causes: dict[str, int]
+    """Of failure, how many runs each, most first."""
+    why: str
+    """The same in a line; what the software did not foresee in full."""
+    compliance: str = ""
+    """``on`` or ``off`` where it was chosen."""
+    speed_m_s: float | None = None
+    """Of gaits, net, mean of the runs."""
+    speed_sd_m_s: float | None = None
+    """Standard deviation of that speed from run to run."""
+    truly_complete: str = ""
+    """``n of m`` runs whose body came to every waypoint, where its pose was estimated."""
+    head_error_m: float | None = None
+    """Of an estimated pose, mean over the runs."""
+    world: str = ""
+    """Where one was chosen."""
+    rolled: int = 0
+    """Runs in which the head link was over 90 degrees on its side at some time."""
+
+
+def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
+    """One row a case: runs complete, means and extremes over its runs, and why others failed."""
+    rows: list[CaseSummary] = []
+    for case in cases:
+        some = sorted((t for t in found if t.case == case), key=lambda t: t.seed)
+        complete, first = sum(t.complete for t in some), sum(t.first_pass for t in some)
+        rows.append(
+            CaseSummary(
+                run=case.run,
+                robot=case.robot or "",
+                motion=case.motion,
+                relief=case.relief,
+                keys=dict(case.keys),
+                runs=len(some),
+                slope_deg=_mean([t.slope_median_deg for t in some], 1),
+                complete=f"{complete} of {len(some)}",
+                complete_95=wilson(complete, len(some)),
+                first_pass=first,
+                first_pass_95=wilson(first, len(some)),
+                reached=_mean([t.reached for t in some], 2),
+                passed_by=sum(t.missed for t in some),
+                duration_s=_mean([t.duration_s for t in some], 1),
+                path_error_m=_mean([t.path_error_m for t in some], 3),
+                path_error_max_m=_most([t.path_error_max_m for t in some], 2),
+                eta=_mean([t.eta for t in some], 2),
+                cost_of_transport=_mean([t.cost_of_transport for t in some], 2),
+                lead_max_rad=_most([t.lead_max_rad for t in some], 3),
+                current_max_a=_most([t.current_max_a for t in some], 2),
+                roll_max_deg=_most([t.roll_max_deg for t in some], 0),
+                in_air=_mean([t.in_air for t in some], 2),
+                alarms=sum(t.alarms for t in some),
+                causes=_counts([t.cause for t in some if not t.complete]),
+                why=reasons([t for t in some if not t.complete]),
+                compliance={None: "", True: "on", False: "off"}[case.compliance],
+                speed_m_s=_mean([t.speed_m_s for t in some], 4),
+                speed_sd_m_s=_deviation([t.speed_m_s for t in some], 4),
+                truly_complete=_truly_complete(some),
+                head_error_m=_mean([t.head_error_m for t in some], 3),
+                world=case.world or "",
+                rolled=sum(t.roll_max_deg > 90.0 for t in some),
+            )
+        )
+    return rows
+
+
+def _truly_complete(some: Sequence[Trial]) -> str:
+    known = [t for t in some if np.isfinite(t.truly_reached)]
+    if not known:
+        return ""
+    return f"{sum(t.truly_reached == t.waypoints for t in known)} of {len(known)}"
+
+
+def wilson(successes: int, runs: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share by E. B. Wilson (1927), three digits; (0, 1) of no run.
+
+    Unlike the normal approximation it holds for few runs and for shares of 0 and 1.
+    """
+    if runs == 0:
+        return 0.0, 1.0
+    z = 1.959964  # normal quantile of 97.5 %
+    share, square = successes / runs, z * z / runs
+    middle = (share + square / 2.0) / (1.0 + square)
+    half = z * math.sqrt((share * (1.0 - share) + square / 4.0) / runs) / (1.0 + square)
+    return round(max(middle - half, 0.0), 3), round(min(middle + half, 1.0), 3)
+
+
+def reasons(failed: Sequence[Trial]) -> str:
+    """Why runs failed and in a line: ``2 slip; 1 refused: ...``."""
+    words = [t.why if t.cause in {"safety", "refused", "error"} else t.cause for t in failed]
+    return "; ".join(f"{count} {word}" for word, count in _counts(words).items())
+
+
+def _counts(words: Sequence[str]) -> dict[str, int]:
+    """Words by how often they occur."""
+    return dict(sorted(sorted(Counter(words).items()), key=lambda item: -item[1]))
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def _mean(values: list[float] | list[int], digits: int) -> float | None:
+    known = [v for v in values if np.isfinite(v)]
+    return round(float(np.mean(known)), digits) if known else None
+
+
+def _deviation(values: list[float], digits: int) -> float | None:
+    known = [v for v in values if np.isfinite(v)]
+    return round(float(np.std(known, ddof=1)), digits) if len(known) > 1 else None
+
+
+def _most(values: list[float], digits: int) -> float | None:
+    known = [v for v in values if np.isfinite(v)]
+    return round(max(known), digits) if known else None

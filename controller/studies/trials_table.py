@@ -1,0 +1,58 @@
+"""The table of trials, one tidy CSV: a row for each finished run, written when it finishes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from snakewalk.controller.console.table import CsvTable
+from snakewalk.controller.studies.trials import Case, Trial
+
+_CASE = tuple(field.name for field in fields(Case))
+_MEASURED = tuple(f.name for f in fields(Trial) if f.name not in {"case", "seed"})
+_PLACE = ("config", "start_spread_m", "seed")
+COLUMNS = (*_CASE, *_PLACE, *_MEASURED)
+"""``config`` is the digest of the three files; ``keys`` are told as ``KEY=VALUE KEY=VALUE``."""
+
+
+class TrialsTable(CsvTable):
+    """Finished trials."""
+
+    def __init__(self, path: Path, configs: Mapping[Case, str], spread_m: float) -> None:
+        """Open or make the table; ``configs`` holds the digest of each case.
+
+        Raises:
+            InputError: the file is something else.
+
+        """
+        super().__init__(path, columns=COLUMNS, place=_PLACE, command="trials")
+        self._configs, self._spread = dict(configs), f"{spread_m:g}"
+
+    def finished(self, planned: Sequence[tuple[Case, int]]) -> list[Trial]:
+        """Those of ``planned`` that the table holds."""
+        found: list[Trial] = []
+        for case, seed in planned:
+            row = self.held(self._where(case, seed))
+            if row is not None:
+                values: dict[str, object] = {key: row[key] for key in _MEASURED}
+                start_m = row["start_m"].split() or None
+                values |= {"case": case, "seed": seed, "start_m": start_m}
+                found.append(_TRIAL.validate_python(values))
+        return found
+
+    def add(self, trial: Trial) -> None:
+        """Append a finished trial."""
+        case, measured = asdict(trial.case), asdict(trial)
+        case["keys"] = " ".join(f"{key}={value}" for key, value in trial.case.keys)
+        case["robot"], case["world"] = trial.case.robot or "", trial.case.world or ""
+        case["compliance"] = {None: "", True: "on", False: "off"}[trial.case.compliance]
+        measured["start_m"] = " ".join(map(str, trial.start_m or ()))
+        place = dict(zip(_PLACE, self._where(trial.case, trial.seed), strict=True))
+        self.append(case | place | {key: measured[key] for key in _MEASURED})
+
+    def _where(self, case: Case, seed: int) -> tuple[str, ...]:
+        return (self._configs[case], self._spread, str(seed))
+
+
+_TRIAL = TypeAdapter(Trial)

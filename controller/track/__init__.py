@@ -1,0 +1,1 @@
+"""Recordings of moving bodies: data type, readers, frame status, resampling, analysis."""

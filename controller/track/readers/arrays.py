@@ -1,0 +1,260 @@
+"""Recordings as named arrays: .npz and MATLAB files of bodies, .npy files of joint angles."""
+
+import math
+import struct
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.readers.formats import KNOWN
+from snakewalk.controller.track.resample import body_points
+from snakewalk.controller.track.track import Track, track_from_points
+
+_MAT_HEAD = 128
+_MAT_PACKED = 15
+_PIECE = 1_000_000
+SKELETON_RATE_HZ = 30.0
+JOINT_RATE_HZ = 32.0
+"""Defaults: neither kind of file holds a frame rate."""
+_BODIES = ("points", "angles_rad", "x", "y", "skeletons")
+ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "licence"} | {
+    "rate_assumed",
+    "verdict",
+    "time_s",
+}
+"""The arrays that are read of an .npz; others, such as the widths of a body, stay in the file."""
+
+
+def save_track(path: Path, track: Track) -> None:
+    """Write our own format: points (dropped frames as NaN), rate_hz, length_m (NaN: no scale)."""
+    number = np.rint(track.time_s * track.rate_hz).astype(int)
+    points = np.full((number[-1] + 1, *track.points.shape[1:]), np.nan)
+    points[number] = track.points
+    verdict = [FrameStatus.MISSING] * len(points)
+    for k, status in zip(number, track.status or [FrameStatus.GOOD] * len(number), strict=True):
+        verdict[k] = status
+    np.savez_compressed(
+        path,
+        points=points,
+        rate_hz=track.rate_hz,
+        length_m=np.nan if track.length_m is None else track.length_m,
+        name=track.name,
+        source=track.source,
+        licence=track.licence,
+        rate_assumed=track.rate_assumed,
+        verdict=np.array([str(one) for one in verdict]),
+    )
+
+
+def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
+    """Load the arrays of an .npz by ``track_from_arrays``; see ``load.load_file``."""
+    try:
+        held, others = read_arrays(file, ARRAYS)
+    except (ValueError, OSError) as error:
+        raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
+    return track_from_arrays(file, held, rate_hz, least_score, others)
+
+
+def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
+    """Load the variables of a MATLAB file up to version 7 by ``track_from_arrays``; 7.3 is HDF5."""
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415  slow to import
+
+    size = file.stat().st_size
+    check_expansion(file, size, _unpacked_mat(file.read_bytes()))
+    try:
+        said = 8 * sum(math.prod(shape) for _, shape, _ in whosmat(file))
+        check_expansion(file, size, said)  # of a cell or struct, too, whose fields may be none
+        held = loadmat(file)
+    except InputError:
+        raise
+    except Exception as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(
+            f"{file}: is no MAT file that can be read: {reason}; known: {KNOWN}"
+        ) from None
+    arrays = {name: np.asarray(data) for name, data in held.items() if not name.startswith("__")}
+    return track_from_arrays(file, arrays, rate_hz, least_score)
+
+
+def _unpacked_mat(data: bytes) -> int:
+    """Bytes that a MATLAB file takes unpacked; variables are packed one by one."""
+    order = "<" if data[126:128] == b"IM" else ">"
+    at, size = _MAT_HEAD, 0
+    while at + 8 <= len(data):
+        kind, length = struct.unpack_from(f"{order}II", data, at)
+        at += 8
+        if kind == _MAT_PACKED:
+            size += _unpacked(memoryview(data)[at : at + length])
+        else:
+            size += length
+        at += length
+    return size
+
+
+def _unpacked(packed: memoryview) -> int:
+    """Bytes that a zlib stream takes unpacked, counted piece by piece; stops where it is broken."""
+    stream, size = zlib.decompressobj(), 0
+    rest: bytes | memoryview = packed
+    try:
+        while rest and size <= MOST_BYTES:
+            size += len(stream.decompress(rest, _PIECE))
+            rest = stream.unconsumed_tail
+    except zlib.error:
+        pass
+    return size
+
+
+def track_from_arrays(
+    file: Path,
+    held: dict[str, NDArray[np.generic]],
+    rate_hz: float | None,
+    least_score: float | None = None,
+    others: Sequence[str] = (),
+) -> Track:
+    """Make a track of named arrays, as .npz and .mat hold them.
+
+    ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P), in metres where ``length_m`` is
+    a number; ``angles_rad`` are the (T, P) directions of equally long pieces, and ``length_m`` is
+    then the body's length. Frames a second are ``rate_hz``, or ``time_s`` or ``t`` in seconds
+    say when each frame was taken, evenly or not. ``score`` (T, P)
+    is how sure the tracker was. ``skeletons`` are pixels, rows downwards.
+    """
+    time_s = None if rate_hz is not None else _times(file, held)
+    given = rate_hz
+    if given is None and "rate_hz" in held:
+        given = _scalar(file, "rate_hz", held["rate_hz"])
+    if given is None and time_s is not None:
+        given = float(1.0 / np.median(np.diff(time_s)))
+    bodies = held.keys() & {"points", "angles_rad"} or {"x", "y"} <= held.keys()
+    if bodies and given is not None:
+        length_m = _scalar(file, "length_m", held.get("length_m", np.array(np.nan)))
+        points = _bodies(file, held, length_m if np.isfinite(length_m) else 1.0)
+        return track_from_points(
+            _text(held, "name", file.stem),
+            _without_unsure(file, points, held, least_score),
+            given,
+            scale_m=1.0 if np.isfinite(length_m) else None,
+            time_s=time_s if time_s is not None and len(time_s) == len(points) else None,
+            rate_assumed=rate_hz is None and _assumed(held),
+            status=_status(held, len(points)),
+            source=_text(held, "source", "not stated"),
+            licence=_text(held, "licence", "not stated"),
+        )
+    if "skeletons" in held:
+        points = _floats(file, "skeletons", held["skeletons"])
+        if points.ndim == 3:
+            points = points * [1.0, -1.0]
+        points = _without_unsure(file, points, held, least_score)
+        rate = SKELETON_RATE_HZ if given is None else given
+        return track_from_points(file.stem, points, rate, rate_assumed=given is None)
+    names = ", ".join(sorted([*held, *others])[:12]) or "none"
+    raise InputError(
+        f"{file}: expected the arrays points or angles_rad (or x and y), and rate_hz or t (and "
+        f"length_m); or skeletons; found {names}"
+    )
+
+
+def _assumed(held: dict[str, NDArray[np.generic]]) -> bool:
+    """Whether the file says that its rate was a guess."""
+    return "rate_assumed" in held and bool(held["rate_assumed"].reshape(-1)[:1].astype(bool).all())
+
+
+def _status(held: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStatus]:
+    """The frames' verdicts, if these are ours."""
+    words = [str(one) for one in held.get("verdict", np.array([])).reshape(-1)]
+    known = {str(one) for one in FrameStatus}
+    return list(map(FrameStatus, words)) if len(words) == frames and known >= set(words) else []
+
+
+def _times(file: Path, held: dict[str, NDArray[np.generic]]) -> Floats | None:
+    """When the frames were taken, s; None if the file does not say."""
+    key = next((name for name in ("time_s", "t") if name in held), None)
+    if key is None:
+        return None
+    time_s = _floats(file, key, held[key]).ravel()
+    step = np.diff(time_s)
+    if len(step) == 0 or not (step > 0.0).all():
+        raise InputError(f"{file}: {key} must increase from frame to frame, in seconds")
+    return time_s
+
+
+def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> Floats:
+    """Points (T, P, 2) from whichever array there is."""
+    if "points" in held:
+        return _floats(file, "points", held["points"])
+    if "angles_rad" in held:
+        angles = _floats(file, "angles_rad", held["angles_rad"])
+        if angles.ndim != 2 or angles.shape[1] < 4:
+            raise InputError(
+                f"{file}: angles_rad must be (frames, 4 or more), {_not_shape(angles)}"
+            )
+        return body_points(angles, length)
+    x, y = _floats(file, "x", held["x"]), _floats(file, "y", held["y"])
+    if x.shape != y.shape or x.ndim != 2:
+        raise InputError(f"{file}: x and y must both be (frames, points), not {x.shape}, {y.shape}")
+    return np.stack([x, y], axis=-1)
+
+
+def _without_unsure(
+    file: Path, points: Floats, held: dict[str, NDArray[np.generic]], least_score: float | None
+) -> Floats:
+    """Points; NaN where the tracker's score is below the least one."""
+    if not least_score:
+        return points
+    if "score" not in held:
+        raise InputError(f"{file}: holds no scores to compare with a least score of {least_score}")
+    score = _floats(file, "score", held["score"])
+    if score.shape != points.shape[:2]:
+        raise InputError(f"{file}: score must be (frames, points), {_not_shape(score)}")
+    return np.where((score < least_score)[..., None], np.nan, points)
+
+
+def load_npy(file: Path, rate_hz: float | None) -> Track:
+    """Load joint angles (T, J), rad, column 0 next to the head; see ``load.load_file``.
+
+    Positive bends the head side to the left. Where the body was and faced is not in such a file:
+    every frame faces along x in the mean, its head at the origin.
+    """
+    try:
+        held = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than is there
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
+    joints = _floats(file, "joint angles", np.asarray(held))
+    if joints.ndim != 2 or joints.shape[1] < 3:
+        raise InputError(
+            f"{file}: expected joint angles (frames, 3 or more joints), {_not_shape(joints)}"
+        )
+    link_rad = np.concatenate([np.zeros((len(joints), 1)), -np.cumsum(joints, axis=1)], axis=1)
+    points = body_points(link_rad - link_rad.mean(axis=1, keepdims=True))
+    rate = JOINT_RATE_HZ if rate_hz is None else rate_hz
+    return track_from_points(file.stem, points, rate, rate_assumed=rate_hz is None)
+
+
+def _floats(file: Path, what: str, values: NDArray[np.generic]) -> Floats:
+    if values.dtype.kind not in "fiu":
+        raise InputError(f"{file}: {what}: expected numbers, not {values.dtype}")
+    return np.asarray(values, dtype=float)
+
+
+def _scalar(file: Path, what: str, value: NDArray[np.generic]) -> float:
+    number = _floats(file, what, value)
+    if number.size != 1:
+        raise InputError(f"{file}: {what}: expected one number, {_not_shape(number)}")
+    return float(number.reshape(()))
+
+
+def _text(held: dict[str, NDArray[np.generic]], name: str, default: str) -> str:
+    if name not in held or held[name].size != 1:
+        return default
+    return str(held[name].reshape(-1)[0])
+
+
+def _not_shape(values: Floats) -> str:
+    return f"not an array of shape {values.shape}"

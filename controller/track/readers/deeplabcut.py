@@ -1,0 +1,161 @@
+"""DeepLabCut's files: a table whose column names are stacked in three or four rows.
+
+``scorer``, ``individuals`` (only of several animals), ``bodyparts`` and ``coords`` (x, y,
+likelihood; hand labels have no likelihood). The HDF5 file is the same table as pandas writes it: a
+group, usually ``df_with_missing``, with a ``table`` of ``values_block_0`` whose column names are a
+pickle in the group's attribute ``non_index_axes``.
+"""
+
+import io
+import pickle
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.track import frame_numbers
+
+PCUTOFF = 0.6
+"""DeepLabCut's own default: below this likelihood it does not draw a point."""
+_LEVELS = {"scorer", "individuals", "bodyparts", "coords"}
+_NUMBER = re.compile(r"(\d+)(?:\.[A-Za-z]+)?$")  # 12, or labeled-data/film/img0012.png
+_OF_NONE = "single"  # body parts that belong to no animal
+Column = tuple[str, str, str]
+"""Individual, body part, coordinate."""
+
+
+def is_deeplabcut(rows: list[list[str]]) -> bool:
+    """Whether these rows begin as DeepLabCut's CSV does."""
+    return len(rows) > 3 and rows[0][0] == "scorer" and "coords" in (rows[2][0], rows[3][0])
+
+
+def load_rows(
+    file: Path,
+    rows: list[list[str]],
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Keypoints:
+    """Load the rows of a CSV; see ``load.load_file``."""
+    depth = 4 if rows[3][0] == "coords" else 3
+    level = {row[0]: row for row in rows[:depth]}
+    if not {"bodyparts", "coords"} <= level.keys() or level.keys() - _LEVELS:
+        raise InputError(
+            f"{file}: DeepLabCut's first lines are scorer, (individuals,) bodyparts, coords; found "
+            f"{', '.join(row[0] for row in rows[:depth])}"
+        )
+    first = 1
+    while first < len(level["coords"]) and not level["coords"][first]:
+        first += 1  # hand labels have folder, video and image where others have one number
+    whose = level.get("individuals", [""] * len(level["coords"]))
+    columns = list(zip(whose, level["bodyparts"], level["coords"], strict=False))[first:]
+    values = np.full((len(rows) - depth, len(columns)), np.nan)
+    for line, row in enumerate(rows[depth:]):
+        for k, cell in enumerate(row[first : first + len(columns)]):
+            text = cell.strip()
+            try:
+                values[line, k] = float(text) if text else np.nan
+            except ValueError:
+                raise InputError(
+                    f"{file}: line {line + depth + 1}: {columns[k][1]} {columns[k][2]}: expected a "
+                    f"number or nothing, found {text!r}"
+                ) from None
+    frame = _frames(file, [row[first - 1] for row in rows[depth:]])
+    return _track(file, columns, values, frame, rate_hz, least_score, choice)
+
+
+def _frames(file: Path, names: list[str]) -> Ints | None:
+    """(T,) frame numbers: of predictions the index, of hand labels that in the image's name.
+
+    Raises:
+        InputError: not rising, as where images of several films are in one table.
+
+    """
+    found = [_NUMBER.search(name) for name in names]
+    numbers = [float(one[1]) for one in found if one]
+    if len(numbers) < len(names):
+        return None
+    if not np.all(np.diff(numbers) > 0.0):
+        raise InputError(
+            f"{file}: the numbers of its images do not rise; expected the labels of one film"
+        )
+    return frame_numbers(str(file), np.array(numbers))
+
+
+def load_group(
+    file: Path, group: Any, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Keypoints:
+    """Load the open HDF5 group that holds ``table``; see ``load.load_file``."""
+    table = group["table"]
+    blocks = [name for name in table.dtype.names or () if name.startswith("values_block_")]
+    if len(blocks) != 1 or table.dtype[blocks[0]].base.kind != "f":
+        raise InputError(f"{file}: {group.name}: expected one block of numbers, found {blocks}")
+    rows = np.asarray(table[:])
+    values = np.asarray(rows[blocks[0]], dtype=float).reshape(len(rows), -1)
+    columns = _columns(file, group.attrs.get("non_index_axes"), values.shape[1])
+    numbers = rows["index"] if "index" in (table.dtype.names or ()) else None
+    frame = None if numbers is None or numbers.dtype.kind not in "iu" else numbers.astype(np.int64)
+    return _track(file, columns, values, frame, rate_hz, least_score, choice)
+
+
+class _OnlyPlain(pickle.Unpickler):
+    """Lists, tuples, numbers and text; a pickle that names a class or function is refused."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        raise pickle.UnpicklingError(f"names {module}.{name}")
+
+
+def _columns(file: Path, stored: Any, count: int) -> list[Column]:
+    """Column names of the HDF5 table."""
+    try:
+        data = stored.encode("latin-1") if isinstance(stored, str) else bytes(stored)
+        axes = _OnlyPlain(io.BytesIO(data), encoding="latin-1").load()
+        names = [tuple(map(str, name)) for name in axes[0][1]]
+    except (pickle.UnpicklingError, ValueError, TypeError, LookupError, EOFError, AttributeError):
+        raise InputError(
+            f"{file}: the names of its columns cannot be read; take DeepLabCut's CSV instead"
+        ) from None
+    if len(names) != count or any(len(name) not in (3, 4) for name in names):
+        raise InputError(
+            f"{file}: names of {len(names)} columns for {count} columns; take the CSV instead"
+        )
+    return [("" if len(name) == 3 else name[1], name[-2], name[-1]) for name in names]
+
+
+def _track(
+    file: Path,
+    columns: list[Column],
+    values: Floats,
+    frame: Ints | None,
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Keypoints:
+    at = {column: k for k, column in enumerate(columns)}
+    names = list(dict.fromkeys(who for who, _, _ in columns))
+    animals = [who for who in names if who != _OF_NONE] or names
+    seen = {column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()}
+    whose = choice.animal(file, animals, [who for who in animals if who in seen] or animals[:1])
+    parts = list(dict.fromkeys(part for who, part, _ in columns if who == whose))
+    missing = [p for p in parts if not {(whose, p, "x"), (whose, p, "y")} <= at.keys()]
+    if missing or not parts:
+        raise InputError(f"{file}: expected x and y of each body part; {missing[:3]} lacks one")
+    pixels = np.stack(
+        [values[:, [at[whose, part, "x"], at[whose, part, "y"]]] for part in parts], axis=1
+    )
+    sure = [at[whose, p, "likelihood"] for p in parts if (whose, p, "likelihood") in at]
+    scores = values[:, sure] if len(sure) == len(parts) else None
+    default = 0.0 if scores is None else PCUTOFF
+    return Keypoints(
+        file,
+        parts,
+        pixels * [1.0, -1.0],
+        scores,
+        rate_hz=rate_hz,
+        least_score=default if least_score is None else least_score,
+        frame=frame,
+    )

@@ -1,0 +1,40 @@
+"""The file formats of recordings, recognised by their first bytes."""
+
+from typing import Literal
+
+from snakewalk.controller.track.readers.markers import is_qtm
+
+KNOWN = (
+    "a CSV of midlines (t, frame, point, x_m, y_m), a SLEAP CSV (frame_idx, <keypoint>.x, "
+    "<keypoint>.y), analysis HDF5 or project (.slp), a DeepLabCut CSV or HDF5, a WCON (JSON), an "
+    ".npz or MATLAB .mat (points or angles_rad or x and y, with rate_hz; or skeletons), an .npy of "
+    "joint angles (frames, joints), or markers as QTM's TSV or a C3D"
+)
+"""What a file of a recording may be, for faults and help."""
+
+Format = Literal["zip", "npy", "hdf5", "mat", "json", "csv", "qtm", "c3d", "empty", "binary"]
+"""``zip`` is an .npz or a zipped WCON; ``binary`` and ``empty`` are no recordings."""
+
+HEAD_BYTES = 128
+"""First bytes of a file that ``format_of`` needs."""
+
+
+def format_of(head: bytes) -> Format:
+    """Recognise a file by its first bytes."""
+    if head.startswith(b"PK\x03\x04"):
+        return "zip"
+    if head.startswith(b"\x93NUMPY"):
+        return "npy"
+    if head.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file")):
+        return "hdf5"
+    if head.startswith(b"MATLAB 5.0 MAT-file"):
+        return "mat"
+    if not head:
+        return "empty"
+    if head[1:2] == b"\x50" and b"\x00" in head:
+        return "c3d"
+    if b"\x00" in head:
+        return "binary"
+    if is_qtm(head):
+        return "qtm"
+    return "json" if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{") else "csv"

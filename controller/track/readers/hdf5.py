@@ -1,0 +1,69 @@
+"""HDF5 files of recordings: SLEAP's analysis and projects, DeepLabCut's table, MATLAB 7.3."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.archive import check_expansion
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.arrays import track_from_arrays
+from snakewalk.controller.track.readers.deeplabcut import load_group
+from snakewalk.controller.track.readers.formats import KNOWN
+from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.sleap import load_analysis, load_project
+from snakewalk.controller.track.track import Track
+
+
+def load_hdf5(
+    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track | Keypoints:
+    """Load an HDF5 file of any of these kinds; see ``load.load_file``."""
+    try:
+        with h5py.File(file, "r") as held:
+            sizes: list[int] = []
+            held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
+            elsewhere = held.visititems_links(_other_file)
+            if elsewhere is not None:
+                raise InputError(f"{file}: {elsewhere}; copy it into this one")
+            check_expansion(file, file.stat().st_size, sum(sizes))
+            if "tracks" in held and "track_occupancy" in held:
+                return load_analysis(file, held, rate_hz, least_score, choice)
+            if "metadata" in held and "instances" in held:
+                return load_project(file, held, rate_hz, least_score, choice)
+            tables = [g for g in held.values() if _holds_table(g)]
+            if tables:
+                return load_group(file, tables[0], rate_hz, least_score, choice)
+            if any(isinstance(g, h5py.Group) and "block0_values" in g for g in held.values()):
+                raise InputError(f"{file}: holds hand labels; take DeepLabCut's CSV of them")
+            arrays = {
+                name: _from_matlab(data)
+                for name, data in held.items()
+                if isinstance(data, h5py.Dataset)
+            }
+    except (OSError, RuntimeError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"{file}: is no HDF5 that can be read: {reason}; known: {KNOWN}") from None
+    if not arrays:
+        raise InputError(f"{file}: holds no arrays, and no table of DeepLabCut; known: {KNOWN}")
+    choice.only(file, "a MATLAB file")
+    return track_from_arrays(file, arrays, rate_hz, least_score)
+
+
+def _other_file(name: str, link: object) -> str | None:
+    """What a link to another file says: nobody knows how far that one expands."""
+    return f"{name} is in {link.filename}" if isinstance(link, h5py.ExternalLink) else None
+
+
+def _holds_table(group: object) -> bool:
+    return isinstance(group, h5py.Group) and isinstance(group.get("table"), h5py.Dataset)
+
+
+def _from_matlab(data: h5py.Dataset) -> NDArray[np.generic]:
+    """One variable: MATLAB's axes are the other way round, and its text is numbers."""
+    values = np.asarray(data[()])
+    kind = data.attrs.get("MATLAB_class", b"")
+    if kind == b"char":
+        return np.array("".join(map(chr, values.ravel().tolist())))
+    return values if kind == b"" else values.T

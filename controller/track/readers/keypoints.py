@@ -1,0 +1,246 @@
+"""Keypoints of pose trackers: which animal, in which order, and what is done where one is missing.
+
+Rows of pixels count downwards. Points with a low score are missing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.sparse.csgraph import minimum_spanning_tree
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.track import Track, track_from_points
+
+KEYPOINT_RATE_HZ = 30.0
+"""Default where a file of keypoints holds no frame rate."""
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+"""Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
+_MISSING = 0.25  # of the keypoints, at least one: so many may be missing in a frame
+_FEWEST = 4  # points that a curve goes through
+_ZIGZAG = 1.5  # from which the order is none of a body
+_TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What of a file is taken: the options ``--individual``, ``--keypoints`` and ``--plane``."""
+
+    individual: str | None = None
+    keypoints: tuple[str, ...] | None = None
+    """Names along the midline, head first; None: all, in the order of the file."""
+    plane: str | None = None
+    """Of ``PLANES``; for markers in space. None is xy."""
+
+    def only(self, file: Path, kind: str, *allowed: str) -> None:
+        """Refuse what a file of this kind does not have.
+
+        Raises:
+            InputError: an option that is not allowed is given.
+
+        """
+        held = {"individual": "names no animals", "keypoints": "names no keypoints"}
+        held["plane"] = "is flat already"
+        for name, reason in held.items():
+            if getattr(self, name) is not None and name not in allowed:
+                raise InputError(f"{file}: --{name}: {kind} {reason}; leave it out")
+
+    def animal(self, file: Path, names: Sequence[str], seen: Sequence[str]) -> str:
+        """Name of the animal that is taken.
+
+        Args:
+            file: for faults.
+            names: all that the file has.
+            seen: those of which it holds any point.
+
+        Raises:
+            InputError: none of that name, or several and none is said.
+
+        """
+        listed = ", ".join(names)
+        if self.individual is not None:
+            if self.individual in names:
+                return self.individual
+            raise InputError(
+                f"{file}: --individual {self.individual}: no such animal; in it are {listed}"
+            )
+        if len(seen) > 1:
+            raise InputError(
+                f"{file}: {len(seen)} animals in it ({', '.join(seen)}): say --individual NAME"
+            )
+        if not seen:
+            raise InputError(f"{file}: 0 animals in it: no point of {listed or 'any'} was seen")
+        return seen[0]
+
+    def order(self, file: Path, nodes: Sequence[str]) -> list[int]:
+        """Indices of the keypoints along the midline.
+
+        Raises:
+            InputError: a name that the file does not have, one twice, or too few.
+
+        """
+        if self.keypoints is None:
+            return list(range(len(nodes)))
+        unknown = [name for name in self.keypoints if name not in nodes]
+        if unknown:
+            raise InputError(
+                f"{file}: --keypoints: it has no {', '.join(unknown)}; it has {', '.join(nodes)}"
+            )
+        if len(set(self.keypoints)) < len(self.keypoints) or len(self.keypoints) < _FEWEST:
+            raise InputError(
+                f"{file}: --keypoints: expected {_FEWEST} or more names along the midline, head "
+                f"first, each once; it has {', '.join(nodes)}"
+            )
+        return [list(nodes).index(name) for name in self.keypoints]
+
+
+ALL = Choice()
+"""Nothing is chosen: one animal, all of its keypoints."""
+
+
+def choice_of(individual: str | None, keypoints: str | None, plane: str | None) -> Choice:
+    """Make a choice of the words of the command line: ``keypoints`` is A,B,C.
+
+    Raises:
+        InputError: no such plane.
+
+    """
+    if plane is not None and plane not in PLANES:
+        raise InputError(f"--plane {plane}: expected one of {', '.join(PLANES)}")
+    names = None if keypoints is None else tuple(one.strip() for one in keypoints.split(","))
+    return Choice(individual, names, plane)
+
+
+@dataclass(frozen=True, slots=True)
+class Keypoints:
+    """The keypoints of one animal."""
+
+    file: Path
+    """For faults and the name."""
+    nodes: Sequence[str]
+    """Names of the K keypoints."""
+    places: Floats
+    """(T, K, 2) to the right and upwards; NaN where nothing was seen."""
+    scores: Floats | None
+    """(T, K) how sure the tracker was, 0..1; None where the file holds no scores."""
+    rate_hz: float | None
+    """Frames a second; None where the file does not say."""
+    least_score: float = 0.0
+    """Keypoints below it count as missing."""
+    frame: Ints | None = None
+    """(T,) frame numbers; None: 0, 1, 2..."""
+    scale_m: float | None = None
+    """Metres in a unit of the places; None: not known."""
+
+    def sure(self, order: Sequence[int]) -> Floats:
+        """(T, N, 2) keypoints by index, NaN where they are missing or not sure.
+
+        Raises:
+            InputError: no scores to compare with, or too little is left.
+
+        """
+        file, least = self.file, self.least_score
+        places = self.places[:, order]
+        if self.scores is None and least > 0.0:
+            raise InputError(f"{file}: holds no scores to compare with a least score of {least}")
+        if self.scores is not None:
+            scores = self.scores[:, order]
+            unsure = scores < least  # NaN is no score: points set by hand have none
+            bad = int(unsure.any(axis=1).sum())
+            if least > 0.0 and bad > len(unsure) - 2:
+                worst = np.nanmedian(scores, axis=0)
+                raise InputError(
+                    f"{file}: in {bad} of {len(unsure)} frames a keypoint scores less than "
+                    f"{least:g} (keypoint {int(np.argmin(worst)) + 1}, the least sure, "
+                    f"{worst.min():.2f} in the median); lower the least score, or leave it out "
+                    "with --keypoints"
+                )
+            places = np.where(unsure[..., None], np.nan, places)
+        seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
+        never = [self.nodes[k] for k, there in zip(order, seen, strict=True) if not there]
+        if never and len(never) < len(order):
+            raise InputError(
+                f"{file}: {', '.join(never)} is never seen: say --keypoints without it"
+            )
+        return np.asarray(places)
+
+    def track(self, choice: Choice) -> Track:
+        """Make a track of those along the midline; an unknown rate is assumed, and marked as such.
+
+        Raises:
+            InputError: as of ``sure``, no such keypoint, or an order that is none of a body.
+
+        """
+        places = self.sure(choice.order(self.file, self.nodes))
+        if choice.keypoints is None and zigzag(places) > _ZIGZAG:
+            raise InputError(
+                f"{self.file}: its keypoints do not lie one after the other along a body: "
+                f"{', '.join(self.nodes)}; say --keypoints with those of the midline, head first"
+            )
+        bridged, which = bridge(places)
+        status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
+        return track_from_points(
+            self.file.stem,
+            bridged,
+            KEYPOINT_RATE_HZ if self.rate_hz is None else self.rate_hz,
+            frame=self.frame,
+            scale_m=self.scale_m,
+            rate_assumed=self.rate_hz is None,
+            status=status,
+        )
+
+
+def zigzag(places: Floats) -> float:
+    """Way from point to point of (T, K, 2) over the least that joins them; 1 along a body."""
+    apart = np.hypot(*(places[:, :, None] - places[:, None]).transpose(3, 0, 1, 2))
+    seen = np.isfinite(apart).any(axis=0)
+    if not seen.all():
+        return 1.0
+    usual = np.nanmedian(apart, axis=0)
+    least = float(minimum_spanning_tree(usual).sum())
+    return float(usual.diagonal(1).sum()) / least if least > 0.0 else 1.0
+
+
+def bridge(places: Floats) -> tuple[Floats, Bools]:
+    """Set single missing points (T, K, 2) on the curve through the others of their frame.
+
+    A point between others is put on the cubic spline through them, as far along as it usually is;
+    one at an end is put at its usual distance, the body's last turn going on. At most a quarter of
+    the points, at least one, may be missing, no two neighbours, and four must be there.
+
+    Returns:
+        The points, and (T,) in which frames one was set.
+
+    """
+    lost = np.asarray(~np.isfinite(places).all(axis=2))
+    count = places.shape[1]
+    most = min(max(1, int(_MISSING * count)), count - _FEWEST)
+    able = lost.any(axis=1) & (lost.sum(axis=1) <= most) & ~(lost[:, 1:] & lost[:, :-1]).any(axis=1)
+    step = np.hypot(*np.diff(places, axis=1).transpose(2, 0, 1))
+    known = np.isfinite(step).any(axis=0)
+    if not (able.any() and known.all()):
+        return places, np.zeros(len(places), dtype=bool)
+    usual = np.nanmedian(step, axis=0)
+    along = np.concatenate([[0.0], np.cumsum(usual)])
+    out = places.copy()
+    for k in np.flatnonzero(able):
+        seen = ~lost[k]
+        curve = CubicSpline(along[seen], places[k, seen])
+        out[k, lost[k]] = curve(along[lost[k]])
+        if lost[k, 0]:
+            out[k, 0] = _beyond(out[k, 1], out[k, 2], out[k, 3], usual[0])
+        if lost[k, -1]:
+            out[k, -1] = _beyond(out[k, -2], out[k, -3], out[k, -4], usual[-1])
+    return out, able
+
+
+def _beyond(last: Floats, second: Floats, third: Floats, reach: float) -> Floats:
+    """The point beyond an end: half of the last turn goes on."""
+    heading = np.arctan2(*(last - second)[::-1])
+    turn = np.angle(np.exp(1j * (heading - np.arctan2(*(second - third)[::-1]))))
+    way = heading + _TURN_ON * turn
+    return np.asarray(last + reach * np.array([np.cos(way), np.sin(way)]))

@@ -1,0 +1,170 @@
+"""The one entry for recordings: a shipped name, figures of your own, or a file of bodies."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load
+from snakewalk.config.recording import RecordingConfig
+from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
+from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, format_of
+from snakewalk.controller.track.readers.generated import EMBEDDED, embedded, generate
+from snakewalk.controller.track.readers.keypoints import ALL, Choice, Keypoints
+from snakewalk.controller.track.readers.markers import load_c3d, load_qtm
+from snakewalk.controller.track.readers.tables import load_csv
+from snakewalk.controller.track.readers.wcon import load_wcon, zipped_text
+from snakewalk.controller.track.track import Track
+
+
+def check_rate(rate_hz: float | None, names: Sequence[str]) -> None:
+    """Check an option ``--rate`` that is given for the files among ``names``.
+
+    Raises:
+        InputError: it is no rate, or none of the names is a file.
+
+    """
+    if rate_hz is None:
+        return
+    if not (math.isfinite(rate_hz) and rate_hz > 0.0):
+        raise InputError(f"--rate {rate_hz:g}: must be a positive number of frames a second")
+    if all(name in EMBEDDED for name in names):
+        raise InputError(f"--rate {rate_hz:g}: {names[0]} says its own rate; give one for files")
+
+
+def load_track(
+    name_or_path: str,
+    rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
+) -> Track:
+    """Load a shipped recording by name, or a file by path.
+
+    Args:
+        name_or_path: a name of ``EMBEDDED``; or figures in a ``.toml`` (``RecordingConfig``); or a
+            file of one of the formats of ``formats.KNOWN``.
+        rate_hz: frames a second of a file, taken instead of what it (or its format) says.
+        least_score: keypoints of a file whose score is below it count as missing.
+        choice: which animal, keypoints and plane of a file that has several.
+
+    Raises:
+        InputError: neither name nor file, no known format, or a fault inside it.
+
+    """
+    path = Path(name_or_path)
+    made = name_or_path in EMBEDDED or path.suffix == ".toml"
+    if made and rate_hz is not None:
+        raise InputError(f"{name_or_path}: its figures hold the frame rate; give one for files")
+    if made and least_score:
+        raise InputError(
+            f"{name_or_path}: is made from figures and has no scores; give one for files"
+        )
+    if made:
+        choice.only(path, "a shipped recording")
+    if name_or_path in EMBEDDED:
+        return embedded(name_or_path)
+    if not path.exists():
+        raise InputError(
+            f"{name_or_path}: no such recording or file; shipped are {', '.join(EMBEDDED)}; "
+            f"a file may be {KNOWN}"
+        )
+    if path.suffix == ".toml":
+        return generate(load(path, RecordingConfig))
+    return load_file(path, rate_hz, least_score, choice)
+
+
+def load_file(
+    path: str | Path,
+    rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
+) -> Track:
+    """Load a recording from a file; its content, not its name, says which format it has.
+
+    Args:
+        path: of the file.
+        rate_hz: frames a second, taken instead of what the file (or its format) says.
+        least_score: keypoints whose score is below it count as missing; default 0, and for
+            DeepLabCut its own 0.6.
+        choice: which animal, keypoints and plane, where there are several.
+
+    Raises:
+        InputError: no such file, none of the known formats, or a fault inside it.
+
+    """
+    found = _loaded(Path(path), rate_hz, least_score, choice)
+    return found.track(choice) if isinstance(found, Keypoints) else found
+
+
+def load_keypoints(
+    path: str | Path,
+    rate_hz: float | None = None,
+    least_score: float | None = None,
+    choice: Choice = ALL,
+) -> Keypoints:
+    """Load all keypoints of one animal, those beside its midline as well; see ``load_file``.
+
+    Raises:
+        InputError: as of ``load_file``, or the file holds midlines.
+
+    """
+    found = _loaded(Path(path), rate_hz, least_score, choice)
+    if not isinstance(found, Keypoints):
+        raise InputError(
+            f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM or C3D"
+        )
+    return found
+
+
+def _loaded(
+    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track | Keypoints:
+    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
+        raise InputError(f"{file}: the frame rate must be above 0 Hz, not {rate_hz}")
+    if least_score is not None and not 0.0 <= least_score <= 1.0:
+        raise InputError(f"{file}: the least score must be from 0 to 1, not {least_score}")
+    try:
+        with file.open("rb") as stream:
+            kind = format_of(stream.read(HEAD_BYTES))
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}") from None
+    match kind:
+        case "zip":
+            text = zipped_text(file)
+            if text is not None:
+                return load_wcon(file, text, rate_hz, choice)
+            choice.only(file, "an .npz")
+            return load_npz(file, rate_hz, least_score)
+        case "npy":
+            choice.only(file, "an .npy")
+            return load_npy(file, rate_hz)
+        case "hdf5":
+            require_extra(f"{file}: HDF5 needs", "h5py")
+            from snakewalk.controller.track.readers.hdf5 import load_hdf5  # noqa: PLC0415  an extra
+
+            return load_hdf5(file, rate_hz, least_score, choice)
+        case "mat":
+            choice.only(file, "a MATLAB file")
+            return load_mat(file, rate_hz, least_score)
+        case "json":
+            try:
+                return load_wcon(file, file.read_text(encoding="utf-8-sig"), rate_hz, choice)
+            except UnicodeDecodeError:
+                raise InputError(f"{file}: is no JSON in UTF-8; known: {KNOWN}") from None
+        case "csv":
+            return load_csv(file, rate_hz, least_score, choice)
+        case "qtm":
+            return load_qtm(file, rate_hz, choice)
+        case "c3d":
+            return load_c3d(file, rate_hz, choice)
+        case _:
+            reason = "is empty" if kind == "empty" else "is no recording"
+            raise InputError(f"{file}: {reason}; known: {KNOWN}")
+
+
+def track_beside(name_or_path: str, folder: Path | None) -> str:
+    """Path of a recording named in a file in ``folder``: relative to it where it is there."""
+    if folder is None or name_or_path in EMBEDDED or not (folder / name_or_path).is_file():
+        return name_or_path
+    return str(folder / name_or_path)

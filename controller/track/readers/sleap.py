@@ -1,0 +1,229 @@
+"""SLEAP's files: its table (CSV), its analysis HDF5, and its projects (``.slp``).
+
+The analysis HDF5 is written column-major for MATLAB, so h5py sees ``tracks`` as (tracks, 2, nodes,
+frames) and ``point_scores`` as (tracks, nodes, frames); ``node_names`` and ``track_names`` are
+bytes. A project holds ``frames``, ``instances`` and their ``points`` (set by hand) or
+``pred_points`` as tables that point into each other, and names as JSON. Pixel rows count downwards.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.track import MOST_FRAMES, frame_numbers
+
+_DOWNWARDS = np.array([1.0, -1.0])
+_CENTRED = 1.1  # format from which a pixel's centre, not its corner, is whole
+_PREDICTED = 1
+_NO_TRACK = "no track"
+
+
+def load_table(
+    file: Path,
+    nodes: list[str],
+    whose: list[str],
+    frame: Floats,
+    xy: Floats,
+    scores: Floats | None,
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Keypoints:
+    """Load the CSV's columns.
+
+    Args:
+        file: for faults and the name.
+        nodes: names of the K keypoints.
+        whose: name of the track of each of T rows.
+        frame: (T,) frame numbers.
+        xy: (T, K, 2) pixels.
+        scores: (T, K), or None.
+        rate_hz: frames a second.
+        least_score: keypoints below it are missing.
+        choice: animal and order of the midline.
+
+    """
+    if not np.isfinite(frame).all():
+        raise InputError(f"{file}: frame_idx must be given in every row")
+    names = list(dict.fromkeys(name or _NO_TRACK for name in whose))
+    mine = np.array([name or _NO_TRACK for name in whose]) == choice.animal(file, names, names)
+    frame, xy, scores = frame[mine], xy[mine], None if scores is None else scores[mine]
+    order = _one_a_frame(file, frame, scores)
+    return Keypoints(
+        file,
+        nodes,
+        xy[order] * _DOWNWARDS,
+        None if scores is None else scores[order],
+        rate_hz=rate_hz,
+        least_score=0.0 if least_score is None else least_score,
+        frame=frame_numbers(str(file), frame[order]),
+    )
+
+
+def _one_a_frame(file: Path, frame: Floats, scores: Floats | None) -> Ints:
+    """Indices of rows, by frame: what was set by hand, without scores, replaces the prediction."""
+    by_hand = np.zeros(len(frame), bool)
+    if scores is not None:
+        by_hand[:] = np.isnan(scores).all(axis=1)
+    order = np.lexsort((~by_hand, frame))
+    again = np.asarray(np.diff(frame[order], prepend=np.nan) == 0.0)
+    if np.any(again & (by_hand[order] == by_hand[np.roll(order, 1)])):
+        raise InputError(f"{file}: more than one animal of one name in a frame; export one track")
+    return np.asarray(order[~again])
+
+
+def load_analysis(
+    file: Path,
+    held: Any,
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Keypoints:
+    """Load the open analysis HDF5 ``held``; see ``load.load_file``."""
+    tracks = _in_order(held["tracks"], ("track", "xy", "node", "frame"))
+    nodes = _names(held, "node_names")
+    if tracks.ndim != 4 or tracks.shape[1] != 2 or len(nodes) not in (0, tracks.shape[2]):
+        raise InputError(
+            f"{file}: tracks: expected (tracks, 2, nodes, frames) as SLEAP writes it, not an array "
+            f"of shape {tracks.shape}" + (f" of {len(nodes)} nodes" if nodes else "")
+        )
+    names = _names(held, "track_names")
+    if len(names) != len(tracks):
+        names = [f"track_{k}" for k in range(len(tracks))]
+    seen = [names[k] for k in np.flatnonzero(np.isfinite(tracks).any(axis=(1, 2, 3)))]
+    one = names.index(choice.animal(file, names, seen))
+    scores = None
+    if "point_scores" in held:
+        stored = _in_order(held["point_scores"], ("track", "node", "frame"))
+        if stored.shape != (tracks.shape[0], *tracks.shape[2:]):
+            raise InputError(
+                f"{file}: point_scores: expected (tracks, nodes, frames), not {stored.shape}"
+            )
+        scores = stored[one].T
+    return Keypoints(
+        file,
+        nodes or [f"node_{k}" for k in range(tracks.shape[2])],
+        tracks[one].transpose(2, 1, 0) * _DOWNWARDS,
+        scores,
+        rate_hz=_stated_rate(held) if rate_hz is None else rate_hz,
+        least_score=0.0 if least_score is None else least_score,
+    )
+
+
+def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
+    """Array with its axes as SLEAP writes them; sleap-io names others in the attribute dims."""
+    values = np.asarray(stored[:], dtype=float)
+    named = _stated(stored, "dims")
+    if not isinstance(named, list) or {*map(str, named)} != {*axes} or values.ndim != len(named):
+        return values
+    return np.asarray(values.transpose([named.index(axis) for axis in axes]))
+
+
+def _stated_rate(held: Any) -> float | None:
+    """Frames a second that sleap-io states of the video; SLEAP itself states none."""
+    about = _stated(held, "video_backend_metadata")
+    rate = about.get("fps") if isinstance(about, dict) else None
+    return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
+
+
+def _stated(held: Any, name: str) -> Any:
+    """What an attribute says as JSON; None where it is not there or no JSON."""
+    try:
+        return parse_json(_text(held.attrs[name]))
+    except (KeyError, ValueError):
+        return None
+
+
+def load_project(
+    file: Path,
+    held: Any,
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Keypoints:
+    """Load the open project ``held`` (.slp); see ``load.load_file``."""
+    try:
+        about = parse_json(_text(held["metadata"].attrs["json"]))
+        version = float(held["metadata"].attrs.get("format_id", 1.0))
+        skeletons = [
+            [str(about["nodes"][int(node["id"])]["name"]) for node in one["nodes"]]
+            for one in about["skeletons"]
+        ]
+        tracks = [str(parse_json(_text(one))[1]) for one in held["tracks_json"][:]]
+        frames, instances = held["frames"][:], held["instances"][:]
+        tables = {False: held["points"][:], True: held["pred_points"][:]}
+        stated = _rate(held)
+    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
+        raise InputError(f"{file}: is no SLEAP project that can be read: {error}") from None
+    if len({int(v) for v in frames["video"]}) > 1:
+        raise InputError(f"{file}: holds several videos; export the labels of one")
+    if len({int(k) for k in instances["skeleton"]}) != 1:
+        raise InputError(f"{file}: expected one skeleton, found {len(skeletons)}")
+    nodes = skeletons[int(instances["skeleton"][0])]
+    names = [*tracks, _NO_TRACK]
+    number = {int(one["frame_id"]): int(one["frame_idx"]) for one in frames}
+    whose = [names[int(k)] if 0 <= k < len(tracks) else _NO_TRACK for k in instances["track"]]
+    seen = list(dict.fromkeys(whose))
+    mine = choice.animal(file, seen, seen)
+    last = max(number.values(), default=-1)
+    if not 0 <= last < MOST_FRAMES:
+        raise InputError(f"{file}: a frame's number is {last}; at most {MOST_FRAMES} are read")
+    places = np.full((last + 1, len(nodes), 2), np.nan)
+    scores = np.full((last + 1, len(nodes)), np.nan)
+    by_hand = np.zeros(last + 1, dtype=bool)
+    taken = np.zeros(last + 1, dtype=bool)
+    shift = 0.0 if version >= _CENTRED else -0.5
+    for one, name in zip(instances, whose, strict=True):
+        if name != mine:
+            continue
+        at = number.get(int(one["frame_id"]), -1)
+        predicted = int(one["instance_type"]) == _PREDICTED
+        rows = tables[predicted][int(one["point_id_start"]) : int(one["point_id_end"])]
+        if at < 0 or len(rows) != len(nodes):
+            raise InputError(f"{file}: an instance has {len(rows)} points of {len(nodes)}")
+        if taken[at] and by_hand[at] == (not predicted):
+            raise InputError(
+                f"{file}: two animals without a track in frame {at}: track them first in SLEAP"
+                if mine == _NO_TRACK
+                else f"{file}: {mine} is twice in frame {at}; correct it in SLEAP"
+            )
+        if taken[at] and predicted:
+            continue  # what was set by hand replaces the prediction
+        taken[at], by_hand[at] = True, not predicted
+        hidden = ~np.asarray(rows["visible"], dtype=bool)
+        places[at] = np.column_stack([rows["x"], rows["y"]]) + shift
+        places[at, hidden] = np.nan
+        scores[at] = rows["score"] if predicted else np.nan
+    return Keypoints(
+        file,
+        nodes,
+        places * _DOWNWARDS,
+        scores,
+        rate_hz=stated if rate_hz is None else rate_hz,
+        least_score=0.0 if least_score is None else least_score,
+    )
+
+
+def _rate(held: Any) -> float | None:
+    """Frames a second that a project states of its video; older ones state none."""
+    for one in held["videos_json"][:] if "videos_json" in held else []:
+        rate = parse_json(_text(one)).get("backend", {}).get("fps")
+        if rate:
+            return float(rate)
+    return None
+
+
+def _names(held: Any, what: str) -> list[str]:
+    return [_text(name) for name in held[what][:]] if what in held else []
+
+
+def _text(value: bytes | str | NDArray[np.generic]) -> str:
+    """Text of an HDF5 value."""
+    plain = value.item() if isinstance(value, np.ndarray | np.generic) else value
+    return plain.decode("utf-8", "replace") if isinstance(plain, bytes) else str(plain)

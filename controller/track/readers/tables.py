@@ -1,0 +1,125 @@
+"""Recordings as tables: midlines point by point, keypoints frame by frame."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
+from snakewalk.controller.track.readers.formats import KNOWN
+from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.sleap import load_table
+from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
+
+_MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
+
+
+def load_csv(
+    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
+) -> Track | Keypoints:
+    """Load a CSV of any of these kinds; see ``load.load_file``."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(f"{file}: is no recording; known: {KNOWN}") from None
+    if len(rows) < 2:
+        raise InputError(f"{file}: expected a line of column names, then rows of numbers")
+    if is_deeplabcut(rows):
+        return load_rows(file, rows, rate_hz, least_score, choice)
+    column = {name.strip(): index for index, name in enumerate(rows[0])}
+    for pair, scale_m in _MIDLINE.items():
+        if {"t", "frame", "point", *pair} <= column.keys():
+            choice.only(file, "a CSV of midlines")
+            columns = [column[name] for name in ("t", "frame", "point", *pair)]
+            return _midline(file, _numbers(file, rows, columns), scale_m, rate_hz)
+    keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
+    if keypoints and "frame_idx" in column:
+        return _sleap(file, rows, column, keypoints, rate_hz, least_score, choice)
+    raise InputError(
+        f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), "
+        "SLEAP's frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
+        f"coords in the first lines; found {', '.join(rows[0][:6])[:80]}"
+    )
+
+
+def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
+    """Cells as numbers (rows, columns); empty ones and NA are NaN."""
+    table = np.full((len(rows) - 1, len(columns)), np.nan)
+    for line, row in enumerate(rows[1:], start=2):
+        for k, index in enumerate(columns):
+            cell = row[index].strip() if index < len(row) else ""
+            if cell.lower() in {"", "na", "nan"}:
+                continue
+            try:
+                table[line - 2, k] = float(cell)
+            except ValueError:
+                name = rows[0][index]
+                raise InputError(
+                    f"{file}: line {line}: {name}: expected a number or nothing, found {cell!r}"
+                ) from None
+    return table
+
+
+def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -> Track:
+    """Rows of t (s), frame, point, x, y; point 1 is the head."""
+    if not np.isfinite(table[:, :3]).all():
+        lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())
+        raise InputError(
+            f"{file}: t, frame and point must be given in every row; {lost} of {len(table)} rows "
+            "lack one, or have one that is not finite"
+        )
+    if len(np.unique(table[:, 1:3], axis=0)) < len(table):
+        raise InputError(f"{file}: a point twice in a frame: more than one animal; export one")
+    table = table[np.lexsort((table[:, 2], table[:, 1]))]
+    frames, first, count = np.unique(table[:, 1], return_index=True, return_counts=True)
+    if len(set(count.tolist())) != 1:
+        odd = int(frames[np.flatnonzero(count != count[0])[0]])
+        raise InputError(
+            f"{file}: every frame must list the same points; frame {odd} differs from the first"
+        )
+    points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
+    time_s = table[first, 0] if rate_hz is None else None
+    if rate_hz is None:
+        if len(frames) < 2:
+            raise InputError(f"{file}: holds 1 frame; a motion needs at least 2")
+        step = np.diff(table[first, 0]) / np.diff(frames)
+        back = np.flatnonzero(~(step > 0.0))
+        if len(back):
+            raise InputError(
+                f"{file}: t must increase from frame to frame, in seconds; it does not in "
+                f"{len(back)} of {len(step)} steps, first after frame {frames[back[0]]:g}"
+            )
+        rate_hz = float(1.0 / np.median(step))
+    return track_from_points(
+        file.stem,
+        points,
+        rate_hz,
+        scale_m=scale_m,
+        frame=frame_numbers(str(file), frames),
+        time_s=time_s,
+    )
+
+
+def _sleap(
+    file: Path,
+    rows: list[list[str]],
+    column: dict[str, int],
+    keypoints: list[str],
+    rate_hz: float | None,
+    least_score: float | None,
+    choice: Choice,
+) -> Keypoints:
+    """One row an animal and frame, keypoints in the table's order, head first, in pixels."""
+    columns = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
+    table = _numbers(file, rows, columns)
+    score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
+    scores = _numbers(file, rows, score_columns) if len(score_columns) == len(keypoints) else None
+    xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
+    whose = [""] * len(table)
+    if "track" in column:
+        at = column["track"]
+        whose = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+    return load_table(file, keypoints, whose, table[:, 0], xy, scores, rate_hz, least_score, choice)

@@ -1,0 +1,198 @@
+"""WCON, the worm trackers' JSON: midlines with their units, one or more records of an animal.
+
+As the format's text has it: ``units`` of t, x, y; ``data`` is one record or a list of them, each
+with an ``id``, one or more times ``t`` and as many lists ``x`` and ``y``; ``head`` "L" is the first
+point and "R" the last; ``ox, oy`` (else ``cx, cy``) is added to the points; null is missing.
+"""
+
+import math
+import re
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from snakewalk.config.archive import DAMAGE, check_members, parse_json
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.keypoints import Choice
+from snakewalk.controller.track.resample import equal_arc_length
+from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
+
+
+def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
+    """Load the text of a WCON file; see ``load.load_file``."""
+    try:
+        held = parse_json(text)
+    except ValueError as error:
+        raise InputError(f"{file}: is no JSON: {error}") from None
+    units = held.get("units") if isinstance(held, dict) else None
+    if not isinstance(units, dict) or "data" not in held:
+        raise InputError(f"{file}: expected a WCON object with units and data")
+    second = _unit(file, units, "t", "s")
+    if second is None:
+        raise InputError(f"{file}: units: t: expected a time, such as s, not {units['t']!r}")
+    choice.only(file, "WCON", "individual")
+    metres = {name: _unit(file, units, name, "m") for name in ("x", "y")}
+    metres |= {
+        name: _unit(file, units, name, "m") if name in units else metres[name[1]]
+        for name in ("ox", "oy", "cx", "cy")
+    }
+    if len({value is None for value in metres.values()}) > 1:
+        raise InputError(
+            f"{file}: units: some are lengths and some are not: "
+            + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
+        )
+    records = held["data"] if isinstance(held["data"], list) else [held["data"]]
+    animals = sorted({str(r.get("id")) for r in records if isinstance(r, dict)})
+    if len(animals) > 1 or choice.individual is not None:
+        mine = choice.animal(file, animals, animals)
+        records = [r for r in records if not isinstance(r, dict) or str(r.get("id")) == mine]
+    bodies: list[tuple[float, Floats]] = []
+    for number, record in enumerate(records):
+        try:
+            bodies += _bodies(record, metres)
+        except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+            raise InputError(
+                f"{file}: data[{number}]: expected id, t, x and y, as many lists x and y as times: "
+                f"{error}"
+            ) from None
+    if len(bodies) < 2:
+        raise InputError(f"{file}: a recording needs 2 or more times, found {len(bodies)}")
+    lost = sum(not math.isfinite(at) for at, _ in bodies)
+    if lost:
+        raise InputError(f"{file}: {lost} of {len(bodies)} times t are no finite numbers")
+    bodies.sort(key=lambda body: body[0])
+    time = second * np.array([at for at, _ in bodies])
+    step = float(np.median(np.diff(time)))
+    if not (np.diff(time) > 0.0).all():
+        raise InputError(f"{file}: a time twice: more than one body at a time")
+    frame = frame_numbers(str(file), np.rint((time - time[0]) / step))
+    if (np.diff(frame) == 0).any():  # so uneven that the times alone count
+        frame = np.arange(len(time))
+    return track_from_points(
+        file.stem,
+        _alike([points for _, points in bodies]),
+        1.0 / step if rate_hz is None else rate_hz,
+        scale_m=None if metres["x"] is None else 1.0,
+        frame=frame,
+        time_s=time if rate_hz is None else None,
+    )
+
+
+def zipped_text(file: Path) -> str | None:
+    """Text of the one JSON in an archive; None if it holds arrays (.npz) instead."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            names = archive.namelist()
+            if any(name.endswith(".npy") for name in names) or not names:
+                return None
+            member = archive.getinfo(names[0])
+            check_members(file, [member], text=True)
+            with archive.open(member) as stream:
+                return stream.read(member.file_size).decode("utf-8-sig")
+    except (*DAMAGE, OSError):
+        return None
+
+
+def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, Floats]]:
+    """Times and head-first points (P, 2) of one record, in metres where the units are lengths."""
+    many = isinstance(record["t"], list)
+    times, xs, ys = (record[k] if many else [record[k]] for k in ("t", "x", "y"))
+    if not len(times) == len(xs) == len(ys):
+        raise ValueError(f"{len(times)} times, {len(xs)} x, {len(ys)} y")
+    from_ = ("ox", "oy") if "ox" in record else ("cx", "cy")
+    found = []
+    for k, (at, x, y) in enumerate(zip(times, xs, ys, strict=True)):
+        points = np.stack(
+            [_floats(x) * (metres["x"] or 1.0), _floats(y) * (metres["y"] or 1.0)], axis=-1
+        )
+        points = points + [
+            float(_at(record.get(name, 0.0), k)) * (metres[name] or 1.0) for name in from_
+        ]
+        head = _at(record.get("head", "L"), k)
+        found.append((float(at), points[::-1] if head == "R" else points))
+    return found
+
+
+def _at(value: Any, k: int) -> Any:
+    """One value for all times, or the k-th of one for each."""
+    return value[k] if isinstance(value, list) else value
+
+
+def _floats(values: Any) -> Floats:
+    listed = values if isinstance(values, list) else [values]
+    return np.array([np.nan if v is None else float(v) for v in listed])
+
+
+def _alike(bodies: list[Floats]) -> Floats:
+    """Bodies (T, P, 2): where counts of points differ, all get the largest by equal arcs."""
+    counts = {len(points) for points in bodies}
+    if len(counts) == 1:
+        return np.stack(bodies)
+    most = max(counts)
+    even = np.full((len(bodies), most, 2), np.nan)
+    for k, points in enumerate(bodies):
+        if len(points) >= 4 and np.isfinite(points).all():
+            even[k] = equal_arc_length(points, most - 1)
+    return even
+
+
+def _unit(file: Path, units: dict[str, Any], name: str, dimension: str) -> float | None:
+    if not isinstance(units.get(name), str):
+        raise InputError(f"{file}: units: {name} must be given, such as {dimension!r}")
+    return si_value(units[name], dimension)
+
+
+_PREFIX = {
+    **{"": 1.0, "c": 1e-2, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "n": 1e-9},
+    **{"k": 1e3, "K": 1e3, "M": 1e6, "G": 1e9},
+}
+_WORDS = {
+    **{"centi": 1e-2, "milli": 1e-3, "micro": 1e-6, "nano": 1e-9, "": 1.0},
+    **{"kilo": 1e3, "mega": 1e6, "giga": 1e9},
+}
+_SHORT = {"m": ("m", 1.0), "in": ("m", 0.0254), "s": ("s", 1.0), "sec": ("s", 1.0)} | {
+    "min": ("s", 60.0), "h": ("s", 3600.0), "d": ("s", 86400.0)
+}  # fmt: skip
+_LONG = {"metre": ("m", 1.0), "meter": ("m", 1.0), "inch": ("m", 0.0254)} | {
+    "micron": ("m", 1e-6), "second": ("s", 1.0), "minute": ("s", 60.0), "hour": ("s", 3600.0),
+    "day": ("s", 86400.0),
+}  # fmt: skip
+
+
+def si_value(unit: str, dimension: str) -> float | None:
+    """How many metres ("m") or seconds ("s") a unit is; None if it is of another kind.
+
+    Prefixes and names as in the WCON format: short (``um``) or in full (``micrometres``), numbers
+    as factors. Capitals matter.
+    """
+    value = 1.0
+    kinds: list[str] = []
+    parts = re.split(r"([*/])", unit.replace(" ", ""))
+    for sign, word in zip(["*", *parts[1::2]], parts[::2], strict=True):
+        kind, factor = _word(word)
+        if factor == 0.0:
+            return None
+        value = value * factor if sign == "*" else value / factor
+        kinds += [] if kind == "1" else [kind if sign == "*" else f"1/{kind}"]
+    return value if kinds == [dimension] else None
+
+
+def _word(word: str) -> tuple[str, float]:
+    """Kind ("m", "s", "1" for a number, "?") and SI value of one factor of a unit."""
+    try:
+        return "1", float(word)
+    except ValueError:
+        singular = word.removesuffix("s")
+    if word in _SHORT:
+        return _SHORT[word]  # "min" is a minute, not a thousandth of an inch
+    for base, (kind, factor) in _LONG.items():
+        for name in (word, singular, "inch" if word == "inches" else word):
+            if name.endswith(base) and name.removesuffix(base) in _WORDS:
+                return kind, factor * _WORDS[name.removesuffix(base)]
+    for base, (kind, factor) in _SHORT.items():
+        if word.endswith(base) and word.removesuffix(base) in _PREFIX:
+            return kind, factor * _PREFIX[word.removesuffix(base)]
+    return "?", 1.0

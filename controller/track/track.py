@@ -1,0 +1,217 @@
+"""A recording of a moving body: midlines over time, and the tangent angles of 100 segments."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.resample import equal_arc_length, tangent_angles
+
+MOST_FRAMES = 500_000
+"""Frames of a track, gaps included (ours): 4.6 hours at 30 Hz."""
+_UNEVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
+_JOINED = 2.5  # frames: bodies are not put between those that are further apart in time
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A recording of any kind; frames without a whole midline are left out and counted."""
+
+    name: str
+    angles_rad: Floats
+    """(T, 100) direction of travel, head first, unwrapped along the body and over time."""
+    points: Floats
+    """(T, P, 2) midline, head first; m, or body lengths where ``length_m`` is None."""
+    time_s: Floats
+    """(T,) of the kept frames, increasing; a gap where frames were dropped."""
+    rate_hz: float
+    """Frames a second of the camera; of uneven times, the rate at which bodies are put between."""
+    length_m: float | None
+    """Body length; None where the recording has no scale."""
+    dropped: int
+    """Frames that were left out because points were missing."""
+    rate_assumed: bool = False
+    """Whether the file states no rate, so that the default of its format was taken."""
+    uneven: bool = False
+    """Whether the frames came at uneven times, so that bodies were put between them."""
+    status: tuple[FrameStatus, ...] = ()
+    """(T,) of the kept frames; empty where the file says nothing of them."""
+    source: str = "not stated"
+    licence: str = "not stated"
+
+    @property
+    def frames(self) -> int:
+        """Kept frames T."""
+        return len(self.angles_rad)
+
+    @property
+    def bridged(self) -> int:
+        """Frames in which a missing keypoint was set on the curve through the others."""
+        return self.status.count(FrameStatus.BRIDGED)
+
+    @property
+    def bend_rad(self) -> Floats:
+        """K of every frame, (T,): standard deviation of the tangent angles ([PT] 2.6.3)."""
+        return np.asarray(self.angles_rad.std(axis=1))
+
+    @property
+    def flips(self) -> int:
+        """Frames that fit the frame before better with head and tail exchanged: tracking faults."""
+        before, after = self.angles_rad[:-1], self.angles_rad[1:]
+        same = 1.0 - np.cos(after - before).mean(axis=1)
+        flipped = 1.0 - np.cos(after[:, ::-1] + np.pi - before).mean(axis=1)
+        joined = np.diff(self.time_s) < 1.5 / self.rate_hz
+        return int(np.count_nonzero((flipped < same) & joined))
+
+
+def track_from_points(
+    name: str,
+    points: Floats,
+    rate_hz: float,
+    *,
+    scale_m: float | None = None,
+    frame: Ints | None = None,
+    time_s: Floats | None = None,
+    rate_assumed: bool = False,
+    status: Sequence[FrameStatus] = (),
+    source: str = "not stated",
+    licence: str = "not stated",
+) -> Track:
+    """Build a ``Track`` from points (T, P, 2), head first, in any unit.
+
+    Args:
+        name: of the recording, also used in faults.
+        points: NaN where a point was not seen.
+        rate_hz: frames a second.
+        scale_m: metres per unit; None where it is unknown (points become body lengths).
+        frame: (T,) frame numbers, increasing; default 0, 1, 2...
+        time_s: (T,) when the frames were taken, increasing. Where these are not the times of an
+            even rate, they decide: bodies are put between them (a cubic spline of each point) at
+            an even rate, that of their median step.
+        rate_assumed: whether ``rate_hz`` is a guess.
+        status: of every frame (T,), or nothing.
+        source: origin of the recording.
+        licence: under which it may be used.
+
+    Raises:
+        InputError: wrong shape, bad rate, or fewer than 2 whole frames.
+
+    """
+    if points.ndim != 3 or points.shape[-1] != 2 or points.shape[1] < 4:
+        raise InputError(f"{name}: points must be (frames, 4 or more, 2), not {points.shape}")
+    if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+        raise InputError(f"{name}: the frame rate must be above 0 Hz, not {rate_hz}")
+    number = np.arange(len(points)) if frame is None else frame
+    _check_span(name, number)
+    uneven = time_s is not None and _is_uneven(name, time_s, number)
+    if time_s is not None and uneven:
+        rate_hz = 1.0 / float(np.median(np.diff(time_s)))
+        number = np.rint(np.clip((time_s - time_s[0]) * rate_hz, 0.0, 2.0**53)).astype(np.int64)
+        _check_span(name, number)
+    elif np.any(number[1:] <= number[:-1]):
+        raise InputError(f"{name}: frame numbers must increase, one row of points for each frame")
+    whole = np.asarray(np.isfinite(points).all(axis=(1, 2)))
+    whole[whole] = [_distinct(body) for body in points[whole]]
+    dropped = int(len(points) - whole.sum())
+    if time_s is not None and uneven:
+        points, number, nearest = _between(points, time_s - time_s[0], whole, rate_hz)
+        status = [status[k] for k in nearest.tolist()] if status else ()
+        whole = np.ones(len(points), dtype=bool)
+    if int(whole.sum()) < 2:
+        raise InputError(f"{name}: only {int(whole.sum())} of {len(points)} frames hold a midline")
+    kept = points[whole]
+    even = np.stack([equal_arc_length(body) for body in kept])
+    length = float(np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1)))
+    return Track(
+        name=name,
+        angles_rad=_over_time(tangent_angles(even)),
+        points=kept / length if scale_m is None else kept * scale_m,
+        time_s=(number[whole] - number[0]) / rate_hz,
+        rate_hz=float(rate_hz),
+        length_m=None if scale_m is None else length * scale_m,
+        dropped=dropped,
+        rate_assumed=rate_assumed,
+        uneven=uneven,
+        status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),
+        source=source,
+        licence=licence,
+    )
+
+
+def _check_span(name: str, number: Ints) -> None:
+    span = int(number[-1]) - int(number[0]) + 1 if len(number) else 0
+    if span > MOST_FRAMES:
+        raise InputError(
+            f"{name}: its frames span {span}; a track has at most {MOST_FRAMES}: give a part of it"
+        )
+
+
+def _is_uneven(name: str, time_s: Floats, number: Ints) -> bool:
+    """Whether times are off those of any one rate by more than a part of a frame.
+
+    Raises:
+        InputError: times or frame numbers do not increase.
+
+    """
+    if np.any(np.diff(number) <= 0) or not (np.diff(time_s) > 0.0).all():
+        raise InputError(f"{name}: frames and their times must increase, one body at a time")
+    if len(time_s) < 3:
+        return False
+    step_s = float(time_s[-1] - time_s[0]) / float(number[-1] - number[0])
+    off_s = time_s - time_s[0] - step_s * (number - number[0])
+    return bool(np.abs(off_s).max() > _UNEVEN * step_s)
+
+
+def _between(
+    points: Floats, time_s: Floats, whole: Bools, rate_hz: float
+) -> tuple[Floats, Ints, Ints]:
+    """Bodies (T', P, 2) at an even rate, their frame numbers, and the nearest frame of each.
+
+    None lies beside a frame without a body, or where frames are far apart.
+    """
+    first = np.flatnonzero(whole[:-1] & whole[1:] & (np.diff(time_s) <= _JOINED / rate_hz))
+    bodies, numbers, nearest = [points[:0]], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for run in np.split(first, np.flatnonzero(np.diff(first) > 1) + 1):
+        if not run.size:
+            continue
+        own = np.append(run, run[-1] + 1)
+        at_s = time_s[own]
+        low, high = np.ceil(at_s[0] * rate_hz - 1e-9), np.floor(at_s[-1] * rate_hz + 1e-9)
+        grid = np.arange(int(low), int(high) + 1)
+        even_s = np.clip(grid / rate_hz, at_s[0], at_s[-1])
+        bodies.append(make_interp_spline(at_s, points[own], k=min(3, len(own) - 1))(even_s))
+        numbers.append(grid)
+        middle = 0.5 * (at_s[1:] + at_s[:-1])
+        nearest.append(own[np.searchsorted(middle, even_s)])
+    return np.concatenate(bodies), np.concatenate(numbers), np.concatenate(nearest)
+
+
+def frame_numbers(name: str, values: Floats) -> Ints:
+    """Frame numbers as integers.
+
+    Raises:
+        InputError: some are not whole, or too large to count frames.
+
+    """
+    odd = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
+    if odd.any():
+        raise InputError(
+            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are no whole numbers, such "
+            f"as {values[odd][0]:g}"
+        )
+    return values.astype(np.int64)
+
+
+def _distinct(body: Floats) -> bool:
+    chord = np.hypot(*np.diff(body, axis=0).T)
+    return int(np.count_nonzero(chord > 1e-9 * chord.sum())) >= 3
+
+
+def _over_time(angles_rad: Floats) -> Floats:
+    """Shift whole frames by turns of 2 pi, so that the mean heading never jumps."""
+    mean = angles_rad.mean(axis=1)
+    return np.asarray(angles_rad + (np.unwrap(mean) - mean)[:, None])

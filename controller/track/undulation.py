@@ -1,0 +1,118 @@
+"""Undulation: how far each part of the body swings, and how its path advances."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.track.resample import body_points, equal_arc_length
+from snakewalk.controller.track.track import Track
+
+
+@dataclass(frozen=True, slots=True)
+class Undulation:
+    """Amplitudes along the body, taken about the slow path of the whole body."""
+
+    angle_rad: Floats
+    """(N,) amplitude of the tangent angle: root of twice its variance over time."""
+    lateral: Floats
+    """(N + 1,) amplitude across the path, body lengths."""
+
+
+def even_points(track: Track) -> Floats | None:
+    """Points (T, 101, 2) at equal arc lengths, body lengths; None where places are not recorded.
+
+    Files of joint angles, and figures without travel, put every head at the same place.
+    """
+    heads = track.points[:, 0]
+    if np.ptp(heads, axis=0).max() <= 1e-9:
+        return None
+    even = np.stack([equal_arc_length(body) for body in track.points])
+    length = np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1))
+    return np.asarray(even / length)
+
+
+def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
+    """Amplitudes along the body.
+
+    The path's direction is the body's mean heading smoothed over a cycle, so that slow turns of
+    the animal do not count as swings.
+
+    Args:
+        track: with at least two frames.
+        frequency_hz: of the undulation; sets what is slow.
+
+    """
+    heading = track.angles_rad.mean(axis=1)
+    cycle = track.rate_hz / max(frequency_hz, 1e-9)
+    slow = _slow(heading, cycle)
+    swing = track.angles_rad - slow[:, None]
+    body = even_points(track)
+    if body is None:
+        body = body_points(track.angles_rad)
+        body = body - body.mean(axis=1, keepdims=True)
+    centre = np.stack([_slow(column, cycle) for column in body.mean(axis=1).T], axis=-1)
+    across = np.stack([-np.sin(slow), np.cos(slow)], axis=-1)
+    side = ((body - centre[:, None]) * across[:, None]).sum(axis=-1)
+    return Undulation(np.sqrt(2.0) * swing.std(axis=0), np.sqrt(2.0) * side.std(axis=0))
+
+
+@dataclass(frozen=True, slots=True)
+class Advance:
+    """How fast each segment goes, points of N a frame; at the pairs of ``measure_pulse_speed``."""
+
+    along: Floats
+    """(S, N) along the body's own tangent there, forwards positive."""
+    headward: Floats
+    """(S, N) in the direction of the head."""
+    cosine: Floats
+    """(S, N) of the angle between the tangent there and the head's."""
+
+    def head_speed(self, pulse: Floats) -> Floats:
+        """Speed of the head along its tangent (S, N), as each segment tells it.
+
+        With the skeleton of [PT] 2.6.4 a segment goes at the pulse speed along its own tangent,
+        and all of them at what the head is faster than the pulse in the direction of the head. So
+        the speed along the tangent of a segment is less than the head's by the angle between them.
+
+        Args:
+            pulse: (S, N) pulse speed, points a frame.
+
+        """
+        return np.asarray(self.headward + pulse * (1.0 - self.cosine))
+
+
+def advance_of(body: Floats, number: Ints, step: int) -> Advance:
+    """Speed of each segment, between frames that are ``step`` apart.
+
+    Args:
+        body: (T, N + 1, 2) points in body lengths, at equal arcs.
+        number: (T,) frame numbers.
+        step: frames between those compared.
+
+    """
+    segments = body.shape[1] - 1
+    at = np.searchsorted(number, number - step)
+    later = np.flatnonzero(number[at] == number - step)
+    earlier = at[later]
+    middle = 0.5 * (body[:, 1:] + body[:, :-1])
+    forward = body[:, :-1] - body[:, 1:]
+    mean = forward[later] + forward[earlier]
+    mean = mean / np.maximum(np.hypot(mean[..., 0], mean[..., 1]), 1e-12)[..., None]
+    gone = (middle[later] - middle[earlier]) * (segments / step)
+    head = mean[:, :1]
+    return Advance(
+        np.asarray((gone * mean).sum(axis=-1)),
+        np.asarray((gone * head).sum(axis=-1)),
+        np.asarray((mean * head).sum(axis=-1)),
+    )
+
+
+def _slow(values: Floats, cycle: float) -> Floats:
+    """What is left of a series without what happens within a cycle of so many frames."""
+    trend = np.polynomial.Polynomial.fit(np.arange(len(values)), values, 1)
+    line = trend(np.arange(len(values)))
+    if len(values) < 3.0 * cycle:
+        return np.asarray(line)
+    return np.asarray(line + gaussian_filter1d(values - line, cycle / 2.0, mode="nearest"))

@@ -1,0 +1,48 @@
+"""``snakewalk view``: a log in the browser, in 3-D, with a time slider."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import VIEW_AT, ViewAt
+
+_MOST = 2
+
+
+def view(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG [LOG]", help="log.mcap of a run, or the .part of a killed one; or of two"
+        ),
+    ],
+    view_at: ViewAt = VIEW_AT,
+) -> None:
+    """Show a log in the browser: body, path, servos and curves, with a time slider. ^C ends it.
+
+    Two logs are shown side by side, or over each other if they have the same ground.
+
+    A run is shown while it lasts by --view of run, gait run and play.
+    """
+    require_extra("the page needs", "viser")
+    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
+    from snakewalk.controller.studies.run_comparison import log_names  # noqa: PLC0415  heavy
+    from snakewalk.controller.view.live_view import host_and_port  # noqa: PLC0415
+    from snakewalk.controller.view.log_page import LogPage, play  # noqa: PLC0415
+    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415
+
+    host, port = host_and_port(view_at)
+    if len(logs) > _MOST:
+        raise InputError(f"{len(logs)} logs: the page shows one or two; more: snakewalk compare")
+    records = {}
+    for log, name in zip(logs, log_names(logs), strict=True):
+        records[name] = read_log(log)
+        if records[name].note:
+            LOGGER.warning("%s: %s", log, records[name].note)
+    page = LogPage(records, host, port)
+    print(f"{page.url}  (^C ends)", flush=True)
+    play(page, WallClock())

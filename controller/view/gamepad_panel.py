@@ -1,0 +1,74 @@
+"""What is said of a gamepad at the computer of whoever has the page open, and how to do without."""
+
+from html import escape
+from queue import SimpleQueue
+from typing import Final
+
+import viser
+
+from snakewalk.controller.view.browser_gamepad import BrowserGamepad
+from snakewalk.controller.view.dead_man import WITHOUT
+
+_NONE: Final = (
+    "No gamepad. Press a button on one that is attached to the computer of this browser, which "
+    "tells of it only then."
+)
+_STOP: Final = "right stick pressed: E-STOP"
+
+
+class GamepadPanel:
+    """A tab of the page."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        tabs: viser.GuiTabGroupHandle,
+        gamepad: BrowserGamepad,
+    ) -> None:
+        self._gamepad = gamepad
+        self._pressed: SimpleQueue[str] = SimpleQueue()
+        self._needed = False
+        self._shown = ""
+        with tabs.add_tab("gamepad"):
+            self._text = server.gui.add_html("")
+            self._without = server.gui.add_button(
+                "go on without the gamepad", hint="nobody has to hold a button", visible=False
+            )
+        self._without.on_click(lambda event: self._pressed.put(WITHOUT))
+        self.show(steers=False)
+
+    def show(self, *, steers: bool) -> None:
+        """Show what the gamepad does: it stops the run, and where that is so steers it."""
+        state, stale = self._gamepad.state, self._gamepad.is_stale
+        if state is None:
+            text = (
+                _NONE if not self._needed else "The gamepad is gone: the body stands in its shape."
+            )
+        elif not state.standard:
+            text = f"{state.name}: this browser does not know which button is which; not taken."
+        elif not steers:
+            text = f"{state.name}: {_STOP}."
+        else:
+            self._needed = True
+            now = (
+                "It says nothing any more: the body stands in its shape."
+                if stale
+                else "Held: the body moves."
+                if state.held
+                else "Let go: the body stands in its shape."
+            )
+            text = f"{state.name}: the body moves while LB or RB is held; {_STOP}. {now}"
+        if text != self._shown:
+            self._shown = text
+            self._text.content = f"<div style='padding:.2em .8em .6em'>{escape(text)}</div>"
+        missing = self._needed and (state is None or stale)
+        if self._without.visible != missing:
+            self._without.visible = missing
+
+    def commands(self) -> list[str]:
+        """What was pressed in the tab since the last call."""
+        found = []
+        while not self._pressed.empty():
+            found.append(self._pressed.get())
+            self._needed = False
+        return found

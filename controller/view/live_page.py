@@ -1,0 +1,198 @@
+"""The process that serves a run's page: rows in, viser out, and the stop button pressed."""
+
+import base64
+import json
+import os
+import signal
+import socket
+import sys
+from collections import defaultdict, deque
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+import viser
+
+from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.view.browser_gamepad import BrowserGamepad
+from snakewalk.controller.view.dashboard import SPAN_S, Dashboard
+from snakewalk.controller.view.gait_panel import GaitPanel
+from snakewalk.controller.view.gamepad_panel import GamepadPanel
+from snakewalk.controller.view.page_server import StopPanel, open_page
+from snakewalk.controller.view.scene import BodyScene
+from snakewalk.controller.view.waypoint_panel import WaypointPanel
+from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.priority import give_way
+from snakewalk.drivers.safety.stop_button import PressedButton
+
+_PERIOD_S: Final = 0.05
+"""How often the body is drawn."""
+_SERVOS_S: Final = 0.2
+_CURVES_S: Final = 0.5
+_SILENT_S: Final = 2.0
+"""A run that says nothing for so long is told."""
+_ROWS: Final = round(SPAN_S / _PERIOD_S)
+
+
+def serve(line: socket.socket, host: str, port: int) -> None:
+    """Serve a page until the run closes the line."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  viser prints
+    give_way()
+    try:
+        gamepad = BrowserGamepad()
+        server, url = open_page(host, port, gamepad)
+    except OSError as fault:
+        line.sendall(json.dumps({"fault": str(fault)}).encode() + b"\n")
+        return
+    line.sendall(json.dumps({"url": url}).encode() + b"\n")
+    page = _LivePage(server, WatcherEnd(line), gamepad)
+    with suppress(EOFError, OSError):
+        while True:
+            page.step()
+    server.stop()
+
+
+class _LivePage:
+    """State of the page between two steps."""
+
+    def __init__(self, server: viser.ViserServer, end: WatcherEnd, gamepad: BrowserGamepad) -> None:
+        self._server, self._end, self._gamepad = server, end, gamepad
+        gamepad.on_stop = lambda: self._stop.show(self._press("E-STOP of a gamepad"))
+        self._gamepad_panel: GamepadPanel | None = None
+        self._clock = WallClock()
+        self._stop = StopPanel(server, self._press)
+        self._button: PressedButton | None = None
+        self._rows: dict[str, deque[dict[str, Any]]] = defaultdict(lambda: deque(maxlen=_ROWS))
+        self._header: Header | None = None
+        self._scene: BodyScene | None = None
+        self._dashboard: Dashboard | None = None
+        self._gait_panel: GaitPanel | None = None
+        self._gait: dict[str, Any] | None = None
+        self._waypoint_panel: WaypointPanel | None = None
+        self._takes_waypoints = False
+        self._over = False
+        self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
+
+    def step(self) -> None:
+        """Take what has come, draw it, and ask for more."""
+        now_s = self._clock.now_s()
+        if self._asked_s < self._told_s or self._asked_s < 0.0:
+            self._clock.sleep_until_s(self._asked_s + _PERIOD_S)
+            self._asked_s = self._clock.now_s()
+            self._end.ask()
+            for command in self._commands():
+                self._end.command(command)
+        for topic, row in self._end.rows(_PERIOD_S):
+            self._take(topic, row)
+            if topic == "/pose":
+                self._told_s = self._clock.now_s()
+                self._draw()
+        if self._button is not None and now_s - max(self._told_s, 0.0) > _SILENT_S:
+            ended = self._button.end
+            if ended is not None and not self._over:
+                self._over = True
+                self._stop.ended(ended)
+            elif self._told_s > 0.0 and not self._over:
+                self._stop.show(f"no news of the run for {now_s - self._told_s:.0f} s")
+
+    def _commands(self) -> list[str]:
+        """What was set in the page since the last call."""
+        found = []
+        if self._gait_panel is not None:
+            found += self._gait_panel.commands(self._asked_s) + self._gamepad.commands()
+        if self._waypoint_panel is not None:
+            found += self._waypoint_panel.commands()
+        if self._gamepad_panel is not None:
+            self._gamepad_panel.show(steers=self._gait_panel is not None)
+            found += self._gamepad_panel.commands()
+        return found
+
+    def _take(self, topic: str, row: dict[str, Any]) -> None:
+        if topic == "/button":
+            self._button = PressedButton(Path(row["path"]))
+            self._stop.arm()
+            return
+        if topic == "/config":
+            self._header = record_of({"/config": [row]}, complete=False, note="").header
+            with self._server.atomic():
+                self._scene = BodyScene(self._server, self._header)
+                self._scene.first_camera(self._server)
+                self._dashboard = Dashboard(self._server, self._header)
+            self._show_gait()
+            self._take_waypoints()
+            tabs = self._dashboard.tabs
+            self._gamepad_panel = GamepadPanel(self._server, tabs, self._gamepad)
+            return
+        if topic == "/picture":
+            if self._dashboard is not None:
+                self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
+            return
+        if topic == "/gait":
+            self._gait = row
+            self._show_gait()
+            return
+        if topic == "/course":
+            self._takes_waypoints = True
+            self._take_waypoints()
+            return
+        if topic == "/waypoints":
+            self._header = self._record({topic: [row]}).header
+            return
+        self._rows[topic].append(row)
+        if topic == "/event":
+            if row["kind"] in ("trip", "interrupt") or (row["kind"] == "stop" and not self._over):
+                self._over = True
+                self._stop.ended(row["text"])
+            if self._dashboard is not None:
+                events = {topic: list(self._rows[topic])}
+                self._dashboard.show_events(self._record(events).events)
+            if self._waypoint_panel is not None:
+                self._waypoint_panel.show(row["kind"], row["text"])
+
+    def _show_gait(self) -> None:
+        """Show what an operator runs, once the page knows the robot; a run without one has none."""
+        if self._gait is None or self._header is None or self._dashboard is None:
+            return
+        if self._gait_panel is None:
+            self._gait_panel = GaitPanel(self._server, self._dashboard.tabs, self._header.robot)
+        self._gait_panel.show(self._gait["name"], self._gait["parameters"])
+
+    def _take_waypoints(self) -> None:
+        """Take clicks on the ground, once there is one; of a run whose waypoints may be set."""
+        if self._takes_waypoints and self._scene is not None and self._dashboard is not None:
+            self._waypoint_panel = WaypointPanel(self._server, self._dashboard.tabs, self._scene)
+
+    def _draw(self) -> None:
+        scene, dashboard, now_s = self._scene, self._dashboard, self._told_s
+        if scene is None or dashboard is None:
+            return
+        newest = {topic: list(self._rows[topic])[-1:] for topic in ("/cycle", "/pose", "/slow")}
+        now = self._record(newest)
+        with self._server.atomic():
+            follow = dashboard.follow.value
+            if not follow:
+                scene.release()
+            scene.show(now, -1, -1, follow=follow, goals=dashboard.goals.value)
+            if now_s - self._servos_s >= _SERVOS_S:
+                self._servos_s = now_s
+                dashboard.show_state(now, -1, -1, "")
+                dashboard.show_servos(now, -1, -1 if len(now.slow.time_s) else None)
+            if now_s - self._curves_s >= _CURVES_S:
+                self._curves_s = now_s
+                past = self._record({topic: list(each) for topic, each in self._rows.items()})
+                dashboard.show_curves(past, len(past.cycle.time_s) - 1, len(past.pose.time_s) - 1)
+                scene.show_paths(past.paths, float(past.cycle.time_s[-1]))
+                scene.show_trail(past.pose.centre_m)
+
+    def _record(self, rows: dict[str, list[dict[str, Any]]]) -> RunRecord:
+        """What is known, of rows by topic."""
+        return record_of(rows, complete=False, note="", header=self._header)
+
+    def _press(self, who: str) -> str:
+        if self._button is None:
+            return "there is no run to stop yet"
+        self._button.press(who)
+        return "stop requested"

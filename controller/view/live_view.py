@@ -1,0 +1,107 @@
+"""A run's page: served by a process of its own, which is fed with the rows of the log."""
+
+import base64
+import json
+import math
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from snakewalk.config.arrays import Image
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.run.watcher import WatcherProcess
+from snakewalk.controller.view.dead_man import DeadMan
+
+_PICTURE_S: Final = 0.5
+"""Pictures of a camera are shown no more often (ours)."""
+_QUALITY: Final = 70
+
+
+class LiveView(WatcherProcess):
+    """Serves the page; use it in a ``with``.
+
+    Raises:
+        InputError: viser is not installed, or nothing can be served there.
+
+    """
+
+    def __init__(self, at: str = "127.0.0.1:8080") -> None:
+        require_extra("the page needs", "viser")
+        super().__init__(_serve, *host_and_port(at), fault=f"--view-at {at}")
+        self.url = str(self.said["url"])
+        """To be opened in a browser; holds the token where one is asked for."""
+        self._picture: bytes | None = None
+        self._picture_s = -math.inf
+        self._dead_man = DeadMan()
+
+    @property
+    def held(self) -> bool:
+        """Whether the dead man's button of a browser's gamepad is held; True without a gamepad."""
+        return self._dead_man.held
+
+    def pressed(self) -> list[str]:
+        """What was set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
+        return self._dead_man.sort_out(self._end.commands())
+
+    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+        """Take the gait that an operator runs: the page then has its sliders."""
+        row = {"name": name, "parameters": parameters}
+        self._end.add("/gait", json.dumps(row).encode())
+
+    def on_course(self) -> None:
+        """Take it that the run's waypoints may be set: the page then takes clicks."""
+        self._end.add("/course", b"{}")
+
+    def on_row(self, topic: str, row: bytes) -> None:
+        """Take a row of the log; returns at once."""
+        if topic == "/pose" and self._picture is not None:
+            picture, self._picture = self._picture, None
+            self._end.add("/picture", picture)
+        self._end.add(topic, row)
+
+    def on_picture(self, image: Image, time_s: float) -> None:
+        """Take a picture (H, W, 3), blue first, of the run's camera, from its thread."""
+        if time_s - self._picture_s < _PICTURE_S:
+            return
+        import cv2  # noqa: PLC0415  an extra
+
+        self._picture_s = time_s
+        whole, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        if whole:
+            shown = base64.b64encode(data.tobytes()).decode()
+            self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
+
+
+@contextmanager
+def open_view(view: bool, at: str) -> Iterator[LiveView | None]:
+    """Serve the page of a run where it is asked for, and print its address."""
+    if not view:
+        yield None
+        return
+    with LiveView(at) as page:
+        print(f"page: {page.url}", file=sys.stderr, flush=True)
+        yield page
+
+
+def _serve(line: socket.socket, host: str, port: int) -> None:
+    from snakewalk.controller.view.live_page import serve  # noqa: PLC0415  viser stays here
+
+    serve(line, host, port)
+
+
+def host_and_port(at: str) -> tuple[str, int]:
+    """Read HOST or HOST:PORT; the port is 8080 unless given.
+
+    Raises:
+        InputError: it is neither.
+
+    """
+    host, colon, port = at.rpartition(":")
+    if not colon:
+        host, port = at, "8080"
+    if not host or not port.isdigit() or not 0 <= int(port) <= 65_535:
+        raise InputError(f"--view-at {at}: expected HOST or HOST:PORT, e.g. 127.0.0.1:8080")
+    return host, int(port)

@@ -1,0 +1,84 @@
+"""Waypoints set by a click on the ground, in the page of a live walk."""
+
+from collections.abc import Callable
+from html import escape
+from queue import SimpleQueue
+from typing import Final
+
+import viser
+
+from snakewalk.controller.view.scene import BodyScene
+from snakewalk.controller.walk.live_course import ADD, CLEAR, END, NEXT
+
+_HINT: Final = "Shift and a click on the ground add a waypoint, too"
+_BAD: Final = "#b3121a"
+
+
+class WaypointPanel:
+    """A tab of buttons; what is clicked is commanded of the run, which says what it made of it."""
+
+    def __init__(
+        self, server: viser.ViserServer, tabs: viser.GuiTabGroupHandle, scene: BodyScene
+    ) -> None:
+        self._scene = scene
+        self._commands: SimpleQueue[str] = SimpleQueue()
+        self._armed = ""
+        gui = server.gui
+        with tabs.add_tab("walk"):
+            for word, label, what in (
+                (ADD, "add a waypoint", "the next click on the ground is the last waypoint"),
+                (NEXT, "go there next", "the next click on the ground is the only waypoint left"),
+            ):
+                gui.add_button(label, hint=what).on_click(self._arming(word))
+            for word, label, what in (
+                (CLEAR, "leave out what is left", "it comes to rest, and waits for a waypoint"),
+                (END, "end the run", "it comes to rest, then torque goes off"),
+            ):
+                gui.add_button(label, hint=what).on_click(self._commanding(word))
+            self._text = gui.add_html("")
+        self._show(_HINT)
+        server.scene.on_click()(self._clicked)
+        server.scene.on_click(modifier="shift")(self._clicked)
+
+    def commands(self) -> list[str]:
+        """What was clicked since the last call, for a ``LiveCourse``."""
+        found = []
+        while not self._commands.empty():
+            found.append(self._commands.get())
+        return found
+
+    def show(self, kind: str, text: str) -> None:
+        """Show what the run made of a click: an event of its log."""
+        if kind in ("operator", "refused"):
+            self._show(text, _BAD if kind == "refused" else "inherit")
+
+    def _arming(self, word: str) -> Callable[[object], None]:
+        """What a button does that waits for a click, or waits no longer."""
+
+        def pressed(event: object) -> None:
+            self._armed = "" if self._armed == word else word
+            self._show("now click on the ground" if self._armed else _HINT)
+
+        return pressed
+
+    def _commanding(self, word: str) -> Callable[[object], None]:
+        def pressed(event: object) -> None:
+            self._armed = ""
+            self._commands.put(word)
+
+        return pressed
+
+    def _clicked(self, event: viser.SceneClickEvent) -> None:
+        word, self._armed = ADD if event.modifier == "shift" else self._armed, ""
+        if not word:
+            return
+        point_m = self._scene.ground_m(event.ray_origin, event.ray_direction)
+        if point_m is None:
+            self._show("refused: there is no ground where you clicked", _BAD)
+            return
+        self._commands.put(f"{word}={point_m[0]:.3f},{point_m[1]:.3f}")
+        self._show("asked of the run")
+
+    def _show(self, text: str, color: str = "inherit") -> None:
+        style = f"padding:.2em .8em .6em;font-size:13px;color:{color}"
+        self._text.content = f"<div style='{style}'>{escape(text)}</div>"

@@ -1,0 +1,125 @@
+"""``scan``, ``doctor`` and ``bus set`` as a user calls them, on a line of 16 servos."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from snakewalk.controller.cli.main import main
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.line_port import OpenedLine, line_port
+
+pytestmark = pytest.mark.usefixtures("device")
+
+
+@pytest.fixture
+def line() -> OpenedLine:
+    return OpenedLine(ServoBank(range(1, 17)), BenchPlant(16))
+
+
+@pytest.fixture
+def device(line: OpenedLine) -> Iterator[str]:
+    with line_port(line) as name:
+        yield name
+
+
+def call(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: str
+) -> tuple[int, str, str]:
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr()
+    return int(ended.value.code or 0), said.out, said.err
+
+
+def test_scan(
+    device: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = call(monkeypatch, capsys, "scan", "--port", device, "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert [servo["servo_id"] for servo in found["servos"]] == list(range(1, 17))
+    assert found["servos"][0]["model"] == "XM430-W350"
+
+
+def test_doctor(
+    device: str,
+    line: OpenedLine,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    line.bank["Hardware Error Status"][4] = 0x20
+    code, out, _ = call(monkeypatch, capsys, "doctor", "--port", device, "--json")
+    found = json.loads(out)
+    grades = {f["check"]: f["grade"] for f in found["findings"]}
+    assert (grades["return delay"], grades["alarms"]) == ("warn", "fail")
+    assert grades["model"] == grades["supply"] == "ok"
+    assert (code, found["worst"]) == (1, "fail")
+    code, out, _ = call(monkeypatch, capsys, "doctor", "--port", device)
+    assert code == 1
+    assert "servo 5: overload" in out
+    assert "-> remove the cause" in out
+
+
+def test_bus_set_shows_asks_and_writes(
+    device: str,
+    line: OpenedLine,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ("bus", "set", "--port", device, "--id", "16", "--new-id", "40")
+    code, out, err = call(monkeypatch, capsys, *words)
+    assert code == 0
+    assert "nothing written" in out
+    assert "say --yes" in err
+    code, out, _ = call(monkeypatch, capsys, *words, "--dry-run", "--yes", "--json")
+    assert not json.loads(out)["written"]
+    assert line.bank["ID"][15] == 16
+    code, out, _ = call(monkeypatch, capsys, *words, "--yes")
+    assert code == 0
+    assert "written and read back" in out
+    assert line.bank["ID"][15] == 40
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("scan", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE: no such port"),
+        (("scan", "--port", "DEVICE", "--baud", "1200"), "--baud 1200: servos have 9600"),
+        (("doctor", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE: no such port"),
+        (("doctor", "--port", "DEVICE", "--robot", "nope"), "nope"),
+        (("bus", "set", "--port", "/dev/ttyNOPE", "--id", "1"), "/dev/ttyNOPE: no such port"),
+        (("bus", "set", "--port", "DEVICE", "--id", "253"), "--id 253: a bus has IDs 0 to 252"),
+        (
+            ("bus", "set", "--port", "DEVICE", "--id", "1", "--new-baud", "1200"),
+            "--new-baud 1200 baud: a XM430-W350 has 9600",
+        ),
+        (
+            ("bus", "set", "--port", "DEVICE", "--id", "1", "--new-id", "2"),
+            "--new-id 2: there is a servo with this ID already",
+        ),
+    ],
+)
+def test_wrong_input_is_one_line_and_code_2(
+    device: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: tuple[str, ...],
+    said: str,
+) -> None:
+    words = tuple(device if word == "DEVICE" else word for word in words)
+    code, out, err = call(monkeypatch, capsys, *words)
+    assert code == 2
+    assert said in err
+    assert len(err.strip().splitlines()) == 1
+    assert out == ""
+
+
+def test_a_servo_that_is_not_there_is_one_line_and_code_1(
+    device: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = call(monkeypatch, capsys, "bus", "set", "--port", device, "--id", "99")
+    assert code == 1
+    assert err.startswith("snakewalk: servo 99: ping: ")

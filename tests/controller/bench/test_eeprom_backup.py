@@ -1,0 +1,130 @@
+"""Servos' settings as a file and back, restarts that clear an alarm, a LED that says which one."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.cli.command_line import app
+from snakewalk.drivers.errors import NoAnswerError
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+Call = Callable[..., tuple[int, str, BaseException | None]]
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> SimLine:
+    made = SimLine(ServoBank([7, 3], ["XM430-W350", "XL330-M288"]), BenchPlant(2))
+    made.latency_s = 0.0  # type: ignore[attr-defined]
+
+    @contextmanager
+    def opened(device: str, baud: int) -> Iterator[SimLine]:
+        yield made
+
+    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
+    return made
+
+
+@pytest.fixture
+def call(line: SimLine) -> Call:
+    def run(*words: object) -> tuple[int, str, BaseException | None]:
+        result = CliRunner().invoke(app, ["bus", *map(str, words), "--port", "any"])
+        return result.exit_code, result.stdout, result.exception
+
+    return run
+
+
+def test_what_was_set_comes_back_and_nothing_else_is_touched(
+    tmp_path: Path, line: SimLine, call: Call
+) -> None:
+    bank, file = line.bank, tmp_path / "servos.json"
+    bank["Homing Offset"][:] = 100, -200
+    bank["Temperature Limit"][0] = 70
+    kept = bank.table.copy()
+    assert call("backup", "-o", file)[0] == 0
+    assert (bank.table[:, :64] == kept[:, :64]).all()  # reading changes nothing
+
+    bank["Homing Offset"][:] = 0
+    bank["Temperature Limit"][0] = 60
+    bank["Torque Enable"][0] = 1
+    code, out, _ = call("restore", file, "--dry-run", "--json")
+    assert code == 0
+    shown = json.loads(out)
+    assert not shown["written"]
+    assert shown["changes"] == {
+        "7": {
+            "Torque Enable": [1, 0],
+            "Homing Offset": [0, 100],
+            "Temperature Limit": [60, 70],
+        },
+        "3": {"Homing Offset": [0, -200]},
+    }
+    assert bank["Homing Offset"].tolist() == [0, 0]
+    assert call("restore", file)[0] == 0  # nobody to ask: nothing is written
+    assert bank["Homing Offset"].tolist() == [0, 0]
+    assert call("restore", file, "--id", 3, "--yes")[0] == 0
+    assert bank["Homing Offset"].tolist() == [0, -200]
+    assert call("restore", file, "--yes")[0] == 0
+    assert (bank.table[:, :64] == kept[:, :64]).all()
+    assert "nothing to restore" in call("restore", file, "--yes")[1]
+
+
+def test_a_file_that_is_not_of_these_servos_is_refused_before_anything_is_written(
+    tmp_path: Path, line: SimLine, call: Call
+) -> None:
+    file = tmp_path / "servos.json"
+    call("backup", "-o", file)
+    assert isinstance(call("backup", "-o", file)[2], InputError)  # it exists
+    text = file.read_text()
+    line.bank["Homing Offset"][:] = 5
+    for broken, said in (
+        (text.replace("XL330-M288", "XM430-W350"), "ID 3: is a XL330-M288"),
+        (text.replace('"Shutdown"', '"Shut down"'), "has no Shut down to restore"),
+        (text.replace('"servos"', '"servo"'), "servos: is required"),
+        ("[]", "no backup of servos"),
+        ("{", "not JSON"),
+    ):
+        file.write_text(broken)
+        fault = call("restore", file, "--yes")[2]
+        assert isinstance(fault, InputError)
+        assert said in str(fault)
+    file.write_text(text)
+    assert "has no ID 9; it has 3, 7" in str(call("restore", file, "--id", 9)[2])
+    assert line.bank["Homing Offset"].tolist() == [5, 5]
+
+
+def test_a_reboot_clears_an_alarm_and_asks_first(line: SimLine, call: Call) -> None:
+    line.bank["Hardware Error Status"][0] = 0x20
+    line.bank["Torque Enable"][1] = 1
+    assert call("reboot", "--id", 7)[0] == 0  # nobody to ask
+    assert line.bank["Hardware Error Status"][0] == 0x20
+    code, out, _ = call("reboot", "--id", 7, "--yes")
+    assert code == 0
+    assert "alarm before: overload; now: none" in out
+    assert line.bank["Hardware Error Status"][0] == 0
+    assert line.bank["Torque Enable"][1] == 1  # the other one was not asked to
+    assert isinstance(call("reboot", "--id", 9, "--yes")[2], NoAnswerError)
+
+
+def test_only_the_led_of_the_servo_that_is_asked_for_blinks(line: SimLine, call: Call) -> None:
+    seen: list[list[int]] = []
+    advance = line.clock.sleep_until_s
+
+    def look(time_s: float) -> None:
+        seen.append(line.bank["LED"].tolist())
+        advance(time_s)
+
+    line.clock.sleep_until_s = look  # type: ignore[method-assign]
+    before = line.firmware.plant.position_rad.copy()
+    assert call("blink", "--id", 3, "--times", 2)[0] == 0
+    changes = [now for last, now in pairwise(seen) if now != last]
+    assert changes == [[0, 1], [0, 0]] * 2
+    assert np.array_equal(line.firmware.plant.position_rad, before)

@@ -1,0 +1,71 @@
+"""Who is on the wire, and the robot's file that is suggested of it."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.cli.command_line import app
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+MODELS = {21: "XM430-W350", 7: "XM430-W350", 3: "XM430-W210"}
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> SimLine:
+    made = SimLine(ServoBank(list(MODELS), list(MODELS.values())), BenchPlant(3))
+    made.latency_s = 0.0  # type: ignore[attr-defined]
+
+    @contextmanager
+    def opened(device: str, baud: int) -> Iterator[SimLine]:
+        yield made
+
+    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
+    return made
+
+
+def call(*words: object):
+    rates = ["--baud", "1000000", "--baud", "57600"]
+    return CliRunner().invoke(app, ["bus", "identify", "--port", "any", *rates, *map(str, words)])
+
+
+def test_each_servo_is_told_with_its_state_and_nothing_changes(line: SimLine) -> None:
+    bank = line.bank
+    bank["Hardware Error Status"][1] = 0x20
+    bank["Torque Enable"][0] = 1
+    kept = bank.table[:, :64].copy()
+    servos = json.loads(call("--json").stdout)["servos"]
+    assert (bank.table[:, :64] == kept).all()
+    assert {servo["servo_id"]: servo["model"] for servo in servos} == MODELS
+    state = {servo["servo_id"]: servo["state"] for servo in servos}
+    assert state[7]["hardware_error"] == 0x20
+    assert [state[each]["torque_on"] for each in (3, 7, 21)] == [False, False, True]
+    assert "alarm: overload" in call().stdout
+
+
+def test_the_robots_file_has_them_by_id_and_says_what_it_assumes(
+    line: SimLine, tmp_path: Path
+) -> None:
+    out = tmp_path / "mine.toml"
+    assert call("-o", out).exit_code == 0
+    robot = load_robot(str(out))
+    assert robot.models_by_id == MODELS
+    assert robot.servo_ids == (3, 7, 21)
+    assert robot.joint_axes == "yyy"
+    assert robot.servo.supply_v == pytest.approx(12.0, abs=0.2)
+    assert "axes" in out.read_text()
+    assert isinstance(call("-o", out).exception, InputError)  # it exists
+
+
+def test_an_empty_wire_is_told(monkeypatch: pytest.MonkeyPatch, line: SimLine) -> None:
+    monkeypatch.setattr(line, "setBaudRate", lambda rate: False)
+    error = call().exception
+    assert isinstance(error, InputError)
+    assert "nobody answers" in str(error)

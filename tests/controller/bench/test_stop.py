@@ -1,0 +1,165 @@
+"""``snakewalk stop``: runs of other programs, and servos on a port that no program holds."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from snakewalk.config.faults import FaultPlan
+from snakewalk.controller.bench import emergency_stop
+from snakewalk.controller.cli.main import main
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runtime.drive import Progress
+from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.line_port import OpenedLine, line_port
+from tests.helpers.program import Program, command
+
+HUNG = """
+import signal, sys
+from snakewalk.drivers.safety.stop_button import StopButton
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+with StopButton("hung", sys.argv[1]):
+    print("up", flush=True)
+    signal.pause()
+"""
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def stop(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
+    def call(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["snakewalk", "stop", *words])
+        with pytest.raises(SystemExit) as end:
+            main()
+        shown = capsys.readouterr()
+        return int(end.value.code or 0), shown.out, shown.err
+
+    return call
+
+
+@pytest.fixture
+def three() -> OpenedLine:
+    return OpenedLine(ServoBank(range(1, 4)), BenchPlant(3))
+
+
+def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("mujoco")
+    other: list[Program] = []
+
+    def on_progress(progress: Progress) -> None:
+        if not other:
+            other.append(command("stop", "--json"))
+
+    job = prepare_gait("lateral-undulation", seconds=3600.0)
+    finished = execute(job, tmp_path / "run", on_progress=on_progress)
+    said, _ = other[0].communicate()
+    (stopped,) = json.loads(said)["stopped"]
+    assert other[0].returncode == 0
+    assert (stopped["what"], stopped["how"], stopped["safe"]) == (
+        "lateral-undulation",
+        "latched",
+        True,
+    )
+    assert stopped["folder"] == str(tmp_path / "run")
+    why = f"stop requested by snakewalk stop (process {other[0].pid})"
+    assert finished.outcome.tripped == why == stopped["text"]
+    assert [event.text for event in read_log(finished.log).events if event.kind == "trip"] == [why]
+
+
+def test_a_run_that_does_not_answer_is_killed_and_its_servos_switched_off_from_here(
+    three: OpenedLine,
+    stop: Callable[..., tuple[int, str, str]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("LATCH_S", "END_S"):
+        monkeypatch.setattr(emergency_stop, name, 0.05)
+    torque = three.bank["Torque Enable"]
+    torque[:] = 1
+    with (
+        line_port(three) as port,
+        subprocess.Popen(
+            [sys.executable, "-c", HUNG, port], stdout=subprocess.PIPE, text=True
+        ) as child,
+    ):
+        assert child.stdout is not None
+        assert child.stdout.readline() == "up\n"
+        code, out, err = stop("--port", port, "--baud", "1000000", "--json")
+    killed, off = json.loads(out)["stopped"]
+    assert (code, child.returncode) == (0, -9), err
+    assert (killed["how"], killed["safe"]) == ("killed", False)
+    assert off["text"] == "torque is off: 3 servos confirm it, 1000000 baud"
+    assert torque.tolist() == [0] * 3
+
+
+def test_a_port_where_nobody_answers_ends_with_exit_code_1(
+    three: OpenedLine, stop: Callable[..., tuple[int, str, str]]
+) -> None:
+    three.bank["Baud Rate"][:] = 1
+    with line_port(three) as port:
+        code, out, _ = stop("--port", port, "--baud", "1000000")
+    assert code == 1
+    assert "nobody answers: is the power on?" in out
+
+
+def test_torque_goes_off_on_a_line_that_loses_every_third_request(
+    stop: Callable[..., tuple[int, str, str]],
+) -> None:
+    """Sent once at each rate, and asked three times, it left torque on here and there."""
+    confirmed = 0
+    for seed in range(20):
+        line = OpenedLine(ServoBank(range(1, 4)), BenchPlant(3))
+        line.bank["Torque Enable"][:] = 1
+        fault = {"kind": "drop", "chance": 0.33, "of": "questions"}
+        FaultPlayer(line, FaultPlan.model_validate({"seed": seed, "fault": [fault]}))
+        with line_port(line) as port:
+            code, out, _ = stop("--port", port)
+        assert line.bank["Torque Enable"].tolist() == [0] * 3
+        confirmed += code == 0 and "3 servos confirm it" in out
+    assert confirmed >= 15  # in the others both broadcast pings got lost
+
+
+def test_what_is_asked_wrongly_is_one_line(
+    stop: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)
+    assert stop("nothing") == (2, "", "snakewalk: nothing: no such run is under way\n")
+    assert stop("a", "--port", "b")[0] == 2
+    code, _, err = stop()
+    assert code == 2
+    assert "nothing to stop: no run is under way; --port: no USB serial adapter found" in err
+    code, _, err = stop("--port", str(tmp_path / "tty"), "--baud", "7")
+    assert "--baud 7: servos have" in err
+
+
+def test_a_run_is_meant_by_name_folder_log_process_or_port(tmp_path: Path) -> None:
+    with StopButton("one", folder=tmp_path / "r") as one, StopButton("two", "/dev/null"):
+        for run in ("one", str(tmp_path / "r"), str(tmp_path / "r" / "log.mcap")):
+            (found,) = emergency_stop.runs_of(run=run)
+            assert found.run == one.run
+            found.close()
+        names = {}
+        for key, buttons in {
+            "process": emergency_stop.runs_of(run=str(one.run.process)),
+            "port": emergency_stop.runs_of(port="/dev/null"),
+            "none": emergency_stop.runs_of(),
+        }.items():
+            names[key] = sorted(each.run.name for each in buttons)
+            for each in buttons:
+                each.close()
+    assert names == {"process": ["one", "two"], "port": ["two"], "none": ["two"]}

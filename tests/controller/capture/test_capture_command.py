@@ -1,0 +1,220 @@
+"""``snakewalk capture``: films in, a track out; bad input in one line; nothing overwritten."""
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
+from snakewalk.controller.capture.scale import scale_of_marker
+from snakewalk.controller.images.video import open_footage
+from snakewalk.controller.track.readers.load import load_track
+from tests.helpers.command import snakewalk
+from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
+
+SCENE = SnakeScene(rows=160, columns=200, length_px=70.0, frames=12, wave_hz=1.0, rate_hz=15.0)
+
+
+def write_film(path: Path, frames: Iterable[np.ndarray]) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (200, 160))
+    for frame in frames:
+        writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
+    writer.release()
+    return path
+
+
+@pytest.fixture(scope="module")
+def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_film(tmp_path_factory.mktemp("films") / "swim.avi", film(SCENE))
+
+
+def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Path) -> None:
+    track, sheet, overlay = (tmp_path / name for name in ("t.npz", "s.png", "o.avi"))
+    done = snakewalk(
+        "capture", str(swim), "-o", str(track), "--length-m", "0.35", "--sheet", str(sheet),
+        "--overlay", str(overlay), "--json",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["frames"] == facts["frames_used"] == 12
+    assert facts["verdicts"] == {"good": 12}
+    assert facts["length_m"] == pytest.approx(0.35)
+    loaded = load_track(str(track))
+    assert loaded.rate_hz == 15.0
+    assert loaded.length_m == pytest.approx(0.35, rel=0.02)
+    truth = true_midlines(SCENE) * [1.0, -1.0]
+    step = -np.diff(truth, axis=1)
+    angles = np.unwrap(np.arctan2(step[..., 1], step[..., 0]), axis=1)
+    error = np.angle(np.exp(1j * (loaded.angles_rad - angles)))
+    assert np.median(np.abs(error)) < 0.08
+    with np.load(track) as held:
+        assert held["verdict"].tolist() == ["good"] * 12
+        assert held["points_px"].shape == (12, 101, 2)
+        assert held["head_margin"].shape == (12,)
+    assert cv2.imread(str(sheet)).shape == (400, 1200, 3)
+    assert open_footage(overlay).count == 12
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["o.avi", "s.png", "t.npz"]
+
+
+def test_nothing_is_overwritten_without_force(tmp_path: Path) -> None:
+    swim = write_film(tmp_path / "short.avi", film(replace(SCENE, frames=6)))
+    track = tmp_path / "t.npz"
+    track.write_bytes(b"mine")
+    with pytest.raises(InputError, match=r"t\.npz: exists; --force overwrites it"):
+        capture_recording(CaptureOptions(swim, track))
+    assert track.read_bytes() == b"mine"
+    capture_recording(CaptureOptions(swim, track, force=True))
+    assert load_track(str(track)).frames == 6
+
+
+def test_a_fault_leaves_nothing_behind(swim: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    whole = swim.read_bytes()
+    cut = tmp_path / "cut.avi"
+    cut.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=r"ends after \d+ of 12 frames"):
+        capture_recording(CaptureOptions(cut, folder / "t.npz"))
+    assert list(folder.iterdir()) == []
+
+
+@pytest.fixture
+def same_scheduling() -> Iterator[None]:
+    """SVT-AV1 gives a superuser's process real-time priority, above all others, and keeps it."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    yield
+    os.sched_setscheduler(0, *before)
+
+
+@pytest.mark.usefixtures("same_scheduling")
+def test_a_codec_that_opencv_lacks_is_read_by_pyav(tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="the extra view is not installed")
+    path = tmp_path / "swim.mp4"
+    wanted = list(film(replace(SCENE, frames=4)))
+    try:
+        with av.open(str(path), "w") as made:
+            stream = made.add_stream(
+                "libsvtav1", rate=25, options={"svtav1-params": "enable-tpl-la=0"}
+            )
+            stream.width, stream.height, stream.pix_fmt = 200, 160, "yuv420p"
+            for frame in wanted:
+                made.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="gray")))
+            made.mux(stream.encode())
+    except (av.error.FFmpegError, ValueError):
+        pytest.skip("this PyAV encodes no AV1")
+    footage = open_footage(path)
+    assert (footage.count, footage.rate_hz, footage.rate_assumed) == (4, 25.0, False)
+    by_av = replace(footage, decoded_by_av=True)
+    for seen, frame in zip(by_av.read(), wanted, strict=True):
+        grey = seen if seen.ndim == 2 else seen.mean(axis=2)
+        assert np.abs(grey.astype(float) - frame).mean() < 12.0
+    assert len(by_av.spread(2)) == 2
+    with pytest.raises(InputError, match="ends after 4 of 40 frames"):
+        list(replace(by_av, count=40).read())
+    if not cv2.VideoCapture(str(path)).read()[0]:
+        assert footage.decoded_by_av
+
+
+def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path) -> None:
+    for number, frame in enumerate(film(SCENE)):
+        cv2.imwrite(str(tmp_path / f"frame{number}.png"), frame)
+    (tmp_path / "notes.txt").write_text("not an image")
+    footage = open_footage(tmp_path, 25.0)
+    assert footage.count == 12
+    assert footage.rate_hz == 25.0
+    assert [f.name for f in footage.files][:3] == ["frame0.png", "frame1.png", "frame2.png"]
+    assert footage.files[-1].name == "frame11.png"
+    assert np.array_equal(next(footage.read()), next(film(SCENE)))
+
+
+def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
+    ground = tmp_path / "ground.png"
+    cv2.imwrite(str(ground), empty(SCENE))
+    facts = capture_recording(CaptureOptions(swim, tmp_path / "t.npz", background=ground))
+    assert facts.background == "given"
+    assert facts.frames_used == 12
+
+
+def test_markers_give_the_scale(tmp_path: Path) -> None:
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    image = np.full((200, 300), 230, dtype=np.uint8)
+    image[60:120, 80:140] = cv2.aruco.generateImageMarker(family, 7, 60)
+    assert scale_of_marker("0.05", image) == pytest.approx(0.05 / 60.0, rel=0.02)
+    assert scale_of_marker("10,20,40,60,0.2", image) == pytest.approx(0.2 / 50.0)
+    for wrong in ("", "big", "0", "-1", "1,2,3", "5,5,5,5,1", "nan"):
+        with pytest.raises(InputError, match="--marker"):
+            scale_of_marker(wrong, image)
+    with pytest.raises(InputError, match="no ArUco or AprilTag marker"):
+        scale_of_marker("0.05", image[:, 150:])
+
+
+def test_the_steps_show_the_animal_as_large_as_the_panel(tmp_path: Path) -> None:
+    """It was 64 of 300 pixels wide in a film of the whole arena, under its own dots."""
+    arena = tmp_path / "arena"
+    arena.mkdir()
+    for number, frame in enumerate(film(replace(SCENE, rows=240, columns=480, frames=4))):
+        cv2.imwrite(str(arena / f"{number}.png"), frame)
+    steps = tmp_path / "steps.png"
+    capture_recording(CaptureOptions(arena, tmp_path / "t.npz", rate_hz=30.0, steps=steps))
+    sheet = cv2.imread(str(steps), cv2.IMREAD_GRAYSCALE)
+    assert sheet is not None
+    high, wide = sheet.shape
+    panel = sheet[: high - 18, 308:608]
+    assert wide == 5 * 300 + 4 * 8
+    assert panel.any(axis=0).sum() > 0.6 * panel.shape[1]
+
+
+def test_help_has_an_example() -> None:
+    done = snakewalk("capture", "--help")
+    assert done.returncode == 0
+    assert "snakewalk capture film.mp4" in " ".join(done.stdout.split())
+
+
+def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
+    junk = tmp_path / "junk.mp4"
+    junk.write_bytes(b"no film" * 50)
+    done = snakewalk("capture", str(junk), "-o", str(tmp_path / "t.npz"))
+    assert done.returncode == 2
+    told = [line for line in done.stderr.splitlines() if line.strip()]
+    assert len(told) == 1
+    assert "junk.mp4: no frame can be read" in told[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"recording": "absent.mp4"}, "absent.mp4: no such video"),
+        ({"recording": "empty.mp4"}, "is an empty file"),
+        ({"recording": "bare"}, "holds no images"),
+        ({"output": "track.txt"}, "a track is an .npz"),
+        ({"output": "no/folder/t.npz"}, "no/folder: no such folder"),
+        ({"overlay": "o.gif"}, "an overlay film is one of"),
+        ({"sheet": "s.doc"}, "a picture is one of"),
+        ({"length_m": 0.0}, "longer than 0 m"),
+        ({"length_m": 0.2, "marker": "0.05"}, "say one of them"),
+        ({"rate_hz": 0.0}, "frame rate must be above 0"),
+        ({"head": "left"}, "expected X,Y"),
+        ({"head": "200,10"}, "outside the images, which have 200 x 160 pixels"),
+        ({"head": "10,-1"}, "outside the images"),
+        ({"head": "5,5", "roi": "40,30,120,100"}, "outside --roi and --mask"),
+        ({"background": "junk.png"}, "is no image"),
+    ],
+)
+def test_bad_options_are_told_before_any_work(
+    swim: Path, tmp_path: Path, change: dict[str, object], said: str
+) -> None:
+    (tmp_path / "empty.mp4").touch()
+    (tmp_path / "junk.png").write_bytes(b"junk")
+    (tmp_path / "bare").mkdir()
+    paths = {"recording", "output", "overlay", "sheet", "background"}
+    given = {k: tmp_path / str(v) if k in paths else v for k, v in change.items()}
+    options = replace(CaptureOptions(swim, tmp_path / "t.npz"), **given)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=said):
+        capture_recording(options)
+    assert not (tmp_path / "t.npz").exists()

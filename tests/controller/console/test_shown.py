@@ -1,0 +1,136 @@
+"""What commands print for a reader: no Python in it, and no line cut at 80 columns."""
+
+from collections.abc import Iterator
+from importlib.metadata import version
+from typing import Any
+
+import pytest
+import typer
+from pytest_mock import MockerFixture
+from typer.testing import CliRunner
+
+from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.cli.main import main
+from snakewalk.controller.console import options
+from snakewalk.controller.console.options import show
+from snakewalk.controller.studies.trials import Case, Trial
+
+
+def test_a_table_speaks_no_python(capsys: pytest.CaptureFixture[str]) -> None:
+    show({"film": None, "sure": True, "left_out": {}, "files": ["a.obj", "a.mtl"]}, False)
+    said = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    assert [[one.strip() for one in line] for line in said] == [
+        ["film", "-"], ["sure", "yes"], ["left", "out  -"], ["files", "a.obj, a.mtl"],
+    ]  # fmt: skip
+
+
+def test_a_table_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    """``:100:`` is no picture, and ``[red]`` no colour."""
+    show({"graph": "er:100:9", "file": "[red].csv"}, False)
+    shown = capsys.readouterr().out
+    assert "er:100:9" in shown
+    assert "[red].csv" in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["plan", "flat-square", "--motion", "gait"], "motion gait needs a table [gait]"),
+        (["body", "worm-like", "-o", "b.glb", "--aspect", "-1"], "aspect: height over width"),
+        (["fish", "match", ".", "-o", "postures.csv"], "is an .npz"),
+        (["fish", "synthesise", "."], "is a folder"),
+    ],
+)
+def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
+    result = CliRunner().invoke(app, words)
+    text = result.output + repr(result.exception)
+    assert result.exit_code != 0
+    assert said in text
+    assert "Value error" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["trials", "--seeds", "0"], "'--seeds'"),
+        (["list", "--log-level", "loud"], "'--log-level': 'loud' is not one of 'debug', 'info'"),
+        (["run", "--bogus"], "No such option: --bogus"),
+        (["gait", "show"], "Missing argument 'name'"),
+        (["nosuch"], "No such command 'nosuch'"),
+        (["run", "flat-square", "--out", __file__], "is a file"),
+    ],
+)
+def test_wrong_words_are_one_line_and_exit_code_2(
+    words: list[str],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    error = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert said in error
+    assert error.startswith("snakewalk: ")
+    assert error.count("\n") == 1
+
+
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        app(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"snakewalk {version('snakewalk')}\n"
+
+
+def _commands(group: Any, above: typer.Context | None, *path: str) -> Iterator[tuple[str, ...]]:
+    context = typer.Context(group, parent=above)
+    for name in group.list_commands(context):
+        found = group.get_command(context, name)
+        if hasattr(found, "list_commands"):
+            yield from _commands(found, context, *path, name)
+        else:
+            yield (*path, name)
+
+
+def test_help_at_80_columns_loses_no_letter_and_breaks_no_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, value in {"COLUMNS": "80", "TERM": "dumb", "NO_COLOR": "1"}.items():
+        monkeypatch.setenv(name, value)
+    commands = list(_commands(typer.main.get_command(app), None))
+    assert len(commands) > 50
+    shown = {}
+    for words in commands:
+        app([*words, "--help"], prog_name="snakewalk", standalone_mode=False)
+        shown[words] = capsys.readouterr().out
+    assert [words for words, text in shown.items() if "\N{HORIZONTAL ELLIPSIS}" in text] == []
+    assert [words for words, text in shown.items() if max(map(len, text.splitlines())) > 80] == []
+    assert "no chances. A run is the same for the same files" in shown[("trials",)]
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_a_narrow_table_of_trials_keeps_its_numbers(
+    columns: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    mocker: MockerFixture,
+) -> None:
+    pytest.importorskip("mujoco")
+    case = Case("jacksboro-traverse", "walk-printed", "alternating16", 0.5)
+    found = [
+        Trial(
+            case, seed, (0.1, 0.2), 4, True, 4, 0, 61.25, 5.4, 0.123, 0.456, 0.789, 12.34,
+            0.1, 1.0, 23.4, 0.3,
+        )
+        for seed in range(20)
+    ]  # fmt: skip
+    mocker.patch("snakewalk.controller.studies.trials.plan_trials", return_value=[])
+    mocker.patch("snakewalk.controller.studies.trials.trials", return_value=found)
+    monkeypatch.setattr(options.console, "_width", columns)
+    words = "trials jacksboro-traverse --motion walk-printed --robot alternating16 --relief 0.5"
+    app(words.split(), standalone_mode=False)
+    shown = capsys.readouterr().out
+    for number in ("20 of 20", "61.2", "0.123", "0.46", "0.79", "12.3"):
+        assert number in shown
+    assert "\N{HORIZONTAL ELLIPSIS}" not in shown

@@ -1,0 +1,121 @@
+"""Images of 16 bit keep their depth, and frames of a video the times that it says."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from snakewalk.controller.capture.capture import load_capture
+from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.video import frame_times, in_8_bits, open_footage
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.readers.load import load_track
+from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
+from tests.oracles.skeleton_accuracy import point_error
+
+SCENE = SnakeScene(rows=210, columns=240, length_px=125.0, frames=8, wave_hz=1.0, noise=0.0)
+DIM = 0.012
+"""Of the contrast: in 8 bit a body one level above its ground, in 16 bit three hundred."""
+
+
+def dim_counts(frame: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """A camera of 16 bit that sees the scene at a hundredth of its contrast, with its noise."""
+    counts = 20000.0 + DIM * 257.0 * frame.astype(float) + rng.normal(0.0, 6.0, frame.shape)
+    return np.rint(counts).astype(np.uint16)
+
+
+@pytest.fixture(scope="module")
+def deep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("deep")
+    rng = np.random.default_rng(1)
+    for number, frame in enumerate(film(SCENE)):
+        cv2.imwrite(str(folder / f"{number}.tif"), dim_counts(frame, rng))
+    cv2.imwrite(str(folder.parent / "ground16.png"), dim_counts(empty(SCENE), rng))
+    return folder
+
+
+def test_sixteen_bits_are_kept(deep: Path) -> None:
+    footage = open_footage(deep, 30.0)
+    assert footage.deep is not None
+    frame = next(footage.read())
+    assert frame.dtype == np.float32
+    raw = cv2.imread(str(deep / "0.tif"), cv2.IMREAD_UNCHANGED)
+    back = np.asarray(frame) / footage.deep.gain + footage.deep.black
+    assert np.abs(back - raw).max() < 0.51, "every count can be told from the next"
+    assert np.ptp(raw // 256) <= 2, "8 bit would hold nothing"
+    assert 0.0 < frame.min() < frame.max() < 255.0
+    shown = in_8_bits(frame)
+    assert shown.dtype == np.uint8
+    assert np.abs(shown.astype(float) - frame).max() <= 0.5
+    background = footage.image(deep.parent / "ground16.png")
+    found = make_detector(footage.spread(8), background).detect(frame)
+    assert found.skeleton.status is FrameStatus.GOOD
+    line = found.skeleton.points_px
+    truth = true_midlines(SCENE)[0]
+    assert min(point_error(line[::way], truth) for way in (1, -1)) < 0.01 * SCENE.length_px
+
+
+def test_a_deep_film_is_captured_and_a_threshold_is_in_its_own_counts(
+    deep: Path, tmp_path: Path
+) -> None:
+    facts = capture_recording(
+        CaptureOptions(
+            deep, tmp_path / "t.npz", rate_hz=30.0, background=deep.parent / "ground16.png",
+            threshold=150.0, sheet=tmp_path / "s.png", steps=tmp_path / "steps.png",
+            overlay=tmp_path / "o.avi", review=tmp_path / "r.html",
+        )
+    )  # fmt: skip
+    assert facts.verdicts == {"good": 8}
+    assert cv2.imread(str(tmp_path / "s.png")).max() > 200
+
+
+def test_images_of_8_bit_stay_whole_numbers(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "0.png"), next(film(SCENE)))
+    footage = open_footage(tmp_path, 30.0)
+    assert footage.deep is None
+    assert next(footage.read()).dtype == np.uint8
+
+
+def test_times_of_an_even_rate_are_that_rate_s_and_uneven_ones_are_kept() -> None:
+    rounded = np.rint(1000.0 * np.arange(300) / 30.0) / 1000.0
+    time_s, rate_hz = frame_times(rounded.tolist(), 30.0)
+    assert rate_hz == 30.0
+    assert np.array_equal(time_s, np.arange(300) / 30.0)
+    time_s, rate_hz = frame_times((1.0 + np.arange(300) / 25.0).tolist(), 30.0)
+    assert rate_hz == pytest.approx(25.0)
+    assert time_s[-1] == pytest.approx(299 / 25.0)
+    uneven = np.cumsum(np.random.default_rng(0).uniform(0.02, 0.06, 300))
+    time_s, rate_hz = frame_times(uneven.tolist(), 30.0)
+    assert np.allclose(time_s, uneven - uneven[0])
+    assert rate_hz == pytest.approx(1.0 / np.median(np.diff(uneven)))
+    for none in ([float("nan")] * 5, [0.0] * 5, [0.0, 2.0, 1.0]):
+        time_s, rate_hz = frame_times(none, 30.0)
+        assert np.array_equal(time_s, np.arange(len(none)) / 30.0)
+
+
+def test_a_film_of_variable_rate_becomes_a_track_with_its_times(tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="the extra view is not installed")
+    path = tmp_path / "phone.mp4"
+    at_ms = np.array([0, 20, 75, 95, 150, 170, 225, 245])
+    with av.open(str(path), "w") as made:
+        stream = made.add_stream("mpeg4", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 240, 210, "yuv420p"
+        stream.time_base = stream.codec_context.time_base = Fraction(1, 1000)
+        for frame, pts in zip(film(SCENE), at_ms, strict=True):
+            shot = av.VideoFrame.from_ndarray(frame, format="gray").reformat(format="yuv420p")
+            shot.pts, shot.time_base = int(pts), Fraction(1, 1000)
+            made.mux(stream.encode(shot))
+        made.mux(stream.encode())
+    cv2.imwrite(str(tmp_path / "ground.png"), empty(SCENE))
+    options = CaptureOptions(path, tmp_path / "t.npz", background=tmp_path / "ground.png")
+    facts = capture_recording(options)
+    assert not facts.rate_assumed
+    held = load_capture(tmp_path / "t.npz").captured
+    assert np.allclose(held.time_s, 1e-3 * at_ms)
+    track = load_track(str(tmp_path / "t.npz"))
+    assert track.uneven
+    assert track.time_s[-1] == pytest.approx(0.245, abs=0.5 / track.rate_hz)
+    assert not load_track(str(tmp_path / "t.npz"), 30.0).uneven

@@ -1,0 +1,269 @@
+"""The page: whole, self-contained, the same each time, and safe against what a log may say."""
+
+import base64
+import gzip
+import json
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.figures.path import body_outline_m
+from snakewalk.controller.figures.style import thin
+from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.report import artifacts
+from snakewalk.controller.report import page as page_module
+from snakewalk.controller.report.artifacts import build_report
+from snakewalk.controller.report.curves import curves_html
+from snakewalk.controller.report.film import film_times
+from snakewalk.controller.report.page import page
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import Event, RunRecord
+
+Make = Callable[..., Path]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+class Sources(HTMLParser):
+    """Collects what a page loads, and checks that tags are closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sources: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.sources += [v or "" for k, v in attrs if k in {"src", "href"}]
+        if tag not in {"img", "meta", "br"}:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def parsed(html: str) -> Sources:
+    reader = Sources()
+    reader.feed(html)
+    assert reader.open == []
+    return reader
+
+
+@pytest.fixture(scope="module")
+def hills(make: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Page of a run over hills, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("hills")
+    log = make(folder / "run.mcap", seconds=12.0, ground="hills")
+    return build_report(read_log(log), folder / "a")
+
+
+def test_the_page_stands_alone(hills: Path) -> None:
+    html = hills.read_text(encoding="utf-8")
+    *sources, link = parsed(html).sources
+    assert link == "summary.json", "no log stands beside this page"
+    assert len(sources) == 7
+    for source in sources:
+        assert source.startswith("data:image/svg+xml;base64,")
+        svg = ElementTree.fromstring(base64.b64decode(source.split(",", 1)[1]))
+        assert svg.tag.endswith("svg")
+    assert not re.search(r"<script[^>]*src", html), "nothing is loaded"
+    assert "waypoint 1 reached" in html
+    assert (hills.parent / "summary.json").is_file()
+
+
+def test_a_run_that_never_began_has_a_page(make: Make, tmp_path: Path) -> None:
+    page_path = build_report(read_log(make(tmp_path / "run.mcap", seconds=0.0)), tmp_path)
+    assert "0 of 4" in page_path.read_text(encoding="utf-8")
+
+
+def test_a_run_that_hardly_began_has_a_page_and_always_the_same(make: Make, tmp_path: Path) -> None:
+    log = make(tmp_path / "run.mcap", seconds=0.02, ground="hills")
+    first = build_report(read_log(log), tmp_path / "a").read_bytes()
+    again = build_report(read_log(log.rename(tmp_path / "b.mcap")), tmp_path / "c").read_bytes()
+    assert again == first, "no date, no path, no chance in it"
+    assert b"0 of 4" in first
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without pictures and curves, of which others tell."""
+    monkeypatch.setattr(artifacts, "_draw", lambda record: artifacts._Drawn([], "", ""))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_summary_that_is_known_is_not_computed_again(record: RunRecord, tmp_path: Path) -> None:
+    numbers = replace(summary(record), run="as known")
+    report = build_report(record, tmp_path, numbers=numbers)
+    assert "<h1>as known</h1>" in report.read_text(encoding="utf-8")
+    assert '"run": "as known"' in (tmp_path / "summary.json").read_text(encoding="utf-8")
+
+
+def test_what_the_log_says_is_text_not_markup(record: RunRecord) -> None:
+    evil = [Event(1.0, "info' onload='x", "<b>", "<script>alert(1)</script>")]
+    html = page(summary(record), [], film="", events=evil, config={"run": "</pre><script>"})
+    parsed(html)
+    assert "<script>alert" not in html
+    assert "</pre><script>" not in html
+    assert "onload='x" not in html
+
+
+def test_film_inside_or_beside(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    film = tmp_path / "out" / "my film.mp4"
+    film.parent.mkdir()
+    film.write_bytes(b"\0" * 1000)
+    small = page_module.film_html(film, tmp_path / "out")
+    assert re.search(r"src='data:video/mp4;base64,A{20}", small)
+    monkeypatch.setattr(page_module, "INLINE_BYTES", 999)
+    assert "src='my%20film.mp4'" in page_module.film_html(film, tmp_path / "out")
+    assert "src='../out/my%20film.mp4'" in page_module.film_html(film, tmp_path / "other")
+    with pytest.raises(InputError, match="no such film"):
+        page_module.film_html(tmp_path / "gone.mp4", tmp_path)
+    with pytest.raises(InputError, match=r"\.mp4, \.webm"):
+        page_module.film_html(tmp_path / "film.avi", tmp_path)
+
+
+def unpacked(html: str, name: str) -> str:
+    packed = re.search(f"<script id='{name}' type='text/plain'>([^<]*)</script>", html)
+    assert packed is not None
+    return gzip.decompress(base64.b64decode(packed[1])).decode()
+
+
+def numbers_of(array: dict[str, str]) -> np.ndarray:
+    assert array["dtype"] == "f4"
+    return np.frombuffer(base64.b64decode(array["bdata"]), "<f4")
+
+
+def test_the_curves_are_the_logs_and_their_library_is_on_the_page(record: RunRecord) -> None:
+    html = curves_html(record)
+    assert "Plotly" in unpacked(html, "plotly")
+    spec = json.loads(unpacked(html, "curves-data"))
+    cycle = record.cycle
+    names = [trace["name"] for trace in spec["traces"]]
+    assert names[spec["first"] :] == ["asked", "sent", "measured", "current"]
+    assert len(spec["joints"]) == cycle.asked_rad.shape[1]
+    for joint in (0, 7):
+        asked, sent, measured, current = map(numbers_of, spec["joints"][joint])
+        assert np.array_equal(asked, cycle.asked_rad[:, joint].astype("f4"))
+        assert np.array_equal(sent, cycle.sent_rad[:, joint].astype("f4"))
+        assert np.array_equal(np.isfinite(measured), cycle.valid[:, joint])
+        assert np.array_equal(current, cycle.current_a[:, joint].astype("f4"), equal_nan=True)
+    (off,) = (trace for trace in spec["traces"] if trace["name"] == "from the path")
+    assert np.nanmean(numbers_of(off["y"])) == pytest.approx(
+        summary(record).path_error_mean_m, rel=1e-4
+    )
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
+def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_page(
+    hills: Path,
+) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1000, "height": 800})
+        page.set_default_timeout(120_000.0)
+        faults: list[str] = []
+        page.on("pageerror", lambda fault: faults.append(str(fault)))
+        page.goto(hills.as_uri())
+        page.wait_for_selector(".js-plotly-plot .nsewdrag")
+        curves = page.locator(".js-plotly-plot")
+        curves.scroll_into_view_if_needed()
+        curves.evaluate("plot => plot.on('plotly_hover', told => window.seen = told.points[0])")
+        panel = page.locator(".js-plotly-plot .nsewdrag").first.bounding_box()
+        assert panel is not None
+        x, y = panel["x"] + 0.5 * panel["width"], panel["y"] + 0.5 * panel["height"]
+        page.mouse.move(x, y)
+        shown = page.locator(".hoverlayer .hovertext").first.text_content()
+        name, value = page.evaluate("[seen.data.name, seen.y]")
+        text, _, number = shown.rpartition(" ")
+        assert text == name
+        assert float(number) == pytest.approx(value, rel=1e-3)
+
+        axis = "plot => plot.layout.xaxis.range.map(Number)"
+        whole = curves.evaluate(axis)
+        page.mouse.down()
+        page.mouse.move(x + 0.25 * panel["width"], y, steps=4)
+        page.mouse.up()
+        page.wait_for_function(
+            f"before => ({axis})(document.querySelector('.js-plotly-plot'))[0] > before",
+            arg=whole[0],
+        )
+        first, last = curves.evaluate(axis)
+        span = whole[1] - whole[0]
+        assert first == pytest.approx(whole[0] + 0.5 * span, abs=0.02 * span)
+        assert last == pytest.approx(whole[0] + 0.75 * span, abs=0.02 * span)
+
+        page.set_viewport_size({"width": 400, "height": 800})
+        page.wait_for_function("document.documentElement.scrollWidth <= 400")
+        hint = "box => getComputedStyle(box, '::before').content"
+        assert "to the right" in page.locator(".wide").first.evaluate(hint)
+        browser.close()
+    assert faults == []
+
+
+def test_a_supply_that_never_changes_is_told_and_not_drawn(record: RunRecord) -> None:
+    level = replace(record.slow, voltage_v=np.full_like(record.slow.voltage_v, 12.0))
+    html = curves_html(replace(record, slow=level))
+    assert "lowest supply 12.0 V" in html
+    spec = json.loads(unpacked(html, "curves-data"))
+    assert "lowest supply" not in [trace["name"] for trace in spec["traces"]]
+    falls = np.linspace(12.0, 11.0, level.voltage_v.size).reshape(level.voltage_v.shape)
+    spec = json.loads(
+        unpacked(curves_html(replace(record, slow=replace(level, voltage_v=falls))), "curves-data")
+    )
+    assert "lowest supply" in [trace["name"] for trace in spec["traces"]]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None:
+    start_s, faster = film_times(record)
+    assert start_s == record.pose.time_s[0]
+    assert faster >= 1.0
+    (tmp_path / "film.mp4").write_bytes(bytes(10))
+    (tmp_path / "log.mcap").write_bytes(b"")
+    html = build_report(record, tmp_path, tmp_path / "film.mp4").read_text(encoding="utf-8")
+    assert f"data-start='{start_s:.3f}' data-speed='{faster:g}'" in html
+    assert f"<button data-time='{record.events[0].time_s:.3f}'>" in html
+    links = [source for source in parsed(html).sources if not source.startswith("data:")]
+    assert links == ["log.mcap", "summary.json", "film.mp4"]
+
+
+def test_the_foot_says_what_made_the_page(record: RunRecord) -> None:
+    html = page(summary(record), [], film="", events=[], config={}, made="Made by <me>")
+    assert "Made by &lt;me&gt;" in html
+
+
+def test_thinning_keeps_the_peaks_and_the_mean() -> None:
+    time = np.arange(100_000) * 0.01
+    values = np.sin(time)
+    values[[31_337, 77_777]] = 9.0, -7.0
+    values[500] = np.nan
+    t, low, mean, high = thin(time, values)
+    assert len(t) < 1000
+    assert (np.diff(t) > 0).all()
+    assert high.max() == 9.0
+    assert low.min() == -7.0
+    assert (low <= mean).all()
+    assert (mean <= high).all()
+    assert mean.mean() == pytest.approx(np.nanmean(values), abs=1e-3)
+    short = thin(time[:50], values[:50])
+    assert all(np.array_equal(part, values[:50]) for part in short[1:])
+
+
+def test_outline_of_a_straight_body() -> None:
+    """A straight body's outline is as long as the body, as wide, and symmetrical."""
+    links = np.column_stack([1.0 - 0.07 * np.arange(17), np.zeros(17)])
+    outline = body_outline_m(links, (0.035, 0.035), 0.03)
+    assert outline[:, 0].max() == pytest.approx(1.0 + 0.035 + 0.03, abs=1e-3)
+    assert outline[:, 0].min() == pytest.approx(1.0 - 16 * 0.07 - 0.035)
+    assert np.abs(outline[:, 1]).max() == pytest.approx(0.03)
+    x, y = outline.T
+    area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+    assert 0.85 * 0.06 * 1.19 < area < 0.06 * 1.25
+    assert sorted(np.round(y, 9)) == sorted(np.round(-y, 9))

@@ -1,0 +1,42 @@
+"""A simulated body that differs from its files in what the run says."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.gait_run import GaitRun
+
+
+def prepared(**told: float) -> GaitRun:
+    keys: dict[str, Any] = {f"run.deviation.{name}": value for name, value in told.items()}
+    keys["run.physics_step_s"] = 0.005
+    return prepare_gait("lateral-undulation", robot="yaw16", seconds=3.0, keys=keys)
+
+
+def current_a(folder: Path, **told: float) -> float:
+    """Root mean square over a cycle and more."""
+    record = execute(prepared(**told), folder, stoppable=False).record
+    assert record.header.run.deviation.mass == told.get("mass", 1.0)  # so it can be replayed
+    cycle = record.cycle
+    return float(np.sqrt((cycle.current_a[cycle.time_s > cycle.time_s[0] + 1.5] ** 2).mean()))
+
+
+def test_friction_of_a_heavier_body_takes_current_in_proportion(tmp_path: Path) -> None:
+    """Coulomb friction is all that counts; a weaker servo needs as much more current."""
+    nominal = current_a(tmp_path / "nominal")
+    heavy = current_a(tmp_path / "heavy", mass=1.5)
+    rough = current_a(tmp_path / "rough", friction_along=1.5, friction_across=1.5)
+    weak = current_a(tmp_path / "weak", mass=1.5, torque=1.5)
+    np.testing.assert_allclose([heavy / rough, heavy / nominal], [1.0, 1.5], rtol=0.12)
+    np.testing.assert_allclose(weak / nominal, 1.0, rtol=0.12)
+
+
+def test_a_robot_on_a_port_is_as_it_is(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="deviation: a robot on a port is as it is"):
+        execute(prepared(mass=1.5), tmp_path / "run", port="/dev/nosuch")
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,39 @@
+"""The predicted speed is the quasi-static one, without a factor that nothing measured."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.mechanics.traction import quasi_static_gain
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_walk
+
+
+def test_the_gain_is_the_quasi_static_gain_of_the_shape() -> None:
+    prepared = prepare_walk("flat-slalom", motion="serpenoid")
+    points = np.arange(100)
+    sine = 0.7 * np.sin(2.0 * np.pi * 1.2 * points / 100)
+    expected = quasi_static_gain(sine[::-1], prepared.world.friction)[0]
+    assert prepared.gain == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_gain_of_a_walk_lies_within_those_of_its_shapes() -> None:
+    prepared = prepare_walk("flat-slalom")
+    gains = quasi_static_gain(prepared.library.shapes_rad, prepared.world.friction)
+    assert np.quantile(gains, 0.25) < prepared.gain < np.quantile(gains, 0.75)
+    assert prepared.gain == pytest.approx(gains.mean(), rel=0.01)
+
+
+def test_a_simulated_body_on_level_ground_comes_near_its_prediction_without_an_alarm(
+    tmp_path: Path,
+) -> None:
+    prepared = prepare_walk(
+        "flat-slalom", motion="serpenoid", waypoints_m=((2.0, 0.0),), time_limit_s=30.0
+    )
+    finished = execute(prepared, tmp_path)
+    speed_m_s, predicted_m_s = finished.summary.speed_m_s, finished.summary.predicted_speed_m_s
+    assert speed_m_s is not None
+    assert predicted_m_s is not None
+    assert 0.9 < speed_m_s / predicted_m_s < 1.03
+    assert finished.outcome.alarms == 0

@@ -1,0 +1,76 @@
+"""A run with a shadow: its rows, its alarm, the cause at its end."""
+
+import json
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_world
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.metrics.comparison import compare
+from snakewalk.controller.run import backend, execute
+from snakewalk.controller.run.deviation import Deviation
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.studies.shadow.run_shadow import ALARM_A
+
+
+def short_run(seconds: float) -> Any:
+    prepared = prepare_gait("lateral-undulation", robot="yaw16", seconds=seconds)
+    robot = RobotConfig(name="short", joint_axes="yyy", link_mass_kg=0.5)
+    run = prepared.run.model_copy(update={"physics_step_s": 0.005})
+    return replace(prepared, robot=robot, run=run)
+
+
+def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weak = Deviation(torque=np.array([1.0, 0.4, 1.0]))
+    monkeypatch.setattr(execute, "simulated", partial(backend.simulated, deviation=weak))
+    told: list[tuple[str, str]] = []
+    finished = execute.execute(
+        short_run(4.0),
+        tmp_path / "run",
+        shadow=True,
+        stoppable=False,
+        on_event=lambda kind, text: told.append((kind, text)),
+    )
+    record = finished.record
+    np.testing.assert_array_equal(record.shadow.time_s, record.cycle.time_s)
+    late = record.cycle.time_s > record.cycle.time_s[0] + 2.0
+    apart_a = (record.cycle.current_a - record.shadow.current_a)[late]
+    assert np.sqrt((apart_a**2).mean(axis=0)).argmax() == 1
+    events = [event.text for event in record.events if event.kind == "shadow"]
+    assert "joint 2" in events[0]
+    assert "differs from its shadow" in events[0]
+    assert "a weaker servo: joint 2" in events[-1]
+    assert [text for kind, text in told if kind == "shadow"] == events
+    ended = CliRunner().invoke(app, ["shadow", str(finished.log), "--workers", "1", "--json"])
+    said = json.loads(ended.stdout)  # the log alone says the same
+    assert (ended.exit_code, said["named"], said["at"]) == (1, "weaker servo", 1)
+    assert said["text"] == events[-1]
+
+
+def test_a_robot_as_told_is_its_shadow_and_a_shadow_changes_nothing(tmp_path: Path) -> None:
+    runs = [
+        execute.execute(short_run(1.0), tmp_path / name, shadow=shadow, stoppable=False).record
+        for name, shadow in (("with", True), ("without", False))
+    ]
+    beside = runs[0].shadow
+    assert np.abs(beside.current_a - runs[0].cycle.current_a).max() < 0.1 * ALARM_A
+    assert np.abs(beside.position_rad - runs[0].cycle.measured_rad).max() < 1e-6
+    assert compare(runs[0], runs[1], tolerances={}).same
+    assert len(runs[1].shadow.time_s) == 0
+
+
+def test_ground_on_which_a_shadow_means_nothing_is_refused(tmp_path: Path) -> None:
+    prepared = replace(short_run(1.0), world=load_world("ramp-10"))
+    with pytest.raises(InputError, match="a shadow needs a level, open floor"):
+        execute.execute(prepared, tmp_path / "run", shadow=True, stoppable=False)
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,484 @@
+"""The page of a run that moves servos on a pseudo-terminal, in a browser: what it shows, E-STOP."""
+
+import dataclasses
+import json
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser")
+
+from snakewalk.config.arrays import Image
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.run.commands.gait_run import _Hands
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.runtime.drive import Progress
+from snakewalk.controller.view.browser_gamepad import BrowserGamepad
+from snakewalk.controller.view.dashboard import Dashboard
+from snakewalk.controller.view.dead_man import DeadMan
+from snakewalk.controller.view.gait_panel import GaitPanel
+from snakewalk.controller.view.live_page import _LivePage
+from snakewalk.controller.view.live_view import LiveView
+from snakewalk.controller.view.page_server import open_page
+from snakewalk.controller.view.scene import BodyScene
+from snakewalk.controller.view.waypoint_panel import WaypointPanel
+from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.helpers.bus import PATIENT
+
+ROOT = Path(__file__).parents[3]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+COMMAND = "from snakewalk.controller.cli.main import main; main()"
+ROBOT = 'name = "quartet"\njoint_axes = "yyyy"\nyaw_limit_rad = 1.4\n'
+
+
+@contextmanager
+def run(folder: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
+    """A live command with a page, whose address it prints first."""
+    options = ["--live", "--no-film", "--out", "run", "--view", "--view-at", "127.0.0.1:0"]
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *words, *options],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        env=os.environ | {"XDG_RUNTIME_DIR": str(folder), "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as child:
+        yield child
+        child.kill()
+
+
+@contextmanager
+def browsed(child: subprocess.Popen[str], width: int = 700, script: str = "") -> Iterator[Any]:
+    """The page of a run in a browser."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    assert child.stderr is not None
+    line = child.stderr.readline()
+    url = re.search(r"http://127\.0\.0\.1:\d+", line)
+    assert url is not None, line + child.stderr.read()
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(
+            executable_path=CHROMIUM,
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+        )
+        page = browser.new_page(viewport={"width": width, "height": 500})
+        page.set_default_timeout(60_000.0)
+        page.add_init_script(script)
+        page.goto(url[0])
+        page.get_by_text("torque off at once, latched").wait_for()
+        yield page
+        browser.close()
+
+
+class View:
+    """The page of a run, in the same thread."""
+
+    def __init__(self) -> None:
+        ours, far = socket.socketpair()
+        self.end = RunEnd(ours)
+        self._picture: bytes | None = None
+        self._picture_s = -1.0
+        server, _ = open_page("127.0.0.1", 0)
+        self.now_s = 100.0
+        self.gamepad = BrowserGamepad(lambda: self.now_s)
+        self.dead_man = DeadMan(lambda: self.now_s)
+        self.page = _LivePage(server, WatcherEnd(far), self.gamepad)
+
+    def on_row(self, topic: str, row: bytes) -> None:
+        LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
+
+    def on_button(self, path: Path) -> None:
+        LiveView.on_button(self, path)  # type: ignore[arg-type]
+
+    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+        LiveView.on_gait(self, name, parameters)  # type: ignore[arg-type]
+
+    def on_picture(self, image: Image, time_s: float) -> None:
+        LiveView.on_picture(self, image, time_s)  # type: ignore[arg-type]
+
+    held = property(lambda self: self.dead_man.held)
+
+    def pressed(self) -> list[str]:
+        return self.dead_man.sort_out(self.end.commands())
+
+    _end = property(lambda self: self.end)
+
+    def shown(self, what: str) -> str:
+        return re.sub("<[^>]*>", " ", getattr(self.page._dashboard, what).content)
+
+
+def test_a_page_shows_a_run_and_its_e_stop_latches_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view, seen = View(), []
+
+    def on_progress(progress: Progress) -> None:
+        view.page.step()
+        seen.append(progress.time_s)
+        if len(seen) == 40:
+            assert "waypoint" not in view.shown("_state")
+            assert view.shown("_bars").count("(ID ") == 16
+            assert view.page._scene is not None
+            assert np.ptp(view.page._scene._body.batched_positions, axis=0).max() > 0.5
+            view.page._stop._pressed(None)
+
+    finished = execute(
+        prepare_gait("lateral-undulation", seconds=10.0),
+        tmp_path / "run",
+        view=view,
+        on_progress=on_progress,
+    )
+    view.page.step()
+    view.page._server.stop()
+    assert finished.outcome.tripped == "stop requested by E-STOP of the page"
+    assert len(seen) == 41  # the cycle in which it latched
+    said = view.page._stop._text.content
+    assert "the run has ended: stop requested by E-STOP of the page" in said
+    assert view.page._stop._button.disabled
+    assert "trip: stop requested" in view.shown("_events")
+
+
+def test_what_is_set_in_the_page_changes_the_gait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view = View()
+    hands = _Hands([view], view)  # type: ignore[list-item, arg-type]
+
+    def on_progress(progress: Progress) -> None:
+        view.page.step()
+        panel = view.page._gait_panel
+        assert panel is not None
+        if progress.time_s > 0.2 and panel._inputs["frequency_hz"].value == 0.5:
+            moved_by_a_browser(panel, "frequency_hz", 0.3)
+            panel._inputs["frequency_hz"].value = 0.3
+
+    finished = execute(
+        prepare_gait("lateral-undulation", seconds=1.0, make_operator=hands.operator),
+        tmp_path / "run",
+        view=view,
+        stop_requested=hands.torque_off,
+        on_progress=on_progress,
+    )
+    view.page._server.stop()
+    said = [event.text for event in finished.record.events if event.kind == "operator"]
+    assert said == ["frequency_hz = 0.3"]
+
+
+def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view, cycles = View(), count()
+    hands = _Hands([view], view)  # type: ignore[list-item, arg-type]
+    texts: list[str] = []
+    script = {
+        30: (),  # it is seen: from now on it has to be held
+        60: (HOLD,),
+        61: (HOLD, MIRROR),
+        150: (HOLD, STOP),
+    }
+
+    def on_progress(progress: Progress) -> None:
+        cycle = next(cycles)
+        view.now_s = 100.0 + progress.time_s
+        if cycle in script:
+            assert view.gamepad.take("browser", pad_state(*script[cycle]))
+        if cycle in script or cycle % 10 == 0:
+            view.page.step()
+            assert view.page._gamepad_panel is not None
+            texts.append(view.page._gamepad_panel._shown)
+
+    finished = execute(
+        prepare_gait("lateral-undulation", seconds=10.0, make_operator=hands.operator),
+        tmp_path / "run",
+        view=view,
+        stop_requested=hands.torque_off,
+        on_progress=on_progress,
+    )
+    view.page._server.stop()
+    assert finished.outcome.tripped == "stop requested by E-STOP of a gamepad"
+    events = [each for each in finished.record.events if each.kind == "operator"]
+    let_go, held = "let go: it stands in its shape", "held: it moves"
+    assert [each.text for each in events[:4]] == [let_go, held, "mirror = True", let_go]
+    assert 0.3 < events[3].time_s - events[1].time_s < 0.4  # it said nothing any more
+    for what in ("No gamepad.", "Let go:", "Held:", "It says nothing any more:"):
+        assert any(what in text for text in texts)
+
+
+HOLD, MIRROR, STOP = 4, 1, 11
+
+
+def pad_state(*pressed: int) -> str:
+    """What the page's script sends of a gamepad."""
+    buttons = [int(k in pressed) for k in range(17)]
+    state = {"name": "Pad", "mapping": "standard", "axes": [0.0, 0.0], "buttons": buttons}
+    return json.dumps(state)
+
+
+def test_the_body_walks_to_where_the_ground_was_clicked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    view = View()
+    LiveView.on_course(view)  # type: ignore[arg-type]
+    at: dict[str, float] = {}
+    cycles = count()
+
+    def on_progress(progress: Progress) -> None:
+        if next(cycles) % 20 and progress.time_s > 0.5:  # each is held to the page's pace
+            return
+        view.page.step()
+        panel, scene = view.page._waypoint_panel, view.page._scene
+        assert panel is not None
+        assert scene is not None
+        if not at and progress.time_s > 1.0:
+            at["clicked"] = progress.time_s
+            clicked(panel, "waypoint", (0.4, 0.2))
+            clicked(panel, "", (2.0, 2.0))  # nothing waits for it
+            clicked(panel, "", (40.0, 0.0), "shift")
+            assert "there is no ground where you clicked" in panel._text.content
+        if progress.reached == 2 and "reached" not in at:
+            at["reached"] = progress.time_s
+            view.page._servos_s = -1.0  # not held back
+        if "reached" in at and progress.time_s > at["reached"] + 1.0 and "end" not in at:
+            at["end"] = progress.time_s
+            assert len(scene._waypoints) == 2
+            assert "waypoint 2 of 2" in view.shown("_state")
+            assert "no waypoint is left: it holds" in panel._text.content
+            panel._commanding("end")(None)
+
+    finished = execute(
+        prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=((0.1, 0.0),)),
+        tmp_path / "run",
+        view=view,
+        waypoint_commands=view.end.commands,
+        on_progress=on_progress,
+    )
+    view.page._server.stop()
+    assert finished.outcome.complete
+    assert finished.outcome.waypoints == 2
+    record = finished.record
+    np.testing.assert_allclose(record.header.plan.waypoints_m, [(0.1, 0.0), (0.4, 0.2)], atol=1e-3)
+    assert np.hypot(*(record.pose.centre_m[-1, :2] - (0.4, 0.2))) < 0.35
+    assert finished.summary.waypoints_reached == finished.summary.waypoints == 2
+    assert len(record.paths) == 2
+    assert 1.0 < at["end"] - at["reached"] < 1.5
+
+
+def test_on_servos_it_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, servo_bus: Callable[..., ServoBus]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    robot = str(tmp_path / "quartet.toml")
+    commands = [["next=1,0.3"], ["waypoint=99,0"], *[[]] * 5, ["end"]]
+    said: list[tuple[str, str]] = []
+    finished = execute(
+        prepare_walk("flat-slalom", motion="serpenoid", robot=robot, keys=PATIENT),
+        tmp_path / "run",
+        servo_bus("1-4").path,
+        waypoint_commands=lambda: commands.pop(0) if commands else [],
+        on_event=lambda kind, text: said.append((kind, text)),
+    )
+    assert [kind for kind, _ in said] == ["operator", "refused", "operator"]
+    assert finished.outcome.tripped is None
+    assert finished.record.waypoints[1][1].tolist() == [[1.0, 0.3]]
+    assert len(finished.record.paths) == 2
+    assert len(finished.record.header.plan.waypoints_m) == 0  # the end leaves out what is left
+
+
+def clicked(
+    panel: WaypointPanel, word: str, at_m: tuple[float, float], modifier: str | None = None
+) -> None:
+    """Click on a place of the floor, from above and beside it, after a button was pressed."""
+    if word:
+        panel._arming(word)(None)
+    origin_m = np.add([*at_m, 0.0], [-1.0, -2.0, 3.0])
+    panel._clicked(
+        SimpleNamespace(ray_origin=origin_m, ray_direction=(1.0, 2.0, -3.0), modifier=modifier)  # type: ignore[arg-type]
+    )
+
+
+def test_a_click_finds_the_ground_that_it_falls_on(record: RunRecord) -> None:
+    field = HeightField(np.outer(np.ones(41), np.abs(np.arange(-20, 21)) * 0.05), 0.1, -2.0, -2.0)
+    server, _ = open_page("127.0.0.1", 0)
+    scene = BodyScene(server, dataclasses.replace(record.header, ground=field))
+    assert scene.ground_m((-3.0, 0.0, 0.5), (1.0, 0.0, 0.0)) is None  # came through the border
+    assert scene.ground_m((0.0, 0.0, 0.5), (1.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0), abs=1e-6)
+    assert scene.ground_m((0.0, 0.3, 5.0), (0.0, 0.0, -2.0)) == pytest.approx((0.0, 0.3), abs=1e-6)
+    assert scene.ground_m((0.0, 0.3, -5.0), (0.0, 0.0, 1.0)) is None  # from below
+    assert scene.ground_m((0.0, 0.3, 5.0), (0.0, 0.0, 1.0)) is None  # the sky
+    scene._frame.position = (1.0, 0.0, 0.0)  # the body is followed
+    assert scene.ground_m((0.0, 0.3, 5.0), (0.0, 0.0, -2.0)) == pytest.approx((-1.0, 0.3), abs=1e-6)
+    server.stop()
+
+
+def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
+    cv2 = pytest.importorskip("cv2")
+    view = View()
+    view.page._dashboard = Dashboard(view.page._server, record.header)
+    colour = np.full((48, 64, 3), (200, 120, 40), dtype=np.uint8)  # red first
+
+    def shown_at(time_s: float, image: Image) -> Image | None:
+        view.on_picture(image[..., ::-1], time_s)
+        view.on_row("/pose", b"{}")
+        view.page._end.ask()
+        view.end.pump()
+        for topic, row in view.page._end.rows(1.0):
+            if topic == "/picture":
+                view.page._take(topic, row)
+        assert view.page._dashboard is not None
+        picture = view.page._dashboard._picture
+        return None if picture is None else picture.image
+
+    first = shown_at(1.0, colour)
+    assert first is not None
+    assert np.abs(first.astype(int) - colour).max() < 12
+    assert np.array_equal(shown_at(1.3, colour // 2), first)
+    assert shown_at(1.6, colour // 2).mean() < 0.6 * first.mean()  # type: ignore[union-attr]
+    assert cv2 is not None
+    view.page._server.stop()
+
+
+def moved_by_a_browser(panel: GaitPanel, name: str, value: object) -> None:
+    target = SimpleNamespace(value=value)
+    panel._command_of(name)(SimpleNamespace(client_id=1, target=target))
+
+
+def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() -> None:
+    server, _ = open_page("127.0.0.1", 0)
+    panel = GaitPanel(server, server.gui.add_tab_group(), load_robot("alternating16"))
+    defaults = make_gait("sidewinding").params.model_dump()
+    panel.show("sidewinding", defaults)
+    assert "rolling" in panel._gait.options
+    assert set(panel._inputs) == set(defaults)
+    assert panel.commands(1.0) == []  # what `show` sets is no command
+    for value in (0.6, 0.61, 0.62):
+        moved_by_a_browser(panel, "frequency_hz", value)
+    panel._inputs["frequency_hz"].value = 0.62
+    assert panel.commands(1.0) == ["frequency_hz=0.62"]
+    moved_by_a_browser(panel, "mirror", True)
+    assert panel.commands(1.1) == []  # too soon after the last
+    panel.show("sidewinding", defaults | {"frequency_hz": 0.61})
+    assert panel._inputs["frequency_hz"].value == 0.62  # it is being moved
+    assert panel.commands(1.25) == ["mirror=1"]
+    panel.commands(2.3)
+    assert panel._inputs["frequency_hz"].value == 0.61  # as the run has it
+    panel.show("rolling", make_gait("rolling").params.model_dump())
+    assert panel._gait.value == "rolling"
+    assert "waves" not in panel._inputs
+    server.stop()
+
+
+IN_A_BROWSER = pytest.mark.skipif(
+    CHROMIUM is None, reason="there is no Chromium to open the page with"
+)
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> None:
+    bus = servo_bus("1-4")
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    words = ["gait", "run", "lateral-undulation", "--seconds", "100"]
+    words += ["--robot", "quartet.toml", "--port", bus.path]
+    words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
+    with run(tmp_path, *words) as child, browsed(child) as page:
+        button = page.get_by_role("button", name="E-STOP")
+        page.get_by_text("lateral-undulation").wait_for()
+        page.get_by_text("joint 4 (ID 4)").wait_for()
+        assert bus["Torque Enable"].tolist() == [1] * 4
+        page.get_by_role("tab", name="gait").click()
+        page.get_by_role("slider").first.focus()
+        page.keyboard.press("ArrowRight")
+        page.get_by_role("tab", name="events").click()
+        page.get_by_text(re.compile(r"operator: frequency_hz = 0\.\d")).wait_for()
+        page.keyboard.press("Escape")
+        page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+        assert button.is_disabled()
+        assert bus["Torque Enable"].tolist() == [0] * 4
+        assert child.wait(60.0) == 1
+    record = read_log(tmp_path / "run" / "log.mcap")
+    assert [event.kind for event in record.events][-2:] == ["trip", "stop"]
+
+
+FAKE_PAD = """
+    window.pad = {id: "Pad (fake)", mapping: "standard", connected: true, axes: [0, 0, 0, 0],
+                  buttons: Array.from({length: 17}, () => ({pressed: false}))};
+    window.press = (k, down) => { window.pad.buttons[k] = {pressed: down}; };
+    window.pads = [null];
+    navigator.getGamepads = () => window.pads;
+"""
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    words = ["gait", "run", "lateral-undulation", "--seconds", "300"]
+    with run(tmp_path, *words) as child, browsed(child, script=FAKE_PAD) as page:
+        page.get_by_role("tab", name="gamepad").click()
+        page.get_by_text("No gamepad. Press a button").wait_for()
+        page.evaluate("window.pads = [window.pad]")
+        page.get_by_text("Let go: the body stands in its shape.").wait_for()
+        page.evaluate("window.press(4, true)")
+        page.get_by_text("Held: the body moves.").wait_for()
+        page.evaluate("window.press(1, true)")
+        page.get_by_role("tab", name="events").click()
+        page.get_by_text("operator: mirror = True").wait_for()
+        page.evaluate("window.press(11, true)")
+        page.get_by_text("the run has ended: stop requested by E-STOP of a gamepad").wait_for()
+        assert child.wait(60.0) == 1
+    record = read_log(tmp_path / "run" / "log.mcap")
+    said = [event.text for event in record.events if event.kind == "operator"]
+    assert said[:2] == ["let go: it stands in its shape", "held: it moves"]
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_in_a_browser_a_click_on_the_ground_is_where_the_body_goes(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("mujoco")
+    words = ["run", "flat-slalom", "--motion", "serpenoid", "--set", "run.waypoints_m=[[0.3,0]]"]
+    with run(tmp_path, *words) as child, browsed(child, width=1000) as page:
+        page.get_by_role("tab", name="walk").click()
+        page.get_by_role("button", name="add a waypoint").click()
+        page.get_by_text("now click on the ground").wait_for()
+        page.mouse.click(420, 330)
+        page.get_by_text("waypoint 2 of 2").wait_for()
+        page.get_by_text("no waypoint is left: it holds, and waits for another").wait_for()
+        page.get_by_role("button", name="end the run").click()
+        page.get_by_text("the run has ended").wait_for()
+        assert child.wait(60.0) == 0
+    record = read_log(tmp_path / "run" / "log.mcap")
+    waypoints_m = record.header.plan.waypoints_m
+    assert len(waypoints_m) == 2
+    assert np.hypot(*(record.pose.centre_m[-1, :2] - waypoints_m[1])) < 0.35
+    assert len(record.paths) >= 2  # and one where it missed its way
