@@ -54,7 +54,7 @@ class LinkValues(RobotKeys):
     def length_m(self) -> float:
         """Length of the spine."""
         if not self.links:
-            return parsed(self, "link_length_m") * self.link_count
+            return float(parsed(self, "link_length_m")) * self.link_count
         lengths_m = self.link_lengths_m
         if len(set(lengths_m)) > 1:
             return math.fsum(lengths_m)
@@ -64,7 +64,7 @@ class LinkValues(RobotKeys):
     def mean_link_length_m(self) -> float:
         """Length of the spine over the number of its links."""
         if not self.links:
-            return parsed(self, "link_length_m")
+            return float(parsed(self, "link_length_m"))
         lengths_m = self.link_lengths_m
         if len(set(lengths_m)) > 1:
             return self.length_m / self.link_count
