@@ -7,12 +7,11 @@ from snakewalk.config.robot.limbs import LimbsConfig
 from snakewalk.config.robot.links import BellyConfig, LinkConfig
 from snakewalk.config.robot.ports import SIMULATED, PortConfig
 from snakewalk.config.robot.power import PowerConfig
-from snakewalk.config.robot.servo import LAST_ID, STALL_CURRENT_A, ServoConfig
+from snakewalk.config.robot.servo import LAST_ID, ServoConfig
 
 __all__ = [
     "LAST_ID",
     "SIMULATED",
-    "STALL_CURRENT_A",
     "BellyConfig",
     "ImuConfig",
     "ImuModel",

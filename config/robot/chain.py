@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import model_validator
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from snakewalk.config.errors import ConfigError
 from snakewalk.config.robot.joint_values import JointValues
 from snakewalk.config.robot.keys import READ_INSTEAD, Unreadable
-from snakewalk.config.robot.servo import LAST_ID, STALL_CURRENT_A
+from snakewalk.config.robot.servo import LAST_ID
 from snakewalk.config.robot.spelling import canonical_joints, canonical_links
 
 _LIMIT_SHARE = 2.0 / 2.3
 """Share of the stall current at which a run stops (ours): 2 A for an XM430."""
-_PROTOCOL_1 = ("AX-", "RX-", "EX-", "DX-")
 
 
 class RobotConfig(JointValues):
@@ -172,15 +172,24 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _models_can_run(self) -> Self:
-        for model in dict.fromkeys(self.servo_models):
-            if model.startswith(_PROTOCOL_1):
+        try:
+            records = dict(zip(self.servo_models, self.servo_records, strict=True))
+        except ConfigError as error:
+            raise ValueError(f"servo: {error}") from None
+        for model, facts in records.items():
+            if facts.protocol == 1:
                 raise ValueError(
                     f"servo: model {model} speaks Protocol 1.0, which has no group read and no "
                     "watchdog that a run could rely on; a run needs a servo of Protocol 2.0, such "
                     "as XL430-W250 (for programs of your own: snakewalk bus serve --servos "
                     "1-4:AX-12A)"
                 )
-            if self.servo.over_current_a is None and model not in STALL_CURRENT_A:
+            missing = facts.missing_for_a_run()
+            if missing:
+                raise ValueError(
+                    f"servo: the file of {model} lacks {', '.join(missing)}, which a run needs"
+                )
+            if self.servo.over_current_a is None and facts.stall_current_a is None:
                 raise ValueError(
                     f"servo: over_current_a is missing: the stall current of {model} is not known"
                 )
@@ -195,12 +204,12 @@ class RobotConfig(JointValues):
             ValueError: the limit is not below the stall current of each servo.
 
         """
-        for model in dict.fromkeys(self.servo_models):
-            stall_a = STALL_CURRENT_A.get(model, math.inf)
-            if limit_a >= stall_a:
+        for facts in self.servo_records:
+            stall_a = facts.stall_current_a
+            if stall_a is not None and limit_a >= stall_a:
                 raise ValueError(
-                    f"{name} = {limit_a:g}: {model} draws {stall_a:g} A at most and would never "
-                    f"trip; leave it out for {_LIMIT_SHARE * stall_a:.2f} A"
+                    f"{name} = {limit_a:g}: {facts.model} draws {stall_a:g} A at most and would "
+                    f"never trip; leave it out for {_LIMIT_SHARE * stall_a:.2f} A"
                 )
 
     @property
@@ -208,13 +217,16 @@ class RobotConfig(JointValues):
         """Current at which a run without a limit stops: that of the weakest servo."""
         if self.servo.over_current_a is not None:
             return self.servo.over_current_a
-        return round(_LIMIT_SHARE * min(STALL_CURRENT_A[m] for m in self.servo_models), 3)
+        stall_a = [a for facts in self.servo_records if (a := facts.stall_current_a) is not None]
+        return round(_LIMIT_SHARE * min(stall_a), 3)
 
     @model_validator(mode="after")
     def _ranges_are_within_a_turn(self) -> Self:
-        """In position mode a servo knows one turn: positions 0 to 4095 of 4096."""
-        most_rad = math.pi - math.tau / 4096
-        for joint, limit_rad in enumerate(self.limit_rad):
+        """Check that each joint's range is within one turn of its servo, which is all it knows."""
+        for joint, (limit_rad, facts) in enumerate(
+            zip(self.limit_rad, self.servo_records, strict=True)
+        ):
+            most_rad = math.pi - facts.rad_per_position
             beyond = limit_rad + abs(self.zeros_rad[joint])
             if beyond > most_rad:
                 raise ValueError(
@@ -238,6 +250,14 @@ class RobotConfig(JointValues):
         if any(not 0.05 < radius <= 1.0 for radius in self.body_profile or ()):
             raise ValueError("body_profile must be over 0.05 and at most 1 everywhere")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_empty_records(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave the key out of files and logs of robots with shipped models only."""
+        data: dict[str, Any] = handler(self)
+        if not self.described_models:
+            data.pop("described_models", None)
+        return data
 
     if not TYPE_CHECKING:
 

@@ -7,6 +7,8 @@ from typing import TypeVar
 from snakewalk.config.motor import MotorConfig
 from snakewalk.config.robot.keys import parsed
 from snakewalk.config.robot.link_values import LinkValues
+from snakewalk.config.servo_catalogue import servo_model
+from snakewalk.config.servo_model import ServoModel
 
 N = TypeVar("N", int, float)
 
@@ -30,15 +32,28 @@ class JointValues(LinkValues):
         return tuple(joint.model or self.servo.model for joint in self.joints)
 
     @property
+    def servo_records(self) -> tuple[ServoModel, ...]:
+        """Record of each servo's model.
+
+        Raises:
+            ConfigError: a model is not known.
+
+        """
+        described = {each.model: each for each in self.described_models}
+        models = self.servo_models
+        known = {name: described.get(name) or servo_model(name) for name in dict.fromkeys(models)}
+        return tuple(known[name] for name in models)
+
+    @property
     def motors(self) -> tuple[MotorConfig | None, ...]:
         """Motor constants of each servo; None: those of its model."""
         own, of = self.servo.motor, self.servo.model
         return tuple(own if model == of else None for model in self.servo_models)
 
     @property
-    def models_by_id(self) -> dict[int, str]:
-        """Model of each servo by its bus ID."""
-        return dict(zip(self.servo_ids, self.servo_models, strict=True))
+    def models_by_id(self) -> dict[int, ServoModel]:
+        """Record of each servo's model by its bus ID."""
+        return dict(zip(self.servo_ids, self.servo_records, strict=True))
 
     @property
     def signs(self) -> tuple[int, ...]:

@@ -18,6 +18,7 @@ from snakewalk.config.robot.links import BellyConfig, LinkConfig
 from snakewalk.config.robot.ports import PortConfig
 from snakewalk.config.robot.power import PowerConfig
 from snakewalk.config.robot.servo import ServoConfig
+from snakewalk.config.servo_model import ServoModel
 
 
 class RobotKeys(Strict):
@@ -56,6 +57,11 @@ class RobotKeys(Strict):
         (), description="pairs of legs, from the tail to the head: tables [[limbs]]"
     )
     servo: ServoConfig = ServoConfig()
+    described_models: tuple[ServoModel, ...] = Field(
+        (),
+        description="records of models that are not shipped; loading a robot fills it from the "
+        "files that `model` names",
+    )
     imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
     stereo_head: StereoHeadConfig | None = Field(
         None, description="a table [stereo_head]; default: there is none"

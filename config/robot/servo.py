@@ -1,6 +1,5 @@
 """Settings of the servos of a chain, as its file gives them."""
 
-from collections.abc import Mapping
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -10,47 +9,16 @@ from snakewalk.config.motor import MotorConfig
 
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
 LAST_ID = 252
-STALL_CURRENT_A: Mapping[str, float] = {
-    "XL330-M077": 1.47,
-    "XL330-M288": 1.47,
-    "XC330-M181": 1.8,
-    "XC330-M288": 1.8,
-    "XC330-T181": 0.8,
-    "XC330-T288": 0.8,
-    "XL430-W250": 1.3,
-    "2XL430-W250": 1.3,
-    "XH430-W210": 1.3,
-    "XH430-W350": 1.3,
-    "XD430-T210": 1.3,
-    "XD430-T350": 1.3,
-    "XW430-T333": 1.3,
-    "XC430-W150": 1.4,
-    "XC430-W240": 1.4,
-    "2XC430-W250": 1.4,
-    "XM430-W210": 2.3,
-    "XM430-W350": 2.3,
-    "XH430-V210": 0.7,
-    "XH430-V350": 0.7,
-    "XM540-W150": 4.4,
-    "XM540-W270": 4.4,
-    "XH540-W150": 4.9,
-    "XH540-W270": 4.9,
-    "XD540-T150": 4.9,
-    "XD540-T270": 4.9,
-    "XW540-T140": 4.9,
-    "XW540-T260": 4.9,
-    "XH540-V150": 2.4,
-    "XH540-V270": 2.4,
-    "XW540-H260": 2.4,
-}
-"""What a servo draws when it is held fast at its recommended voltage: the e-manual's page of each
-model of the X series, "Specifications"; XD models as their XH twins."""
 
 
 class ServoConfig(Strict):
     """Settings of all servos of the chain."""
 
-    model: str = Field("XM430-W350", description="name as printed on the servo")
+    model: str = Field(
+        "XM430-W350",
+        description="name as printed on the servo, or a file that describes the model "
+        "(docs/how-to/add-a-servo-model.md)",
+    )
     first_id: int = Field(1, ge=0, le=LAST_ID, description="ID of the joint next to the head")
     baud: Baud = 1_000_000
     supply_v: float = Field(12.0, ge=3.0, le=26.0)

@@ -88,7 +88,7 @@ def simulated(
     plant.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     servo = robot.servo
     line = SimLine(
-        ServoBank(robot.servo_ids, robot.servo_models, servo.baud),
+        ServoBank(robot.servo_ids, robot.servo_records, servo.baud),
         plant,
         baud=servo.baud,
         mounting=deviation.mounting(robot),
@@ -195,7 +195,7 @@ def split(
     baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
     imu = plant_imu(robot, plant, baud, run.seed)
     bank = ServoBank(
-        [robot.servo_ids[row] for row in rows], [robot.servo_models[row] for row in rows], baud
+        [robot.servo_ids[row] for row in rows], [robot.servo_records[row] for row in rows], baud
     )
     line = SimLine(
         bank,

@@ -40,7 +40,6 @@ from snakewalk.controller.run.steered_run import SteeredRun
 from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.controller.track.readers.load import track_beside
 from snakewalk.drivers.bus.budget import robot_budget
-from snakewalk.sim.servo.models import MODELS
 
 C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
 _FIELDS = {
@@ -537,15 +536,15 @@ def check_supply(robot: RobotConfig) -> None:
         InputError: with the model's range of voltages, and the one that its page recommends.
 
     """
-    for model in dict.fromkeys(robot.servo_models):
-        facts = MODELS.get(model)
-        if facts is None:  # what another servo takes is not known here
+    for facts in robot.models_by_id.values():
+        if facts.motor is None:  # its file does not say
             continue
-        low_v, high_v = (tenths / 10.0 for tenths in facts.volts)
+        low_v, high_v = facts.motor.voltage_v
         if not low_v <= robot.servo.supply_v <= high_v:
             raise InputError(
-                f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {model} takes "
-                f"{low_v:g} to {high_v:g} V; recommended: supply_v = {facts.nominal_v:g}"
+                f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {facts.model} "
+                f"takes {low_v:g} to {high_v:g} V; recommended: supply_v = "
+                f"{facts.motor.nominal_v:g}"
             )
 
 

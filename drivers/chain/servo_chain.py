@@ -96,7 +96,7 @@ class ServoChain:
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
         tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
-        self._units = JointUnits.of(robot, [ServoUnits.of(table) for table in tables])
+        self._units = JointUnits.of(robot, [ServoUnits.of(table.facts) for table in tables])
         # rounded up: at least the time that was asked for
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))

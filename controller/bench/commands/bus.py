@@ -177,7 +177,8 @@ def sniff(
     ],
     baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="of servos whose model no ping has shown; AX-12A: Protocol 1.0")
+        str,
+        typer.Option(help="model, or its file, of servos that no ping has shown"),
     ] = "XM430-W350",
     through: Annotated[
         bool, typer.Option("--through", help="stand between a client and the device")
@@ -186,15 +187,16 @@ def sniff(
     as_json: Json = False,
 ) -> None:
     """Decode a live or recorded exchange packet by packet."""
+    from snakewalk.config.servo_catalogue import servo_model  # noqa: PLC0415
     from snakewalk.controller.bench.sniff import receive, stand_between  # noqa: PLC0415  --help stays quick
     from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
-    from snakewalk.sim.ax12.table import MODEL as AX12  # noqa: PLC0415
     from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
     from snakewalk.sim.sniff.trace import read_trace  # noqa: PLC0415
 
     if not source.exists():
         raise InputError(f"{source}: no such file or device")
-    decoder = Decoder1() if model.upper() == AX12 else Decoder(model)
+    facts = servo_model(model, Path())
+    decoder = Decoder1(facts) if facts.protocol == 1 else Decoder(facts)
     live = source.is_char_device()
     if through and not live:
         raise InputError(f"{source}: --through needs a serial device")
@@ -255,14 +257,16 @@ def _simulated(
         line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
     else:
         line = _robot_line(robot, baud)
-        spec = ChainSpec(line.bank.ids, line.bank.models)
     player = None
     if faults is not None:
         player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
-        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), Decoder1, None
-    models = dict(zip(spec.ids, spec.models, strict=True))
-    decoder = partial(Decoder, spec.kinds[0], models)
+        spec = ChainSpec(spec.ids, (line.servos.facts.model,) * len(spec.ids))
+        decoder = partial(Decoder1, line.servos.facts)
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), decoder, None
+    spec = ChainSpec(line.bank.ids, line.bank.models)
+    models = dict(zip(line.bank.ids, line.bank.facts, strict=True))
+    decoder = partial(Decoder, line.bank.facts[0], models)
     return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
 
 
@@ -277,7 +281,7 @@ def _robot_line(name: str, baud: int | None) -> "SimLine":
 
     robot = load_robot(name)
     rate = baud or robot.servo.baud
-    bank = ServoBank(robot.servo_ids, robot.servo_models, rate)
+    bank = ServoBank(robot.servo_ids, robot.servo_records, rate)
     plant = MujocoPlant(robot, load_world("flat"))
     return SimLine(
         bank,
