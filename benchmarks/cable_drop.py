@@ -58,7 +58,7 @@ def tried(name: str, seed: int) -> tuple[int, int, int, int, int, int]:
     robot = with_keys(load_robot(name), {"power": power.model_dump()}, "benchmark")
     plant = MujocoPlant(robot, load_world("flat"))
     plant.reset((0.0, 0.0), 0.0, rng.uniform(-0.4, 0.4, 16))
-    bank = ServoBank(robot.servo_ids, robot.servo_models, robot.servo.baud)
+    bank = ServoBank(robot.servo_ids, robot.servo_records, robot.servo.baud)
     supply = SupplyAndAmbient.of(robot)
     line = SimLine(bank, plant, mounting=Mounting.of(robot), supply_and_ambient=supply)
     bus = DynamixelBus(line, robot.models_by_id)

@@ -20,6 +20,7 @@ from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.world import WorldConfig
 
@@ -34,9 +35,12 @@ SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
     "animal": AnimalConfig,
     "schedule": ScheduleConfig,
     "faults": FaultPlan,
+    "servo": ServoModel,
 }
 """Model by the name of its file; a synthesis is also a table of a run."""
 
+WRITTEN_BY_PROGRAM: Final = ("described_models",)
+"""Keys that loading a file fills; no page or template shows them."""
 _HEAD = """# Configuration
 
 A run is a TOML file that names a robot and a world; each is a shipped name or a path ending in
@@ -77,8 +81,8 @@ default and its meaning (`--robot`, `--from RUN`: like another one), and `snakew
 mine/run.toml` runs them as they are.
 
 **In an editor.** `snakewalk schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
-`skin`, `animal`, `schedule`, `faults`, `policy`) prints the JSON Schema of such a file. `init`
-writes those of its three files into `mine/schema/` and names them in each file's first line,
+`skin`, `animal`, `schedule`, `faults`, `servo`, `policy`) prints the JSON Schema of such a file.
+`init` writes those of its three files into `mine/schema/` and names them in each file's first line,
 `#:schema schema/run.json`: that is all that the extension *Even Better TOML* of VS Code needs,
 and `taplo check run.toml` on a command line, to complete keys, show their meaning and mark what
 is wrong. For files elsewhere a `.taplo.toml` says it:
@@ -96,10 +100,16 @@ This page is written from the schema by `python -m snakewalk.config.document`; a
 """
 
 
+_FILES: Final = (
+    *(("Run", RunConfig), ("Robot", RobotConfig), ("World", WorldConfig)),
+    ("Servo model", ServoModel),
+)
+
+
 def reference() -> str:
     """Markdown of every table and key."""
     parts = [_HEAD]
-    for title, model in (("Run", RunConfig), ("Robot", RobotConfig), ("World", WorldConfig)):
+    for title, model in _FILES:
         parts += _tables(title, model)
     kinds: tuple[Kind, ...] = ("runs", "robots", "worlds")
     for kind in kinds:
@@ -114,12 +124,15 @@ def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, An
     is that of a file which only a room above reads.
     """
     model = model or SCHEMAS[kind]
+    schema = model.model_json_schema()
+    if model is ServoModel:  # the other keys may come from the model that it is like
+        schema["required"] = ["model", "model_number", "source"]
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"snakewalk: {kind}",
         "description": (model.__doc__ or "").partition("\n")[0],
     }
-    return model.model_json_schema() | head
+    return schema | head
 
 
 def _shipped(kind: Kind) -> list[str]:
@@ -148,6 +161,8 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
     ]
     inner: list[str] = []
     for name, field in model.model_fields.items():
+        if name in WRITTEN_BY_PROGRAM:
+            continue
         nested = table_models(field.annotation)
         row = row_model(field.annotation)
         if row is not None:

@@ -1,20 +1,17 @@
-"""TOML to schema, strictly: every fault of a file at once, each with its path inside the file."""
+"""Configurations by shipped name or by path: robots, worlds, runs, gaits."""
 
 import hashlib
-import re
-import tomllib
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import PydanticSerializationError, to_json
+from pydantic import BaseModel
 
-from snakewalk.config.archive import read_text, why_no_file
+from snakewalk.config import strict_toml
+from snakewalk.config.archive import why_no_file
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
+from snakewalk.config.strict_toml import read_toml
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -58,41 +55,20 @@ def load(path: Path, model: type[M]) -> M:
         ConfigError: missing file, broken TOML, or schema faults, all of them, one line each.
 
     """
-    try:
-        text = read_text(path, _MOST_BYTES)
-        _check_keys(text)
-        data = tomllib.loads(text)
-    except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror or error}") from None
-    except tomllib.TOMLDecodeError as error:
-        place = _PLACE.search(str(error))
-        where = f"{path}:{place[1]}" if place else str(path)
-        raise ConfigError(f"{where}: not TOML: {_PLACE.sub('', str(error))}") from None
-    except RecursionError:
-        raise ConfigError(f"{path}: not TOML: nested too deeply") from None
-    except ValueError as error:
-        raise ConfigError(f"{path}: not TOML: {error}") from None
+    data, text = read_toml(path)
     return checked(model, data, str(path), text)
 
 
 def checked(model: type[M], data: dict[str, Any], source: str, text: str = "") -> M:
-    """Validate ``data``; ``source`` leads each line of the faults, with the line in ``text``.
+    """Validate ``data``; ``source`` starts each line of the faults, with the line in ``text``.
 
-    A value of another type is a fault: text is no number, and true is not 1.
+    A value of another type is a fault: text is not a number, and true is not 1.
 
     Raises:
         ConfigError: schema faults, all of them, one line each.
 
     """
-    try:
-        plain = to_json(data, inf_nan_mode="constants", fallback=_plain)
-        return model.model_validate_json(plain, strict=True)
-    except PydanticSerializationError as error:
-        raise ConfigError(f"{source}: {error}") from None
-    except ValidationError as error:
-        raise ConfigError(
-            [_line(model, source, text, dict(fault)) for fault in error.errors()]
-        ) from None
+    return strict_toml.checked(model, data, source, text, _files)
 
 
 def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
@@ -113,6 +89,8 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
                 raise ConfigError(f"{source}: {key}: {name} is no table of it")
             table = table[name]
         table[last] = value
+    if "servo" in data:
+        data = with_models(data, None)
     return checked(type(config), data, source)
 
 
@@ -120,7 +98,42 @@ def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
     """Load a robot by shipped name or path."""
     from snakewalk.config.robot import RobotConfig  # noqa: PLC0415  slow to build; a list of gaits needs none
 
-    return load(locate("robots", name_or_path, beside), RobotConfig)
+    path = locate("robots", name_or_path, beside)
+    data, text = read_toml(path)
+    return checked(RobotConfig, with_models(data, path.parent), str(path), text)
+
+
+def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Data of a robot with the records of the models that its file describes by files.
+
+    Each `model` that names a file, or a model of the folder `servos` beside the robot's file,
+    becomes the name of the model; its record goes into `described_models`, so that a log is
+    complete without the file.
+
+    Raises:
+        ConfigError: the faults of such a file.
+
+    """
+    from snakewalk.config.servo_catalogue import described_model  # noqa: PLC0415  as above
+
+    found: dict[str, BaseModel] = {}
+
+    def named(table: object) -> object:
+        model = table.get("model") if isinstance(table, dict) else None
+        record = described_model(model, folder) if isinstance(model, str) else None
+        if record is None or not isinstance(table, dict):
+            return table
+        found[record.model] = record
+        return {**table, "model": record.model}
+
+    servo, joints = named(data.get("servo")), data.get("joints")
+    joints = [named(each) for each in joints] if isinstance(joints, list | tuple) else joints
+    if not found:
+        return data
+    known = [each for each in data.get("described_models", ()) if each.get("model") not in found]
+    more = {"described_models": [*known, *(each.model_dump() for each in found.values())]}
+    given = {"servo": servo, "joints": joints}
+    return data | {key: value for key, value in given.items() if value is not None} | more
 
 
 def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
@@ -169,69 +182,8 @@ def digest(*models: BaseModel) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _plain(value: Any) -> Any:
-    """Return numbers of numpy, or arrays of them, as Python's own.
-
-    Raises:
-        TypeError: it is something else.
-
-    """
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no value of a configuration")
-
-
-def _check_keys(text: str) -> None:
-    """Refuse keys of hundreds of tables, for which ``tomllib`` takes minutes.
-
-    Raises:
-        ValueError: there is one.
-
-    """
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.count(".") > _MOST_TABLES and any(
-            key.count(".") > _MOST_TABLES for key in _NO_KEY.split(line)
-        ):
-            raise ValueError(f"a key of over {_MOST_TABLES} tables in line {number}")
-
-
 def _folder(kind: Kind) -> Path:
     return Path(__file__).parent / kind
-
-
-_MOST_BYTES: Final = 4_000_000
-_MOST_TABLES: Final = 100
-"""Of a TOML file, and of a dotted key in it (ours)."""
-_NO_KEY: Final = re.compile(r"[^\w.\s\"'-]+")
-_PLACE: Final = re.compile(r" ?\(at line (\d+), column \d+\)")
-_TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
-_KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
-
-
-def _line_number(text: str, loc: Sequence[str | int]) -> int | None:
-    """Line on which a TOML text sets the innermost key of ``loc`` that it has; None if none."""
-    wanted = [str(part) for part in loc if isinstance(part, str)]
-    places = [part for part in loc if isinstance(part, int)]
-    table: list[str] = []
-    seen: Counter[str] = Counter()
-    found, depth, here = None, 0, True
-    for number, line in enumerate(text.splitlines(), start=1):
-        if header := _TABLE.match(line):
-            keys = table = _parts(header[2])
-            here = header[1] == "[" or places[:1] == [seen[header[2]]]
-            seen[header[2]] += 1
-        elif key := _KEY.match(line):
-            keys = table + _parts(key[1])
-        else:
-            continue
-        rest = iter(wanted)
-        if here and len(keys) > depth and all(part in rest for part in keys):
-            found, depth = number, len(keys)
-    return found
-
-
-def _parts(key: str) -> list[str]:
-    return [part.strip(" \"'") for part in key.split(".")]
 
 
 def _files() -> dict[str, type[BaseModel]]:
@@ -243,17 +195,6 @@ def _files() -> dict[str, type[BaseModel]]:
     return {"run": RunConfig, "robot": RobotConfig, "world": WorldConfig}
 
 
-def _keys(kind: Any) -> Iterator[str]:
-    """Keys of a schema and of all tables in it."""
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        for name, field in kind.model_fields.items():
-            yield name
-            yield from _keys(field.annotation)
-    else:
-        for part in get_args(kind):
-            yield from _keys(part)
-
-
 def _dotted(path: str, kind: Any) -> Iterator[str]:
     """Keys of a table and of the tables in it that hold a single value, dotted behind ``path``."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -263,65 +204,3 @@ def _dotted(path: str, kind: Any) -> Iterator[str]:
     elif get_origin(kind) not in {list, tuple, dict}:
         for part in get_args(kind):
             yield from _dotted(path, part)
-
-
-def _meant(model: type[BaseModel], key: str) -> str:
-    """The key of the schema that an unknown one is like, or the file that has such a key."""
-    near = get_close_matches(key, set(_keys(model)) - {key}, 1, 0.78)
-    if near:
-        return f"; did you mean {near[0]}?"
-    owner = next((n for n, m in _files().items() if m is not model and key in m.model_fields), None)
-    return "" if owner is None else f"; it is a key of a {owner}'s file"
-
-
-def _pattern_in_words(pattern: str) -> str:
-    letters = re.fullmatch(r"\^\[(\w+)\](?:\*|\{(\d+),(\d+)\})\$", pattern)
-    if letters is None:
-        return "holds '/', a control character or a leading dot"
-    which, least, most = letters.groups()
-    return f"must have the letters {' and '.join(which)} only" + (
-        f", {least} to {most} of them" if least else ""
-    )
-
-
-def _line(model: type[BaseModel], path: str, text: str, fault: dict[str, Any]) -> str:
-    loc = fault["loc"]
-    where = ".".join(str(p) for p in loc)
-    number = _line_number(text, loc)
-    if number is not None:
-        path = f"{path}:{number}"
-    given = fault.get("input")
-    shown = f" (got {given!r})" if isinstance(given, int | float | str | bool) else ""
-    context = fault.get("ctx", {})
-    bounds = {key: context[key] for key in ("gt", "ge", "lt", "le") if key in context}
-    tag, known = context.get("tag"), context.get("expected_tags")
-    said = {
-        "missing": "is required",
-        "tuple_type": "must be a list: [ ... ]",
-        "model_type": "must be a table",
-        "model_attributes_type": "must be a table",
-        "dict_type": "must be a table",
-        "string_type": "must be text",
-        "int_type": "must be a whole number",
-        "int_from_float": "must be a whole number",
-        "float_type": "must be a number",
-        "bool_type": "must be true or false",
-        "finite_number": "must be a finite number",
-        "union_tag_invalid": f"kind {tag!r} is none of {known}",
-        "union_tag_not_found": "needs a key kind, which says what it is",
-        "literal_error": f"must be {context.get('expected')}",
-        "greater_than": f"must be over {bounds.get('gt', 0):g}",
-        "greater_than_equal": f"must be at least {bounds.get('ge', 0):g}",
-        "less_than": f"must be under {bounds.get('lt', 0):g}",
-        "less_than_equal": f"must be at most {bounds.get('le', 0):g}",
-        "too_long": f"must have at most {context.get('max_length')} values",
-        "too_short": f"must have at least {context.get('min_length')} values",
-        "string_too_long": f"must have at most {context.get('max_length')} characters",
-        "string_too_short": "must not be empty",
-    }
-    if fault["type"] == "extra_forbidden":
-        said["extra_forbidden"] = f"unknown key{_meant(model, str(loc[-1]))}"
-    pattern = str(context.get("pattern"))
-    said["string_pattern_mismatch"] = _pattern_in_words(pattern)
-    what = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
-    return f"{path}: {where}: {what}{shown}" if where else f"{path}: {what}{shown}"

@@ -1,6 +1,5 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
-import math
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
@@ -28,10 +27,6 @@ MOTIONS: Final = (
 _ALONG_WAYPOINTS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
 MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
 """A motion of ``MOTIONS``, or the name of a plug-in."""
-
-FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
-"""Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
-register over 128, an error is counted in 4096ths of a turn (e-manual, X series)."""
 
 
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -190,8 +185,9 @@ class SafetyConfig(Strict):
         ground holds it off.
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
-        for axis, gain in zip(robot.all_axes, robot.position_p_gains, strict=True):
-            full_rad = FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
+        columns = robot.all_axes, robot.position_p_gains, robot.servo_records
+        for axis, gain, facts in zip(*columns, strict=True):
+            full_rad = facts.full_output_rad / max(gain, 1) if axis != "p" else 0.0
             limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
         return tuple(limits_rad)
 

@@ -9,7 +9,12 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from snakewalk.config.document import row_model, table_models, value_kind
+from snakewalk.config.document import (
+    WRITTEN_BY_PROGRAM,
+    row_model,
+    table_models,
+    value_kind,
+)
 from snakewalk.config.robot import RobotConfig
 
 _COLUMN: Final = 42
@@ -41,7 +46,7 @@ def _table(
     for key, field in model.model_fields.items():
         where = f"{place}.{key}".removeprefix(".")
         row, choices = row_model(field.annotation), table_models(field.annotation)
-        if key in without:
+        if key in without or (key in WRITTEN_BY_PROGRAM and not values.get(key)):
             continue
         if row is not None:
             inner += _rows(row, (given or {}).get(key, ()), where)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from snakewalk.config.errors import InputError
     from snakewalk.config.faults import FaultPlan
     from snakewalk.config.loader import load_robot, load_run, load_world
-    from snakewalk.config.robot import RobotConfig
+    from snakewalk.config.robot.chain import RobotConfig
     from snakewalk.config.run import RunConfig, SafetyConfig
     from snakewalk.config.world import WorldConfig
     from snakewalk.controller.gaits.gait import Gait, Needs
@@ -96,7 +96,7 @@ _NAMES = {
     "config.errors": ("InputError",),
     "config.faults": ("FaultPlan",),
     "config.loader": ("load_robot", "load_run", "load_world"),
-    "config.robot": ("RobotConfig",),
+    "config.robot.chain": ("RobotConfig",),
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
     "controller.run.execute": ("execute",),

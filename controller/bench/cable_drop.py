@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.controller.console.finding import Finding
-from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, VOLTAGE_UNIT_V
-from snakewalk.sim.servo.motor import MOTORS
+from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V
+from snakewalk.sim.servo.motor import motors_of
 from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling
 
 CHECK: Final = "cables"
@@ -281,13 +281,13 @@ def drawn_a(robot: RobotConfig, duty: Floats, current_a: Floats) -> Floats:
         (..., S); NaN of servos without a current sensor.
 
     """
-    measured = [model in CURRENT_UNIT_A for model in robot.servo_models]
+    measured = [facts.units.current_a is not None for facts in robot.servo_records]
     return np.asarray(np.where(measured, np.abs(duty * current_a), np.nan) + _standby_a(robot))
 
 
 def _standby_a(robot: RobotConfig) -> Floats:
     """(S,) what the electronics of the servos draw (e-manual, "Standby Current")."""
-    return np.array([MOTORS[model].standby_a for model in robot.servo_models])
+    return np.array([motor.standby_a for motor in motors_of(robot)])
 
 
 def _step_stays(step_v: Floats, cable: int) -> bool:

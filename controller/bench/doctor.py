@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.bench import adapter, line_checks
 from snakewalk.controller.bench import servo_checks as servos
 from snakewalk.controller.bench.imu_check import imu_finding
@@ -17,7 +18,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.probe import Probe, overhear
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
-from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport, inspect
+from snakewalk.drivers.chain.start_up import ServoReport, inspect
 from snakewalk.drivers.errors import BusError, FaultCause, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.port.network_port import NetworkPort
@@ -102,12 +103,12 @@ def examine(
             *_settings(bus, robot, reports, noise),
         ]
         on_progress("group reads")
-        fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
+        fast = all(s.fast_reads for s in reports)
         port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to what was asked so far
         patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
         findings.append(line_checks.line_quality(port, cycle, latency_s))
-    fast = all(s.firmware >= FAST_READ_FIRMWARE for s in reports)
+    fast = all(s.fast_reads for s in reports)
     findings.append(adapter.wire(robot_budget(robot, baud, fast=fast), rate_hz))
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
@@ -226,7 +227,7 @@ def _settings(
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
     except BusError as error:
         return [_unreadable(error, noise)]
-    scales = [ServoUnits.of(bus.table_of(servo_id)) for servo_id in robot.servo_ids]
+    scales = [ServoUnits.of(bus.table_of(servo_id).facts) for servo_id in robot.servo_ids]
     return register_findings(registers, robot, JointUnits.of(robot, scales))
 
 
@@ -237,7 +238,7 @@ def _unreadable(error: BusError, noise: Finding | None) -> Finding:
 
 def _at_other_bauds(
     port: BytePort,
-    models: Mapping[int, str],
+    models: Mapping[int, ServoModel],
     missing: Sequence[int],
     latency_s: float,
     on_progress: Callable[[str], None],

@@ -19,7 +19,6 @@ from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import ChainError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
-from snakewalk.drivers.protocol.registers import EEPROM_END
 
 _IDENTITY = (
     *("Model Number", "Model Information", "Firmware Version"),
@@ -33,7 +32,7 @@ class ServoBackup(Strict):
     id: int = Field(ge=0, le=252)
     model: str
     registers: dict[str, int]
-    """Raw values of the EEPROM, by the SDK's names."""
+    """Raw values of the EEPROM, by the names of the e-manual."""
 
 
 class BackupFile(Strict):
@@ -140,7 +139,7 @@ def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
     registers = sorted((bus.table[name] for name in bus.table), key=lambda each: each.address)
     values = {}
     for register in registers:
-        if register.address < EEPROM_END and register.name not in _IDENTITY:
+        if register.address < bus.table.facts.ram_from and register.name not in _IDENTITY:
             try:
                 values[register.name] = bus.read(servo_id, register.name)
             except ServoError:

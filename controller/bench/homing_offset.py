@@ -14,7 +14,6 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import BusError, DriverError
-from snakewalk.drivers.protocol.registers import HOMING_LIMIT
 
 _REST_POSITIONS = 16
 """How far a limp shaft may sag between two readings, positions: 1.4 degrees (ours)."""
@@ -46,10 +45,11 @@ def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ..
         after = before - round(robot.zeros_rad[joint] / table.rad_per_position)
         planned.append(HomingOffset(servo_id, before, after))
         reach_rad = abs(after) * table.rad_per_position + robot.limit_rad[joint]
-        if abs(after) > HOMING_LIMIT or reach_rad > math.pi:
+        most = table.facts.units.homing_limit
+        if (most is not None and abs(after) > most) or reach_rad > math.pi:
             why = (
-                f"beyond {HOMING_LIMIT} the servo ignores it in position mode"
-                if abs(after) > HOMING_LIMIT
+                f"beyond {most} the servo ignores it in position mode"
+                if most is not None and abs(after) > most
                 else f"with its limit of {robot.limit_rad[joint]:g} rad it leaves the servo's turn"
             )
             faults.append(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.console.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
@@ -26,7 +27,6 @@ from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
     POSITION_MODE,
-    PWM_FULL,
     REVERSE,
     SECONDARY_ID_LIMIT,
     SHUTDOWN_ALARMS,
@@ -89,10 +89,13 @@ class _Checks:
         self, servos: Sequence[ServoRegisters], robot: RobotConfig, units: JointUnits
     ) -> None:
         self._servos, self._robot, self._units = servos, robot, units
-        self._factory = [_factory_values(model) for model in robot.servo_models]
+        self._factory = [_factory_values(facts) for facts in robot.servo_records]
+        self._full = units.full_pwm.tolist()
 
     def all(self) -> list[Finding | None]:
         """Findings in the order of their weight; None where all is well."""
+        full = self._full
+        shown = " or ".join(map(str, dict.fromkeys(full)))
         return [
             self._pose(),
             self._exchanged(),
@@ -136,20 +139,23 @@ class _Checks:
                 lambda servo: servo.values.get("PWM Limit") == 0,
                 "move: PWM Limit(36) is 0",
                 verb="cannot",
-                remedy=f"set it to {PWM_FULL}",
+                remedy=f"set it to {shown}",
             ),
             self._bad(
                 "PWM limit",
                 "warn",
-                lambda servo: 0 < servo.values.get("PWM Limit", PWM_FULL) < PWM_FULL,
-                f"a PWM Limit(36) below {PWM_FULL}: weak and slow",
-                remedy=f"set it to {PWM_FULL}, unless it is meant",
+                lambda servo: (
+                    0 < servo.values.get("PWM Limit", full[servo.joint]) < full[servo.joint]
+                ),
+                f"a PWM Limit(36) below {shown}: weak and slow",
+                remedy=f"set it to {shown}, unless it is meant",
             ),
             self._bad(
                 "goal PWM",
                 "warn",
                 lambda servo: (
-                    servo.values.get("Goal PWM", PWM_FULL) < servo.values.get("PWM Limit", PWM_FULL)
+                    servo.values.get("Goal PWM", full[servo.joint])
+                    < servo.values.get("PWM Limit", full[servo.joint])
                 ),
                 "a Goal PWM(100) below its limit: weak or without power",
             ),
@@ -277,13 +283,13 @@ class _Checks:
         return Finding(check, "warn", "; ".join(found), _BY_A_RUN) if found else None
 
     def _settings(self, servo: ServoRegisters) -> tuple[ChainSetting, ...]:
-        return chain_settings(self._robot, self._units, servo.joint, PWM_FULL)
+        return chain_settings(self._robot, self._units, servo.joint, self._full[servo.joint])
 
 
-def _factory_values(model: str) -> dict[str, int]:
-    """Initial values by the model's page of the e-manual; empty where it is not known."""
+def _factory_values(facts: ServoModel) -> dict[str, int]:
+    """Initial values of the registers; empty if the model's file does not give them."""
     try:
-        rules = registers_of(model).rules
+        rules = registers_of(facts).rules
     except ControlTableError:
         return {}
     return {name: rule.initial for name, rule in rules.items()}

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.probe import Probe
-from snakewalk.drivers.chain.start_up import FAST_READ_FIRMWARE, ServoReport
+from snakewalk.drivers.chain.start_up import ServoReport
 from snakewalk.drivers.protocol.registers import alarm_names
 
 _HOT_C = 60.0
@@ -141,13 +141,13 @@ def firmware(servos: Sequence[ServoReport]) -> Finding:
     """Old firmwares have no fast sync read; mixed ones behave differently."""
     versions = sorted({s.firmware for s in servos})
     shown = ", ".join(map(str, versions))
-    old = [s for s in servos if s.firmware < FAST_READ_FIRMWARE]
+    old = [s for s in servos if not s.fast_reads]
     if old:
         return Finding(
             "firmware",
             "warn",
-            f"{_subject(old, 'have')} no fast sync read (before {FAST_READ_FIRMWARE}): plain "
-            "reads are used, which take longer",
+            f"{_subject(old, 'have')} no fast sync read (version {shown}): plain reads are used, "
+            "which take longer",
             "update it with DYNAMIXEL Wizard 2.0",
         )
     if len(versions) > 1:

@@ -135,7 +135,7 @@ def apply(bus: DynamixelBus, servo_id: int, changes: tuple[SettingChange, ...]) 
             if change.register == "ID":
                 servo_id = change.after
             else:
-                bus.port.setBaudRate(bauds_of(bus.table.model)[change.after])
+                bus.port.setBaudRate(bauds_of(bus.table.facts)[change.after])
             if bus.read(servo_id, change.register) != change.after:
                 raise BusError(f"servo {servo_id}: {change.register}: does not read back")
         else:
@@ -185,7 +185,7 @@ def _raw(
             faults.append(f"--new-id {request.new_id}: a bus has IDs 0 to {MAX_ID}")
     if request.new_baud is not None:
         try:
-            code = baud_code(bus.table.model, request.new_baud)
+            code = baud_code(bus.table.facts, request.new_baud)
             values["Baud Rate"] = (code, f"{request.new_baud} bit/s")
         except InputError as error:
             faults.append(f"--new-baud {error}")
@@ -198,14 +198,14 @@ def _limit(bus: DynamixelBus, register: str, value: float) -> int:
     if register.endswith("Position Limit"):
         units = bus.table
         raw = round(value / units.rad_per_position) + units.zero_position
-        turn = round(2.0 * np.pi / units.rad_per_position)
-        if not 0 <= raw < turn:
+        half = round(np.pi / units.rad_per_position)
+        if not -half <= raw - units.zero_position < half:
             raise InputError("beyond half a turn from straight")
         return raw
     if value < 0.0:
         raise InputError("is negative")
     if register == "Current Limit":
-        return ServoUnits.of(bus.table).current_raw(value)
+        return ServoUnits.of(bus.table.facts).current_raw(value)
     if register.endswith("Voltage Limit"):
         return round(value / VOLTAGE_UNIT_V)
     return round(value / 2.0) if register == "Return Delay Time" else round(value)

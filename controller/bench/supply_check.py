@@ -14,7 +14,6 @@ from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.chain.joint_codec import voltages_v
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
-from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
@@ -124,5 +123,7 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
 def _drawn_a(robot: RobotConfig, blocks: Bytes) -> Floats:
     """(S,) drawn from the supply, of blocks (S, B) that begin with output and current."""
     output, current = np.ascontiguousarray(blocks[:, :4]).view("<i2").T
-    unit_a = [CURRENT_UNIT_A.get(model, math.nan) for model in robot.servo_models]
-    return drawn_a(robot, output / PWM_FULL, current * np.array(unit_a))
+    models = robot.servo_records
+    unit_a = [math.nan if (a := each.units.current_a) is None else a for each in models]
+    full = np.array([each.units.full_pwm or math.nan for each in models])
+    return drawn_a(robot, output / full, current * np.array(unit_a))

@@ -360,9 +360,7 @@ class OverheadDetector:
         window = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
         frame = np.ascontiguousarray(image[window])
         line = to_px(prior.links_m) - (left, top)
-        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / (
-            robot.link_length_m * (len(line) - 1)
-        )
+        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.middles_apart_m
         radius = robot.body_radius_m * metre
         area = 2.0 * radius * robot.length_m * metre
         now = np.asarray(cv2.GaussianBlur(frame, (3, 3), 0.0), dtype=np.uint8)

@@ -123,11 +123,12 @@ class _Chain:
 
 
 def _chain(robot: RobotConfig, prior: BodyPrior) -> _Chain:
-    quarter = 0.25 * robot.link_length_m * prior.forward
+    lengths_m, radii_m = np.array(robot.link_lengths_m), np.array(robot.link_radii_m)
+    quarter = (0.25 * lengths_m)[:, None] * prior.forward
     places = np.stack([prior.links_m + quarter, prior.links_m - quarter], 1).reshape(-1, 2)
-    reach = 0.5 * robot.link_length_m + _CAP * robot.body_radius_m
+    reach = 0.5 * lengths_m[[0, -1]] + _CAP * radii_m[[0, -1]]
     out = np.stack([prior.forward[0], -prior.forward[-1]])
-    tips = prior.links_m[[0, -1]] + reach * out
+    tips = prior.links_m[[0, -1]] + reach[:, None] * out
     heading = float(np.arctan2(prior.forward[0, 1], prior.forward[0, 0]))
     return _Chain(
         places,

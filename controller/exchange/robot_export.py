@@ -7,7 +7,6 @@ from xml.etree import ElementTree as ET
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.drivers.protocol.control_table import load_control_table
 
 Ros2Control = Literal["topic", "dynamixel"]
 """What ros2_control drives: our ROS node, or the servos themselves."""
@@ -92,10 +91,10 @@ def _add_ros2_control(root: ET.Element, robot: RobotConfig, kind: Ros2Control) -
         plugin.text = "dynamixel_hardware_interface/DynamixelHardware"
         _add_params(hardware, _dynamixel_params(robot))
     rows = zip(
-        robot.limit_rad, robot.servo_ids, robot.servo_models, robot.position_p_gains, strict=True
+        robot.limit_rad, robot.servo_ids, robot.servo_records, robot.position_p_gains, strict=True
     )
-    for joint, (limit, number, model, gain) in enumerate(rows):
-        senses = "Present Current" in load_control_table(model).registers
+    for joint, (limit, number, facts, gain) in enumerate(rows):
+        senses = facts.measures_current
         each = ET.SubElement(system, "joint", name=f"joint{joint}")
         command = ET.SubElement(each, "command_interface", name="position")
         _add_params(command, {"min": repr(-limit), "max": repr(limit)})

@@ -47,7 +47,7 @@ class PitchFitter:
         ends = (end / robot.link_count for end in robot.link_ends)
         self._half_m = np.array(robot.radii_at_m(tuple(ends)))
         self._pitch = np.array(robot.pitch_joints, dtype=np.intp)
-        self._limit_rad = robot.pitch_limit_rad
+        self._limit_rad = np.array(robot.limit_rad)[self._pitch]
         self._joints = robot.joint_count
         behind = np.arange(robot.joint_count + 1)[:, None] > self._pitch
         self._behind = behind.astype(float)

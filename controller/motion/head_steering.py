@@ -50,7 +50,8 @@ class HeadSteering:
         self.source, self.target = source, target
         self._neck = np.array(robot.yaw_joints[:neck_joints])
         self._robot = robot
-        self._reach = RANGE_SHARE * robot.yaw_limit_rad
+        limit_rad = np.array(robot.limit_rad)[self._neck]
+        self._reach = RANGE_SHARE * limit_rad
         self._limiter = RateLimiter(
             source.goal_rad()[self._neck],
             robot.joint_speed_limit_rad_s,
@@ -91,8 +92,7 @@ class HeadSteering:
         self._last_rad = shoulders
         heading = float(wrap(self.target.heading_from(view.link_m[0]) - shoulders))
         each = (heading - LEAD_S * self._swing_rad_s) / len(self._neck)
-        each = min(max(each, -self._reach), self._reach)
-        angles = self._limiter.step(dt_s, np.full(len(self._neck), each))
+        angles = self._limiter.step(dt_s, np.clip(each, -self._reach, self._reach))
         return self._with_neck(goal, angles)
 
     def _with_neck(self, joints: Floats, neck: Floats) -> Floats:

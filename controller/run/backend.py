@@ -96,7 +96,7 @@ def simulated(
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     servo = robot.servo
     line = SimLine(
-        ServoBank(robot.servo_ids, robot.servo_models, servo.baud),
+        ServoBank(robot.servo_ids, robot.servo_records, servo.baud),
         body,
         baud=servo.baud,
         mounting=deviation.mounting(robot),
@@ -204,7 +204,7 @@ def split(
     baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
     imu = plant_imu(robot, plant, baud, run.seed)
     bank = ServoBank(
-        [robot.servo_ids[row] for row in rows], [robot.servo_models[row] for row in rows], baud
+        [robot.servo_ids[row] for row in rows], [robot.servo_records[row] for row in rows], baud
     )
     line = SimLine(
         bank,

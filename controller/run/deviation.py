@@ -45,15 +45,10 @@ class Deviation:
         """Return the body that the physics has."""
         if self.load_kg is None:
             return robot
-        links = [link.model_dump() for link in robot.links] or [{}] * robot.link_count
         masses_kg = np.array(robot.link_masses_kg) + self.load_kg
         if robot.stereo_head is not None:  # the robot adds it again
             masses_kg[robot.stereo_head.link] -= robot.stereo_head.mass_kg
-        loaded = [
-            link | {"mass_kg": float(mass_kg)}
-            for link, mass_kg in zip(links, masses_kg, strict=True)
-        ]
-        return RobotConfig.model_validate(robot.model_dump() | {"links": loaded})
+        return robot.with_link_masses(masses_kg)
 
     def world(self, world: WorldConfig) -> WorldConfig:
         """Return the ground that the physics has."""

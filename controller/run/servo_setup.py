@@ -6,7 +6,6 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.drivers.bus.budget import robot_budget
-from snakewalk.sim.servo.models import MODELS
 
 GAIT_PITCH_SHARE = 0.75
 """Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
@@ -20,15 +19,15 @@ def check_supply(robot: RobotConfig) -> None:
         InputError: with the model's range of voltages, and the one that its page recommends.
 
     """
-    for model in dict.fromkeys(robot.servo_models):
-        facts = MODELS.get(model)
-        if facts is None:  # what another servo takes is not known here
+    for facts in robot.models_by_id.values():
+        if facts.motor is None:  # its file does not state it
             continue
-        low_v, high_v = (tenths / 10.0 for tenths in facts.volts)
+        low_v, high_v = facts.motor.voltage_v
         if not low_v <= robot.servo.supply_v <= high_v:
             raise InputError(
-                f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {model} takes "
-                f"{low_v:g} to {high_v:g} V; recommended: supply_v = {facts.nominal_v:g}"
+                f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {facts.model} "
+                f"takes {low_v:g} to {high_v:g} V; recommended: supply_v = "
+                f"{facts.motor.nominal_v:g}"
             )
 
 

@@ -216,10 +216,12 @@ class RollPlanner:
 
     def _arc_m(self, centre_m: Floats, heading_rad: float, bend_rad: float) -> Floats:
         """Centres (L, 2) of links that lie in an arc."""
-        links = self._robot.link_count
-        angle = heading_rad + bend_rad * (0.5 - (np.arange(links) + 0.5) / links)
-        steps_m = -self._robot.link_length_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        at_m = np.cumsum(steps_m, axis=0)
+        ends = np.array(self._robot.link_ends)
+        angle = heading_rad + bend_rad * (0.5 - 0.5 * (ends[:-1] + ends[1:]) / ends[-1])
+        forward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        lengths_m = np.array(self._robot.link_lengths_m)[:, None]
+        at_m = np.cumsum(-lengths_m * forward, axis=0)  # their ends towards the tail
+        at_m += 0.5 * (lengths_m - self._robot.mean_link_length_m) * forward
         return np.asarray(centre_m + at_m - at_m.mean(axis=0))
 
     def _height_m(self, points_m: Floats) -> float:

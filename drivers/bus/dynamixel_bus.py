@@ -25,7 +25,12 @@ from snakewalk.drivers.bus.probe import Probe, broadcast_ping, probe
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
 from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort, reopen
-from snakewalk.drivers.protocol.control_table import ControlTable, Register, load_control_table
+from snakewalk.drivers.protocol.control_table import (
+    ControlTable,
+    Model,
+    Register,
+    load_control_table,
+)
 from snakewalk.drivers.protocol.packet import (
     ALERT,
     BITS_PER_BYTE,
@@ -62,7 +67,7 @@ class DynamixelBus:
     def __init__(
         self,
         port: BytePort,
-        model: str | Mapping[int, str] = "XM430-W350",
+        model: Model | Mapping[int, Model] = "XM430-W350",
         *,
         latency_s: float = 0.004,
         tries: int = 3,
@@ -71,8 +76,8 @@ class DynamixelBus:
 
         Args:
             port: the line.
-            model: of all servos, or of each by its ID; servos that are not listed are taken for
-                the first.
+            model: model of all servos, or of each by its ID; a servo that is not listed is taken
+                for the first. A model is a name, a file or a record.
             latency_s: how long adapter and driver may hold bytes back.
             tries: how often a transaction is begun at most.
 
@@ -81,9 +86,9 @@ class DynamixelBus:
 
         """
         self.port = port
-        models = {} if isinstance(model, str) else dict(model)
+        models = dict(model) if isinstance(model, Mapping) else {}
         self._tables = {servo_id: load_control_table(each) for servo_id, each in models.items()}
-        first = model if isinstance(model, str) else next(iter(models.values()))
+        first = next(iter(models.values())) if isinstance(model, Mapping) else model
         self.table: ControlTable = load_control_table(first)
         """Of the model, or of the first one."""
         self.latency_s = latency_s

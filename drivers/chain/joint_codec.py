@@ -20,7 +20,7 @@ from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import ControlTable
 from snakewalk.drivers.protocol.packet import ALERT
-from snakewalk.drivers.protocol.registers import LOAD_UNIT, PWM_FULL, VOLTAGE_UNIT_V, ServoUnits
+from snakewalk.drivers.protocol.registers import LOAD_UNIT, VOLTAGE_UNIT_V, ServoUnits
 from snakewalk.drivers.types import JointState
 
 S = TypeVar("S", bound=np.generic)
@@ -43,11 +43,22 @@ class JointUnits:
     limits_raw: Int32s
     """(J, 2) least and greatest raw goal; in position mode the servo checks them."""
     measures_current: Bools
-    """(J,) False where the current is the share of full output, times the stall current."""
+    """(J,) False if the current is the share of full output, times the stall current."""
+    limits_current: Bools
+    """(J,) False if the servo has no current-based position control."""
+    stall_current_a: Floats
+    """(J,)"""
+    full_pwm: Int32s
+    """(J,) Goal PWM of full output."""
 
     @staticmethod
     def of(robot: RobotConfig, servos: Sequence[ServoUnits]) -> "JointUnits":
-        """Units of a robot's joints, with the scales of their servos (J)."""
+        """Units of a robot's joints, with the scales of their servos (J).
+
+        Raises:
+            ControlTableError: the output of a pitch joint cannot be limited.
+
+        """
         sign = np.array(robot.signs, np.float64)
         step_rad = np.array([servo.rad_per_position for servo in servos])
         places = zip(robot.zeros_rad, servos, strict=True)
@@ -55,6 +66,13 @@ class JointUnits:
         half = [
             math.floor(limit / step) for limit, step in zip(robot.limit_rad, step_rad, strict=True)
         ]
+        for joint, (axis, servo) in enumerate(zip(robot.all_axes, servos, strict=True)):
+            if axis == "p" and not servo.limits_current and math.isnan(servo.stall_current_a):
+                raise ControlTableError(
+                    f"{robot.joint_name(joint)}: {robot.servo_models[joint]} has no current-based "
+                    "position control, so its output is limited as a share of the stall current; "
+                    "its file gives none: docs/how-to/add-a-servo-model.md"
+                )
         return JointUnits(
             np.array(zero, np.int32),
             sign * step_rad,
@@ -62,6 +80,9 @@ class JointUnits:
             sign * np.array([servo.a_per_current for servo in servos]),
             np.array([(z - h, z + h) for z, h in zip(zero, half, strict=True)], np.int32),
             np.array([servo.measures_current for servo in servos]),
+            np.array([servo.limits_current for servo in servos]),
+            np.array([servo.stall_current_a for servo in servos]),
+            np.array([servo.full_pwm for servo in servos], np.int32),
         )
 
     def position_rad(self, joint: int, raw: int) -> float:
@@ -73,9 +94,11 @@ class JointUnits:
         return round(current_a / abs(float(self.a_per_current[joint])))
 
     def pwm_raw(self, joint: int, current_a: float, most: int) -> int:
-        """Goal PWM(100), 1 to ``most``, at which a joint without a sensor draws that at rest."""
-        share = current_a * LOAD_UNIT / abs(float(self.a_per_current[joint]))
-        return min(most, max(1, round(PWM_FULL * share)))
+        """Goal PWM, 1 to ``most``, at which a joint at rest draws ``current_a``."""
+        full_a = float(self.stall_current_a[joint])
+        if not self.measures_current[joint]:
+            full_a = abs(float(self.a_per_current[joint])) / LOAD_UNIT
+        return min(most, max(1, round(self.full_pwm[joint] * current_a / full_a)))
 
 
 class GoalEncoder:

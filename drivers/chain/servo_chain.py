@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s
-from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
+from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
@@ -86,7 +86,7 @@ class ServoChain:
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
         tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
-        self._units = JointUnits.of(robot, [ServoUnits.of(table) for table in tables])
+        self._units = JointUnits.of(robot, [ServoUnits.of(table.facts) for table in tables])
         # rounded up: at least the time that was asked for
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
@@ -101,7 +101,7 @@ class ServoChain:
         self._reads = 0
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
-        stall_a = [STALL_CURRENT_A.get(model, math.inf) for model in robot.servo_models]
+        stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
         names = [robot.joint_name(joint) for joint in range(robot.joint_count)]
         self._sensors = TemperatureSensors(names, np.array(stall_a))
         self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)

@@ -20,7 +20,6 @@ from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
     NO_SECONDARY_ID,
     POSITION_MODE,
-    PWM_FULL,
     RETURN_DELAY_UNIT_S,
     REVERSE,
     SHUTDOWN_ALARMS,
@@ -58,8 +57,6 @@ _SETTINGS = (
 """What ``configure`` looks at."""
 ALL_REPLY = 2
 """Status Return Level(68)."""
-FAST_READ_FIRMWARE = 45
-"""First firmware with fast sync read (e-manual, DYNAMIXEL Protocol 2.0, Fast Sync Read)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +65,7 @@ class ServoReport:
 
     servo_id: int
     model: str
-    """Name of its model number; the number where the SDK has no name."""
+    """Name of its model number; the number itself if no file has it."""
     firmware: int
     hardware_error: int
     return_delay_s: float
@@ -77,7 +74,9 @@ class ServoReport:
     temperature_c: float
     voltage_v: float
     registers: Mapping[str, int]
-    """Where it stands, and what a chain sets in its RAM, as far as the model has it."""
+    """Present position, and the RAM registers that a chain sets, if the model has them."""
+    fast_reads: bool
+    """Whether its firmware has fast sync read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +89,7 @@ class Inspection:
     @property
     def fast_reads(self) -> bool:
         """Whether every firmware knows fast sync read."""
-        return all(servo.firmware >= FAST_READ_FIRMWARE for servo in self.servos)
+        return all(servo.fast_reads for servo in self.servos)
 
 
 def inspect(
@@ -127,9 +126,10 @@ def inspect(
     servos = []
     for servo_id, servo in found.items():
         joint = robot.joint_name(robot.servo_ids.index(servo_id))
-        name = model_numbers().get(servo.model_number, f"number {servo.model_number}")
         table = bus.table_of(servo_id)
+        name = table.model
         if servo.model_number != table.model_number:
+            name = model_numbers().get(servo.model_number, f"number {servo.model_number}")
             text = f"{joint}: is a {name}, not a {table.model}"
             faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
             continue
@@ -165,6 +165,7 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
         temperature_c=float(values["Present Temperature"]),
         voltage_v=values["Present Input Voltage"] * VOLTAGE_UNIT_V,
         registers=values,
+        fast_reads=table.facts.has_fast_reads(values["Firmware Version"]),
     )
 
 
@@ -199,7 +200,7 @@ def chain_settings(
     """
     low, high = units.limits_raw[joint]
     pitch = robot.all_axes[joint] == "p"
-    limits_current = pitch and bool(units.measures_current[joint])
+    limits_current = pitch and bool(units.limits_current[joint])
     if pitch and not limits_current:  # such a model is as soft as its output is small
         goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
     return (
@@ -278,15 +279,16 @@ def _configure_joint(
     on_event: Callable[[str], None],
 ) -> dict[str, int]:
     name, pwm_limit = robot.joint_name(joint), found["PWM Limit"]
+    full = int(units.full_pwm[joint])
     if pwm_limit == 0:
-        raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {PWM_FULL}")
+        raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {full}")
     settings = list(chain_settings(robot, units, joint, pwm_limit))
-    if robot.all_axes[joint] == "p" and units.measures_current[joint]:
+    if robot.all_axes[joint] == "p" and units.limits_current[joint]:
         settings.append(_current_setting(robot, units, joint, found["Current Limit"]))
     settings.append(ChainSetting(IDENTITY, identity(joint)))
     values = _apply(bus, robot, joint, settings, found, on_event)
-    if pwm_limit < PWM_FULL:
-        on_event(f"{name}: PWM Limit is {pwm_limit} of {PWM_FULL}: weak and slow")
+    if pwm_limit < full:
+        on_event(f"{name}: PWM Limit is {pwm_limit} of {full}: weak and slow")
     if values["Drive Mode"] & REVERSE:
         on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
     before = found.get(IDENTITY, 0)

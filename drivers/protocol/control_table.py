@@ -1,28 +1,18 @@
-"""Control tables of the servo models, read from the files that the DYNAMIXEL SDK ships."""
+"""Control tables of the servo models, from their files in `config/servos`."""
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.servo_catalogue import models_by_number, servo_model, shipped_models
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.errors import ControlTableError
 
-# The files mark only four registers as signed. These are all two's complement registers of the X,
-# MX(2.0), P and PRO series in the e-manual (negative values in the column "Range").
-_SIGNED = frozenset(
-    {
-        *("Homing Offset", "Goal PWM", "Goal Current", "Goal Velocity", "Goal Position"),
-        *("Present PWM", "Present Load", "Present Current", "Present Velocity", "Present Position"),
-        *("Velocity Trajectory", "Position Trajectory"),
-        *("Max Position Limit", "Min Position Limit"),
-    }
-)
-
-_SHUTDOWN_ADDRESS = 63
-"""Of the layout that has Startup Configuration at 60."""
+Model = str | ServoModel
+"""Servo model by its name, or as a file describes it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,25 +45,38 @@ class Register:
             ) from None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ControlTable:
-    """Registers of one model, and the scales in its file."""
+    """Registers of one model."""
 
-    model: str
-    """As printed on the servo: ``XM430-W350``."""
-    model_number: int
+    facts: ServoModel
     registers: Mapping[str, Register]
-    zero_position: int
-    """Raw position of 0 rad: straight."""
-    rad_per_position: float
-    rad_s_per_velocity: float | None
-    """None where the file gives none."""
+
+    @property
+    def model(self) -> str:
+        """Name as printed on the servo: ``XM430-W350``."""
+        return self.facts.model
+
+    @property
+    def model_number(self) -> int:
+        """Register 0."""
+        return self.facts.model_number
+
+    @property
+    def zero_position(self) -> int:
+        """Raw position of 0 rad: straight."""
+        return self.facts.units.zero_position
+
+    @property
+    def rad_per_position(self) -> float:
+        """Angle of one position."""
+        return self.facts.rad_per_position
 
     def register(self, name: str) -> Register:
-        """Look a register up by the SDK's name, ``Present Position``.
+        """Look up a register by its name in the e-manual, ``Present Position``.
 
         Raises:
-            ControlTableError: this model has none of that name.
+            ControlTableError: this model has no register of that name.
 
         """
         try:
@@ -99,85 +102,63 @@ class ControlTable:
         return iter(self.registers)
 
 
-@cache
 def model_numbers() -> Mapping[int, str]:
-    """Names of all servos that the SDK knows, by model number."""
-    lines = (_folder() / "dynamixel.model").read_text(encoding="utf-8").splitlines()[1:]
-    numbers = (line.split("\t") for line in lines if line.strip())
-    return MappingProxyType({int(n): _printed(file.strip()) for n, file in numbers})
+    """Names of the known servos of Protocol 2.0 by model number.
+
+    They include those of the files in the folder ``servos`` of the working directory.
+    """
+    return models_by_number(Path())
 
 
 def model_of(model_number: int) -> str:
     """Name of a model number (register 0).
 
     Raises:
-        ControlTableError: the SDK does not know it.
+        ControlTableError: no file describes it.
 
     """
     try:
         return model_numbers()[model_number]
     except KeyError:
-        raise ControlTableError(f"model number {model_number} is none that the SDK knows") from None
+        raise ControlTableError(
+            f"model number {model_number} is not known; describe the model in a file: "
+            "docs/how-to/add-a-servo-model.md"
+        ) from None
 
 
-@cache
-def load_control_table(model: str) -> ControlTable:
-    """Control table of ``XM430-W350``; upper or lower case, ``_`` or ``-``.
+def load_control_table(model: Model) -> ControlTable:
+    """Control table of a model.
+
+    Args:
+        model: ``XM430-W350``, in any case and with ``_`` or ``-``; a path of its file; or its
+            record.
 
     Raises:
-        ControlTableError: the SDK has no table of that name, or is not installed.
+        ControlTableError: there is no such model, or it has another protocol.
 
     """
-    printed = _printed(model)
-    number = next((n for n, name in model_numbers().items() if name == printed), None)
-    if number is None:
-        shown = ", ".join(sorted(model_numbers().values()))
-        raise ControlTableError(f"{model}: no such servo; the SDK has tables of {shown}")
-    path = _folder() / f"{printed.lower().replace('-', '_')}.model"
-    sections = _sections(path.read_text(encoding="utf-8"))
-    info = {row[0]: float(row[1]) for row in sections["type info"]}
-    units = {row[0]: float(row[1]) for row in sections["unit info"]}
-    registers: dict[str, Register] = {}
-    for address, size, name, *_ in sections["control table"]:
-        registers.setdefault(name, Register(name, int(address), int(size), name in _SIGNED))
-    shutdown = registers.get("Shutdown")
-    if shutdown is not None and shutdown.address == _SHUTDOWN_ADDRESS:
-        # in the e-manual's tables from firmware 45 (330: 46) on, but not in the SDK's files
-        startup = Register("Startup Configuration", 60, 1, signed=False)
-        registers.setdefault(startup.name, startup)
-    zero = int(info["value_of_zero_radian_position"])
-    # the lowest value is exactly -pi; on some models the highest is one step below +pi
-    steps = zero - int(info["value_of_min_radian_position"])
-    return ControlTable(
-        model=printed,
-        model_number=number,
-        registers=MappingProxyType(registers),
-        zero_position=zero,
-        rad_per_position=math.pi / steps,
-        rad_s_per_velocity=units.get("Present Velocity"),
-    )
-
-
-def _printed(name: str) -> str:
-    return name.removesuffix(".model").upper().replace("_", "-")
-
-
-def _sections(text: str) -> dict[str, list[list[str]]]:
-    """Rows of each ``[section]`` without its heading line."""
-    sections: dict[str, list[list[str]]] = {"type info": [], "unit info": [], "control table": []}
-    rows: list[list[str]] = []
-    for line in text.splitlines():
-        cells = [cell.strip() for cell in line.split("\t")]
-        if line.startswith("["):
-            rows = sections.setdefault(line.strip().strip("[]"), [])
-        elif len(cells) > 1 and cells[0] not in ("name", "Data Name", "Address"):
-            rows.append(cells)
-    return sections
+    return _named(model) if isinstance(model, str) else _table(model)
 
 
 @cache
-def _folder() -> Path:
-    package = find_spec("dynamixel_easy_sdk")  # without importing it
-    if package is None or package.origin is None:
-        raise ControlTableError("the DYNAMIXEL SDK is not installed: pip install dynamixel-sdk")
-    return Path(package.origin).parent / "control_table"
+def _named(model: str) -> ControlTable:
+    try:
+        return _table(servo_model(model, Path()))
+    except ConfigError as error:
+        raise ControlTableError(error.faults) from None
+
+
+def _table(facts: ServoModel) -> ControlTable:
+    if facts.protocol != 2:
+        usable = ", ".join(name for name in shipped_models() if servo_model(name).protocol == 2)
+        raise ControlTableError(
+            f"{facts.model}: has Protocol 1.0; known models of Protocol 2.0 are {usable}"
+        )
+    registers = {
+        name: Register(name, row.address, row.size, row.signed)
+        for name, row in facts.registers.items()
+    }
+    for address, data, _ in facts.indirect[:1]:
+        for name, at, size in (("Indirect Address 1", address, 2), ("Indirect Data 1", data, 1)):
+            registers[name] = Register(name, at, size, signed=False)
+    return ControlTable(facts, MappingProxyType(registers))

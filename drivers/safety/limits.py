@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
-from snakewalk.config.run import FULL_OUTPUT_RAD, SafetyConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 STEP_SLACK_RAD, STEP_RATE = 0.2, 2.0
@@ -86,9 +86,9 @@ class SafetyLimits:
 def _output(robot: RobotConfig) -> Floats:
     """(3, J) as ``SafetyLimits.output``; the first row is 0 for a joint that cannot be judged."""
     rows = []
-    joints = zip(robot.servo_models, robot.position_p_gains, robot.current_limits_a, strict=True)
-    for model, gain, limit_a in joints:
-        stall_a = STALL_CURRENT_A.get(model, 0.0)
+    joints = zip(robot.servo_records, robot.position_p_gains, robot.current_limits_a, strict=True)
+    for facts, gain, limit_a in joints:
+        stall_a = facts.stall_current_a or 0.0
         is_judged = stall_a > 0.0 and limit_a >= _LEAST_LIMIT_A
-        rows.append((gain / FULL_OUTPUT_RAD if is_judged else 0.0, stall_a, limit_a))
+        rows.append((gain / facts.full_output_rad if is_judged else 0.0, stall_a, limit_a))
     return np.array(rows).T.copy()

@@ -1,4 +1,4 @@
-"""Alarms of an AX-12A: a blocked shaft, heat, a supply out of range.
+"""Alarms of a servo of Protocol 1.0: a blocked shaft, heat, a supply out of range.
 
 An alarm is a bit of the error byte of every answer while its cause lasts. Those in the mask of
 Shutdown(18) also set Torque Limit(34) to 0 and switch the torque off, and stay until the cause is

@@ -1,43 +1,51 @@
-"""AX-12A servos: the control table drives the motors, and shows their shafts (e-manual, AX-12A)."""
+"""Servos of Protocol 1.0: the control table drives the motors and shows their shafts (AX-12A)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.config.errors import InputError
-from snakewalk.drivers.protocol.registers import VELOCITY_UNIT_RAD_S
+from snakewalk.config.servo_catalogue import servo_model
+from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.sim.ax12.alarms import Ax12Alarms
 from snakewalk.sim.ax12.protocol1 import MAX_ID, Error1
-from snakewalk.sim.ax12.table import AT, CELLS, EEPROM_END, MODEL, TABLE_BYTES, Cell
+from snakewalk.sim.ax12.table import MODEL, end_of, initial_value
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MotorModel, make_drive
 from snakewalk.sim.servo.profile import Trajectory
 
-CENTRE_TICKS, TICKS_PER_RAD = 512, 1023.0 / np.radians(300.0)
-SPEED_UNIT_RAD_S = 0.111 * 2.0 * np.pi / 60.0
-"""Moving Speed(32), Present Speed(38)."""
 SLICE_S = 2e-3
 WHEEL_GAIN = 1e-9
 CLOCKWISE = 0x400
 """Bit 10: the direction of speeds and loads."""
 TURN_RAD = 2.0 * np.pi
-AX12_MOTOR = MotorModel(12.0, 1.5, 1.5, 59.0 * 2.0 * np.pi / 60.0, 1e-3, 1.0, 0.050, 12.0, 150.0)
-"""E-manual AX-12A: 1.5 N m at 12 V and 1.5 A, 59 rev/min; standby from the AX series; heat ours."""
 
 
 class Ax12Servos:
-    """S servos on the shafts of ``plant``.
+    """S servos of one model on the shafts of ``plant``.
 
     Raises:
-        InputError: an ID is out of 0 to 253 or used twice.
+        InputError: an ID is out of 0 to 253 or used twice, or the model cannot be simulated.
 
     """
 
-    def __init__(self, ids: tuple[int, ...], plant: Plant, supply_v: float = 12.0) -> None:
+    def __init__(
+        self,
+        ids: tuple[int, ...],
+        plant: Plant,
+        supply_v: float | None = None,
+        facts: ServoModel | None = None,
+    ) -> None:
+        """Set up new servos; the defaults are AX-12A at the recommended supply."""
+        self.facts = facts = servo_model(MODEL) if facts is None else facts
+        motor = MotorModel.of(facts)
+        supply_v = motor.nominal_v if supply_v is None else supply_v
         wrong = [
-            f"ID {each}: an {MODEL} has 0 to {MAX_ID}" for each in ids if not 0 <= each <= MAX_ID
+            f"ID {each}: an {facts.model} has 0 to {MAX_ID}"
+            for each in ids
+            if not 0 <= each <= MAX_ID
         ]
         if len(set(ids)) != len(ids):
             wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
@@ -45,19 +53,21 @@ class Ax12Servos:
             raise InputError(wrong)
         servos = len(ids)
         self.plant = plant
-        self.table = np.zeros((servos, TABLE_BYTES), np.uint8)
-        self.drive = make_drive([AX12_MOTOR] * servos, supply_v)
-        self._views = {name: self._view(cell) for name, cell in CELLS.items()}
+        self._per_rad, self._centre = facts.positions_per_rad, facts.units.zero_position
+        self._starts = {row.address: name for name, row in facts.registers.items()}
+        self.table = np.zeros((servos, end_of(facts.registers)), np.uint8)
+        self.drive = make_drive([motor] * servos, supply_v)
+        self._views = {name: self._view(cell) for name, cell in facts.registers.items()}
         self.blocked_shaft = BlockedShaft(self.drive)
         self.protection = Ax12Alarms(
-            self._views.__getitem__, self.drive, AX12_MOTOR, self.blocked_shaft, supply_v
+            self._views.__getitem__, self.drive, motor, self.blocked_shaft, supply_v
         )
         self.events = EventQueue()
         """Events that happen to the servos at a time of their own, such as faults."""
         self.powered = np.ones(servos, bool)
         """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
         self._no_output = np.zeros(servos, bool)
-        self._trajectory = Trajectory(servos)
+        self._trajectory = Trajectory(servos, facts.rad_s_per_velocity, np.nan)
         self._turn_rad = np.zeros(servos)
         self._registered: dict[int, tuple[int, bytes]] = {}
         self._time_s = plant.time_s
@@ -78,16 +88,17 @@ class Ax12Servos:
         """Error bits that a write of ``data`` would answer; nothing is written."""
         at = address
         while at < address + len(data):
-            name = AT.get(at)
+            name = self._starts.get(at)
             if name is None:
                 return Error1.INSTRUCTION
-            cell = CELLS[name]
+            cell = self.facts.registers[name]
             raw = data[at - address : at - address + cell.size]
-            locked = at < EEPROM_END and self["Lock"][row]
-            if len(raw) < cell.size or locked or cell.low is None or cell.high is None:
+            locked = at < self.facts.ram_from and self["Lock"][row]
+            if len(raw) < cell.size or locked or cell.range is None:
                 return Error1.INSTRUCTION
             value = int.from_bytes(raw, "little")
-            if not cell.low <= value <= cell.high or (name == "Lock" and value < self[name][row]):
+            unlocks = name == "Lock" and value < self[name][row]
+            if not cell.range[0] <= value <= cell.range[1] or unlocks:
                 return Error1.RANGE
             if name == "Goal Position" and not self._wheel()[row]:
                 low, high = int(self["CW Angle Limit"][row]), int(self["CCW Angle Limit"][row])
@@ -102,10 +113,10 @@ class Ax12Servos:
         if error:
             return error
         self.table[row, address : address + len(data)] = np.frombuffer(data, np.uint8)
-        touched = range(address, address + len(data))
-        if CELLS["Torque Limit"].address in touched and self["Torque Limit"][row]:
+        rows, touched = self.facts.registers, range(address, address + len(data))
+        if rows["Torque Limit"].address in touched and self["Torque Limit"][row]:
             self.protection.reset(row)
-        if CELLS["Goal Position"].address in touched:  # a goal switches the torque on
+        if rows["Goal Position"].address in touched:  # a goal switches the torque on
             self["Torque Enable"][row] = 1
         return 0
 
@@ -125,16 +136,16 @@ class Ax12Servos:
 
     def reset(self, row: int) -> None:
         """Set factory values, the ID too; then reboot."""
-        for name, cell in CELLS.items():
-            self[name][row] = cell.initial
+        for name in self.facts.registers:
+            self[name][row] = initial_value(self.facts, name)
         self.reboot(row)
 
     # power, blocked shafts, time
 
     def reboot(self, row: int) -> None:
         """Restart: initial RAM, Torque Limit(34) = Max Torque(14), goal = present position."""
-        for name, cell in CELLS.items():
-            if cell.address >= EEPROM_END:
+        for name, cell in self.facts.registers.items():
+            if cell.address >= self.facts.ram_from:
                 self[name][row] = cell.initial
         self["Torque Limit"][row] = self["Max Torque"][row]
         self._registered.pop(row, None)
@@ -183,9 +194,12 @@ class Ax12Servos:
     def refresh(self) -> None:
         """Write all present values into the table."""
         self._update_turns()
-        ticks = (self.plant.position_rad - self._turn_rad) * TICKS_PER_RAD + CENTRE_TICKS
-        self["Present Position"][:] = np.clip(np.rint(ticks), 0, 1023)
-        self["Present Speed"][:] = _signed(self.plant.velocity_rad_s / SPEED_UNIT_RAD_S)
+        ticks = (self.plant.position_rad - self._turn_rad) * self._per_rad + self._centre
+        _, last = self.facts.registers["Goal Position"].range or (0, 1023)
+        self["Present Position"][:] = np.clip(np.rint(ticks), 0, last)
+        self["Present Speed"][:] = _signed(
+            self.plant.velocity_rad_s / self.facts.rad_s_per_velocity
+        )
         self["Present Load"][:] = _signed(self.blocked_shaft.pwm() * 1023.0)
         self["Present Voltage"][:] = np.clip(np.rint(self.drive.supply_v * 10.0), 0, 255)
         celsius = np.rint(self.protection.temperature_c)
@@ -210,9 +224,10 @@ class Ax12Servos:
         shaft = self.plant.position_rad
         self._trajectory.restart(~on | wheel, shaft)
         self._update_turns()
-        goal = (self["Goal Position"].astype(float) - CENTRE_TICKS) / TICKS_PER_RAD
+        per_rad = self._per_rad
+        goal = (self["Goal Position"].astype(float) - self._centre) / per_rad
         goal += self._turn_rad
-        units = (speed & 1023).astype(np.float64) * (SPEED_UNIT_RAD_S / VELOCITY_UNIT_RAD_S)
+        units = (speed & 1023).astype(np.float64)
         still = np.where(on & ~wheel, goal, self._trajectory.goal).astype(np.float64)
         self._trajectory.set_goals(still, units, np.zeros(len(self)), np.zeros(len(self), bool))
         self._trajectory.advance(seconds, np.ones(len(self), bool))
@@ -220,21 +235,19 @@ class Ax12Servos:
         right = error < 0.0
         margin = np.where(right, self["CW Compliance Margin"], self["CCW Compliance Margin"])
         slope = np.where(right, self["CW Compliance Slope"], self["CCW Compliance Slope"])
-        inside = np.abs(error) * TICKS_PER_RAD <= margin
+        inside = np.abs(error) * per_rad <= margin
         push = np.where(speed & CLOCKWISE, -1.0, 1.0) * (speed & 1023) / 1023.0
-        gain = np.where(wheel | inside, WHEEL_GAIN, TICKS_PER_RAD / slope)
+        gain = np.where(wheel | inside, WHEEL_GAIN, per_rad / slope)
         drive.torque_on[:] = on
         drive.p_gain_per_rad[:] = gain
-        aim = np.where(
-            inside, shaft, self._trajectory.position - np.sign(error) * margin / TICKS_PER_RAD
-        )
+        aim = np.where(inside, shaft, self._trajectory.position - np.sign(error) * margin / per_rad)
         drive.goal_rad[:] = np.where(wheel, push / WHEEL_GAIN, aim)
         full = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
         drive.pwm_limit[:] = np.where(self._no_output, 0.0, full)
         drive.current_limit_a[:] = np.inf
         self.blocked_shaft.hold()
 
-    def _view(self, cell: Cell) -> NDArray[np.unsignedinteger]:
+    def _view(self, cell: RegisterRow) -> NDArray[np.unsignedinteger]:
         block = self.table[:, cell.address : cell.address + cell.size]
         return block.view(f"<u{cell.size}")[:, 0]
 

@@ -1,4 +1,4 @@
-"""Decoder of Protocol 1.0 into words, packet by packet, with the registers of an AX-12A.
+"""Decoder of Protocol 1.0 into words, packet by packet, with the registers of one model.
 
 A status packet looks like an instruction packet. A packet with the ID of the last instruction, and
 of the length that its reply must have, is taken for the reply; so an instruction that gets no reply
@@ -7,8 +7,10 @@ and is repeated at once looks like one with a reply.
 
 from collections.abc import Iterator
 
+from snakewalk.config.servo_catalogue import servo_model
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, Packet1, Reader1, frame
-from snakewalk.sim.ax12.table import CELLS
+from snakewalk.sim.ax12.table import MODEL
 from snakewalk.sim.sniff.decode import DecodedPacket
 
 GAP_S = 5e-3
@@ -20,7 +22,9 @@ REPLY_MAX_S = 0.1
 class Decoder1:
     """Bytes of a bus in, lines out."""
 
-    def __init__(self) -> None:
+    def __init__(self, facts: ServoModel | None = None) -> None:
+        """Decode with the registers of a model; default: AX-12A."""
+        self._registers = (servo_model(MODEL) if facts is None else facts).registers
         self._reader = Reader1()
         self._asked: Packet1 | None = None
         self._asked_s = self._last_s = 0.0
@@ -58,13 +62,13 @@ class Decoder1:
         name = Instruction1(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
         values: dict[str, object] = {}
         if code == Instruction1.READ and len(params) == 2:
-            values = dict.fromkeys(_values(params[0], bytes(params[1])), "?")
+            values = dict.fromkeys(self._values(params[0], bytes(params[1])), "?")
         elif code in (Instruction1.WRITE, Instruction1.REG_WRITE) and len(params) > 1:
-            values = _values(params[0], params[1:])
+            values = self._values(params[0], params[1:])
         elif code == Instruction1.SYNC_WRITE and len(params) > 1:
             address, size = params[0], params[1]
             for at in range(2, len(params) - size, size + 1):
-                part = _values(address, params[at + 1 : at + 1 + size])
+                part = self._values(address, params[at + 1 : at + 1 + size])
                 values |= {f"{params[at]}: {key}": value for key, value in part.items()}
         return DecodedPacket(time_s, "question", packet.servo_id, name, values, raw)
 
@@ -73,7 +77,7 @@ class Decoder1:
         if asked is not None and asked.servo_id != BROADCAST_ID:
             self._asked = None
             if packet.params:
-                values = _values(asked.params[0], packet.params)
+                values = self._values(asked.params[0], packet.params)
         alarms = [
             each.name.lower().replace("_", " ") for each in Error1 if packet.instruction & each
         ]
@@ -81,13 +85,12 @@ class Decoder1:
             time_s, "answer", packet.servo_id, ", ".join(alarms) or "ok", values, raw
         )
 
-
-def _values(address: int, data: bytes) -> dict[str, object]:
-    """Registers that lie in a block."""
-    end = address + len(data)
-    found: dict[str, object] = {
-        name: int.from_bytes(data[cell.address - address :][: cell.size], "little")
-        for name, cell in CELLS.items()
-        if address <= cell.address and cell.address + cell.size <= end
-    }
-    return found or {f"{address}+{len(data)}": data.hex(" ")}
+    def _values(self, address: int, data: bytes) -> dict[str, object]:
+        """Registers that lie in a block."""
+        end = address + len(data)
+        found: dict[str, object] = {
+            name: int.from_bytes(data[cell.address - address :][: cell.size], "little")
+            for name, cell in self._registers.items()
+            if address <= cell.address and cell.address + cell.size <= end
+        }
+        return found or {f"{address}+{len(data)}": data.hex(" ")}

@@ -1,4 +1,4 @@
-"""AX-12A servos on the wire: Protocol 1.0."""
+"""Servos of Protocol 1.0 on the wire."""
 
 from collections.abc import Collection, Sequence
 from itertools import groupby
@@ -18,7 +18,6 @@ from snakewalk.sim.ax12.protocol1 import (
     Reader1,
     frame,
 )
-from snakewalk.sim.ax12.table import TABLE_BYTES
 from snakewalk.sim.line.bus_contention import Reply, bus_contention
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.wire import Wire
@@ -164,7 +163,7 @@ class Ax12Line(Wire):
             return 0, b""
         if code == Instruction1.READ and len(params) == 2:
             address, length = params
-            if not 0 < length <= TABLE_BYTES - address:
+            if not 0 < length <= servos.table.shape[1] - address:
                 return Error1.RANGE, b""
             servos.refresh()
             return 0, servos.table[row, address : address + length].tobytes()

@@ -72,8 +72,8 @@ class Mechanics:
         mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
-        legs = len(robot.limb_joints)
-        mass = np.array([*robot.link_masses_kg, *(robot.link_mass_kg,) * legs])
+        legs_kg = (robot.limbs[joint.pair].segment_mass_kg for joint in robot.limb_joints)
+        mass = np.array([*robot.link_masses_kg, *legs_kg])
         water = water_constants(world, robot)
         grip = mu.along, mu.across, mu.backward
         planes = TangentPlanes.of(model, ground)

@@ -1,12 +1,16 @@
 """Servos on a command line: ``1-16``, ``1,2,5-8:XL330-M288``, ``1-2:XL430-W250,3:XM540-W270``.
 
 A model holds for the IDs before it, back to the model before; IDs behind the last are of it, too.
+A model is a name, or the path of a file that describes it.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import ImuConfig
+from snakewalk.config.servo_catalogue import printed_name, servo_model
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.port.port_map import id_range
 from snakewalk.drivers.protocol.imu_table import IMU_TABLES
 
@@ -24,7 +28,17 @@ class ChainSpec:
     ids: tuple[int, ...]
     """In the order of the chain."""
     models: tuple[str, ...]
-    """Of each."""
+    """Name or file of each servo's model."""
+
+    def records(self) -> tuple[ServoModel, ...]:
+        """Record of each servo's model.
+
+        Raises:
+            InputError: there is no such model; or the faults of its file.
+
+        """
+        known = {model: servo_model(model, Path()) for model in self.kinds}
+        return tuple(known[model] for model in self.models)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -53,7 +67,8 @@ def parse_chain(text: str) -> ChainSpec:
             raise InputError(f"--servos {text}: {piece.strip()!r} names no model; {_EXAMPLE}")
         ids += id_range(numbers, f"--servos {text}", _EXAMPLE)
         if colon:
-            models += [model.upper().replace("_", "-")] * (len(ids) - len(models))
+            is_file = model.endswith(".toml")
+            models += [model if is_file else printed_name(model)] * (len(ids) - len(models))
     rest = models[-1] if models else DEFAULT_MODEL
     return ChainSpec(tuple(ids), (*models, *[rest] * (len(ids) - len(models))))
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 
 from snakewalk.sim.ax12.ax12 import Ax12Servos
-from snakewalk.sim.ax12.table import CELLS
 from snakewalk.sim.line.sim_line import SimLine
 
 COLUMNS = {
@@ -72,9 +71,13 @@ def servo_rows(line: SimLine) -> Rows:
 
 
 def ax12_rows(servos: Ax12Servos) -> Rows:
-    """One row an AX-12A."""
+    """One row for each servo of Protocol 1.0."""
     servos.refresh()
-    shown = ("ID", "Goal Position", *(name for name in CELLS if name.startswith("Present")))
+    shown = (
+        "ID",
+        "Goal Position",
+        *(name for name in servos.facts.registers if name.startswith("Present")),
+    )
     rows: Rows = []
     for row in range(len(servos)):
         values: dict[str, object] = {

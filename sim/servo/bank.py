@@ -5,19 +5,18 @@ What the registers *do* (drive the motor, show the shaft, run the watchdog) is i
 ``sim.servo.firmware``.
 """
 
+import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from snakewalk.config.arrays import Bytes, Indices, SignedInts
+from snakewalk.config.arrays import Bytes, Floats, Indices, SignedInts
+from snakewalk.config.servo_model import TABLE_BYTES, ServoModel
 from snakewalk.drivers.errors import ControlTableError
-from snakewalk.drivers.protocol.control_table import Register
+from snakewalk.drivers.protocol.control_table import Model, Register, load_control_table
 from snakewalk.drivers.protocol.packet import ALERT, ResultError
 from snakewalk.drivers.protocol.registers import (
-    BAUDS,
-    CURRENT_MODES,
-    EEPROM_END,
-    MODES,
     POSITION_MODE,
     VELOCITY_MODE,
     WATCHDOG_TRIPPED,
@@ -27,50 +26,95 @@ from snakewalk.sim.servo.register_rules import (
     GOALS,
     MODE_RESETS,
     ModelRegisters,
+    limit_of,
     registers_of,
 )
 
-TABLE_BYTES = 1024
+_SHARED = (
+    *("Torque Enable", "Goal Position", "Present Position", "Present Input Voltage"),
+    *("Status Return Level", "Bus Watchdog"),
+)
+"""Registers that show whether two models have the same layout."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServoScales:
+    """Units of S servos, (S,) each."""
+
+    positions_per_rad: Floats
+    positions_per_turn: Floats
+    zero_position: Floats
+    rad_s_per_velocity: Floats
+    rad_s2_per_acceleration: Floats
+    full_pwm: Floats
+    lowest_position: Floats
+    """Of one turn."""
+    homing_limit: Floats
+    """Infinite if there is none."""
+
+    @staticmethod
+    def of(models: Sequence[ServoModel]) -> "ServoScales":
+        """Scales of servos of these models."""
+        rows = [
+            (
+                *(m.positions_per_rad, m.units.positions_per_turn, m.units.zero_position),
+                *(m.rad_s_per_velocity, m.rad_s2_per_acceleration, m.units.full_pwm),
+                m.units.zero_position - m.units.positions_per_turn / 2.0,
+                math.inf if m.units.homing_limit is None else m.units.homing_limit,
+            )
+            for m in models
+        ]
+        return ServoScales(*np.array(rows, np.float64).reshape(-1, 8).T.copy())
 
 
 class ServoBank:
-    """S servos, factory new but for ID and baud rate, of one model or of one each.
+    """S servos with factory settings, except ID and baud rate, of one model or of several.
 
-    Most registers lie at the same address throughout the X series, so that a register is one column
-    over all servos; what a model has of its own, and its rules, are asked for by row.
+    The registers of a run are at the same address in all models of a bank, so that a register is
+    one column over all servos; other registers and the rules are looked up by row.
 
     Args:
         ids: in the order of the chain.
-        model: of all servos, or (S,) of each.
+        model: name, file or record; of all servos, or (S,) of each.
         baud: of all servos.
         clashing: two servos may share an ID, as they do in an unlucky chain.
 
     Raises:
-        ControlTableError: a model cannot be simulated, an ID is out of range or used twice, or the
-            baud rate is not one of a model's.
+        ControlTableError: a model cannot be simulated, two models have registers at different
+            addresses, an ID is out of range or used twice, or the baud rate is not one of a
+            model's.
 
     """
 
     def __init__(
         self,
         ids: Sequence[int],
-        model: str | Sequence[str] = "XM430-W350",
+        model: Model | Sequence[Model] = "XM430-W350",
         baud: int = 1_000_000,
         *,
         clashing: bool = False,
     ) -> None:
         self.ids = tuple(ids)
-        names = [model] * len(self.ids) if isinstance(model, str) else model
-        self._of_row = [registers_of(each.upper().replace("_", "-")) for each in names]
-        kinds = list({each.layout.model: each for each in self._of_row}.values())
+        several = model if isinstance(model, Sequence) and not isinstance(model, str) else None
+        models = [model] * len(self.ids) if several is None else several
+        by_name = {each.layout.model: each for each in map(registers_of, _different(models))}
+        self._of_row = [by_name[load_control_table(each).model] for each in models]
+        kinds = list(by_name.values())
         faults = [f"ID {each}: a servo has 0 to 252" for each in self.ids if not 0 <= each <= 252]
         if len(set(self.ids)) != len(self.ids) and not clashing:
             faults.append(f"two servos share an ID: {', '.join(map(str, sorted(self.ids)))}")
         faults += [
-            f"{baud} baud: {kind.layout.model} has {', '.join(map(str, kind.bauds))}"
+            f"{baud} baud: {kind.layout.model} has {', '.join(map(str, kind.facts.bauds))}"
             for kind in kinds
-            if baud not in kind.bauds
+            if baud not in kind.facts.bauds
         ]
+        faults += [
+            f"{kind.layout.model} and {kinds[0].layout.model} have {name} at different addresses: "
+            "they cannot be on one simulated line"
+            for kind in kinds[1:]
+            for name in _SHARED
+            if kind.layout[name] != kinds[0].layout[name]
+        ][:1]
         if faults:
             raise ControlTableError(faults)
         self.models = tuple(each.layout.model for each in self._of_row)
@@ -80,6 +124,7 @@ class ServoBank:
         self.table: Bytes = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
         rows = [self._rows_of(kind) for kind in kinds]
         self._kinds = tuple(zip(kinds, rows, strict=True))
+        self.scales = ServoScales.of([each.facts for each in self._of_row])
         self._registers = _in_one_place(kinds)
         self._columns = {name: self._column(each) for name, each in self._registers.items()}
         self._defined = np.zeros((len(self.ids), TABLE_BYTES), bool)
@@ -98,13 +143,16 @@ class ServoBank:
         self._backup: dict[int, bytes] = {}
         self.reset(np.arange(len(self.ids)), keep=())
         self["ID"][:] = self.ids
-        self["Baud Rate"][:] = BAUDS.index(baud)
+        self._codes = [
+            {rate: code for code, rate in enumerate(each.facts.bauds)} for each in self._of_row
+        ]
+        self["Baud Rate"][:] = [codes[baud] for codes in self._codes]
 
     def __len__(self) -> int:
         return len(self.ids)
 
     def __getitem__(self, name: str) -> SignedInts:
-        """(S,) live view of a register of all servos, by the SDK's name; 0 where one lacks it."""
+        """(S,) live view of a register of all servos; 0 for servos without it."""
         return self._columns[name]
 
     def __contains__(self, name: object) -> bool:
@@ -117,17 +165,27 @@ class ServoBank:
         return self._registers
 
     def register(self, name: str) -> Register:
-        """Address, size and sign of a register, also of those that the SDK's table lacks."""
+        """Address, size and sign of a register."""
         return self._registers[name]
 
     def has(self, row: int, name: str) -> bool:
         """Whether a servo has a register."""
         return name in self._of_row[row].registers
 
+    @property
+    def facts(self) -> tuple[ServoModel, ...]:
+        """(S,) records of the models."""
+        return tuple(each.facts for each in self._of_row)
+
+    def range_of(self, row: int, name: str) -> tuple[int, int]:
+        """Lowest and highest value that a register accepts; 0 and 0 if it is read-only."""
+        rule = self._of_row[row].rules[name]
+        return (rule.low or 0, rule.high or 0)
+
     def tuned_to(self, baud: int) -> Indices:
         """Rows of the servos that are tuned to ``baud``."""
-        index = BAUDS.index(baud) if baud in BAUDS else -1
-        return np.flatnonzero(self["Baud Rate"] == index)
+        codes = np.array([codes.get(baud, -1) for codes in self._codes])
+        return np.flatnonzero(self["Baud Rate"] == codes)
 
     def alert(self, rows: Indices | slice | int) -> Bytes:
         """Bit 7 of the error field: set while Hardware Error Status(70) is not 0."""
@@ -166,7 +224,7 @@ class ServoBank:
                 end = at + register.size
                 if end > start + len(run):
                     return ResultError.DATA_LENGTH
-                locked = at < EEPROM_END and (ram_only or self["Torque Enable"][row])
+                locked = at < own.facts.ram_from and (ram_only or self["Torque Enable"][row])
                 if not rule.writable or locked:
                     return ResultError.ACCESS
                 error = self._check_value(
@@ -207,21 +265,24 @@ class ServoBank:
             some = np.intersect1d(rows, own)
             for name, rule in kind.rules.items():
                 register = kind.registers[name]
-                if name not in keep and not (ram_only and register.address < EEPROM_END):
+                if name not in keep and not (ram_only and register.address < kind.facts.ram_from):
                     self._column(register)[some] = rule.initial
             for goal in GOALS[:3]:
                 if goal in kind.registers:
-                    self[goal][some] = self[_limit_of(goal)][some]
+                    self[goal][some] = self[limit_of(goal)][some]
         self._zero_goal_velocity(rows)
         for row in rows:
             self._registered.pop(int(row), None)
-            self["Backup Ready"][row] = int(row) in self._backup
+            if "Backup Ready" in self:
+                self["Backup Ready"][row] = int(row) in self._backup
         self.indirect.refresh()
 
     def back_up(self, row: int) -> ResultError:
         """Store the EEPROM and the saved part of the RAM; only with torque off (e-manual)."""
         if self["Torque Enable"][row]:
             return ResultError.RESULT_FAIL
+        if not self.has(row, "Backup Ready"):
+            return ResultError.INSTRUCTION
         self._backup[row] = self.table[row].tobytes()
         self["Backup Ready"][row] = 1
         return ResultError.NONE
@@ -230,7 +291,8 @@ class ServoBank:
         """Put the stored EEPROM back; the servo then reboots."""
         if self["Torque Enable"][row] or row not in self._backup:
             return ResultError.RESULT_FAIL
-        self.table[row, :EEPROM_END] = np.frombuffer(self._backup[row], np.uint8)[:EEPROM_END]
+        end = self._of_row[row].facts.ram_from
+        self.table[row, :end] = np.frombuffer(self._backup[row], np.uint8)[:end]
         return ResultError.NONE
 
     def restore_ram(self, row: int) -> None:
@@ -254,7 +316,7 @@ class ServoBank:
                 self[name][some] = kind.rules[name].initial
             for goal in ("Goal PWM", "Goal Current"):
                 if goal in kind.registers:
-                    self[goal][some] = self[_limit_of(goal)][some]
+                    self[goal][some] = self[limit_of(goal)][some]
         self._zero_goal_velocity(rows)
 
     def _zero_goal_velocity(self, rows: Indices) -> None:
@@ -269,7 +331,7 @@ class ServoBank:
         rule = self._of_row[row].rules[name]
         if rule.low is not None and rule.high is not None and not rule.low <= value <= rule.high:
             return ResultError.DATA_RANGE
-        if name == "Operating Mode" and not self._has_mode(row, value):
+        if name == "Operating Mode" and value not in self._of_row[row].facts.modes:
             return ResultError.DATA_RANGE
         if name == "Torque Enable" and value and self.shut_down(row):
             return ResultError.RESULT_FAIL
@@ -286,13 +348,9 @@ class ServoBank:
         if name == "Goal Position":
             if self["Operating Mode"][row] == POSITION_MODE:
                 return int(self["Min Position Limit"][row]), int(self["Max Position Limit"][row])
-            rule = self._of_row[row].rules[name]
-            return int(rule.low or 0), int(rule.high or 0)
-        limit = int(self[_limit_of(name)][row])
+            return self.range_of(row, name)
+        limit = int(self[limit_of(name)][row])
         return -limit, limit
-
-    def _has_mode(self, row: int, mode: int) -> bool:
-        return mode in MODES and (self.measures_current[row] or mode not in CURRENT_MODES)
 
     def _rows_of(self, kind: ModelRegisters) -> Indices:
         return np.flatnonzero([each is kind for each in self._of_row])
@@ -314,5 +372,6 @@ def _in_one_place(kinds: Sequence[ModelRegisters]) -> dict[str, Register]:
     return {name: register for name, register in found.items() if name not in apart}
 
 
-def _limit_of(goal: str) -> str:
-    return goal.removeprefix("Goal ") + " Limit"
+def _different(models: Sequence[Model]) -> list[Model]:
+    """Models without repetitions; records cannot be hashed."""
+    return [model for k, model in enumerate(models) if model not in models[:k]]

@@ -3,7 +3,7 @@
 Position PID with feed-forward along a profile, and the velocity loop, run every ``CONTROL_S``; they
 reach the motors through the same drive: a proportional gain, and a goal shifted by what the other
 terms add. Gains are the e-manual's: K_P = register / 128 PWM units a tick, K_D / 16, K_I / 65536,
-feed-forward / 4; velocity K_P / 128 a unit of 0.229 rev/min, K_I / 65536. It gives no unit of time
+feed-forward / 4; velocity K_P / 128 a unit of velocity, K_I / 65536. It gives no unit of time
 for the other terms: they are taken a control period, one millisecond (ours).
 """
 
@@ -12,17 +12,14 @@ import numpy as np
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.registers import (
-    ACCELERATION_UNIT_RAD_S2,
     CURRENT_POSITION_MODE,
     EXTENDED_MODE,
     POSITION_MODE,
-    PWM_FULL,
     VELOCITY_MODE,
-    VELOCITY_UNIT_RAD_S,
 )
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.motor import TICKS_PER_RAD, MotorColumns, p_gain_per_rad
+from snakewalk.sim.servo.motor import MotorColumns, p_gain_per_rad
 from snakewalk.sim.servo.profile import Trajectory
 
 CONTROL_S = 1e-3
@@ -41,7 +38,17 @@ class ControlLoops:
     def __init__(self, bank: ServoBank, drive: ServoDrive, motor: MotorColumns) -> None:
         self._bank, self._drive, self._motor = bank, drive, motor
         servos = len(bank)
-        self.trajectory = Trajectory(servos)
+        scales = bank.scales
+        self._rad_s_per_velocity = scales.rad_s_per_velocity
+        self._scales = np.stack(
+            [
+                *(scales.positions_per_rad, scales.full_pwm, scales.rad_s_per_velocity),
+                scales.rad_s2_per_acceleration,
+            ]
+        )
+        self.trajectory = Trajectory(
+            servos, scales.rad_s_per_velocity, scales.rad_s2_per_acceleration
+        )
         self.active = False
         """Whether any servo needs ``tick``."""
         self.position = np.zeros(servos, bool)
@@ -77,7 +84,7 @@ class ControlLoops:
         forward = [bank[name] / 4.0 for name in _FORWARD]
         self._gains = np.stack([kp, integral, differential, *forward])
         if self._any_velocity:
-            goal_rad_s = bank["Goal Velocity"] * VELOCITY_UNIT_RAD_S
+            goal_rad_s = bank["Goal Velocity"] * self._rad_s_per_velocity
             gains = (bank["Velocity P Gain"] / 128.0, bank["Velocity I Gain"] / 65_536.0)
             self._settings = np.stack([goal_rad_s, bank["Profile Acceleration"], *gains])
 
@@ -100,27 +107,28 @@ class ControlLoops:
         if self._any_velocity:
             _run_velocity(
                 *(self.velocity, held, sign, plant.position_rad, plant.velocity_rad_s),
-                *(drive.pwm_limit, self._settings, self._timed),
+                *(drive.pwm_limit, self._settings, self._scales, self._timed),
                 *(path.velocity, self._sum, drive.goal_rad),
             )
         if self._any_position:
             path.advance(CONTROL_S, self.position)
             _run_position(
                 *(self.position, held, goal_rad, plant.position_rad, drive.pwm_limit, self._gains),
+                self._scales,
                 *(path.position, path.velocity, path.acceleration),
                 *(self._sum, self._last_error, drive.p_gain_per_rad, drive.goal_rad),
             )
 
 
-@compiled("float64(float64, float64, float64)")
-def _limited_sum(errors: float, gain: float, pwm_limit: float) -> float:
+@compiled("float64(float64, float64, float64, float64)")
+def _limited_sum(errors: float, gain: float, pwm_limit: float, full_pwm: float) -> float:
     """Sum of errors that puts out no more than the bridge may (no wind-up)."""
-    limit = pwm_limit * PWM_FULL / max(gain, 1e-12) if gain > 0.0 else 0.0
+    limit = pwm_limit * full_pwm / max(gain, 1e-12) if gain > 0.0 else 0.0
     return min(max(errors, -limit), limit)
 
 
 @compiled(
-    f"void({_BOOLS}, {_BOOLS}, {_READ}, {_READ}, {_READ}, {_GAINS},"
+    f"void({_BOOLS}, {_BOOLS}, {_READ}, {_READ}, {_READ}, {_GAINS}, {_GAINS},"
     f" {_READ}, {_READ}, {_READ}, {', '.join(['float64[::1]'] * 4)})"
 )
 def _run_position(
@@ -130,6 +138,7 @@ def _run_position(
     shaft_rad: Floats,
     pwm_limit: Floats,
     gains: Floats,
+    scales: Floats,
     path_rad: Floats,
     path_rad_s: Floats,
     path_rad_s2: Floats,
@@ -141,14 +150,16 @@ def _run_position(
     """Position PID with feed-forward, of the servos in ``run``.
 
     ``gains`` (5, S): P in the drive's unit, I, D, feed-forward of speed and of acceleration.
+    ``scales`` (4, S): positions in a radian, PWM of full output, units of velocity, acceleration.
     """
-    ticks = TICKS_PER_RAD * CONTROL_S
     for k in range(len(run)):
         if not run[k]:
             continue
+        per_rad, full_pwm = scales[0, k], scales[1, k]
+        ticks = per_rad * CONTROL_S
         target = hold_rad[k] if held[k] else path_rad[k]
-        error = (target - shaft_rad[k]) * TICKS_PER_RAD
-        sums[k] = _limited_sum(sums[k] + error, gains[1, k], pwm_limit[k])
+        error = (target - shaft_rad[k]) * per_rad
+        sums[k] = _limited_sum(sums[k] + error, gains[1, k], pwm_limit[k], full_pwm)
         pwm = gains[1, k] * sums[k] + gains[2, k] * (error - last_error[k])
         last_error[k] = error
         if not held[k]:
@@ -156,11 +167,11 @@ def _run_position(
             pwm += gains[4, k] * path_rad_s2[k] * (ticks * CONTROL_S)
         gain = max(gains[0, k], TINY_GAIN)
         p_gain_per_rad[k] = gain
-        goal_rad[k] = target + pwm / PWM_FULL / gain
+        goal_rad[k] = target + pwm / full_pwm / gain
 
 
 @compiled(
-    f"void({_BOOLS}, {_BOOLS}, {_READ}, {_READ}, {_READ}, {_READ}, {_GAINS}, {_BOOLS},"
+    f"void({_BOOLS}, {_BOOLS}, {_READ}, {_READ}, {_READ}, {_READ}, {_GAINS}, {_GAINS}, {_BOOLS},"
     " float64[::1], float64[::1], float64[::1])"
 )
 def _run_velocity(
@@ -171,6 +182,7 @@ def _run_velocity(
     shaft_rad_s: Floats,
     pwm_limit: Floats,
     settings: Floats,
+    scales: Floats,
     timed: Bools,
     path_rad_s: Floats,
     sums: Floats,
@@ -178,20 +190,22 @@ def _run_velocity(
 ) -> None:
     """Velocity PI along a ramp, of the servos in ``run``.
 
-    ``settings`` (4, S): goal in rad/s of the servo, Profile Acceleration, P and I.
+    ``settings`` (4, S): goal in rad/s of the servo, Profile Acceleration, P and I. ``scales`` as
+    in ``_run_position``.
     """
     for k in range(len(run)):
         if not run[k]:
             continue
+        full_pwm, rad_s, rad_s2 = scales[1, k], scales[2, k], scales[3, k]
         goal = 0.0 if held[k] else settings[0, k] * sign[k]
         ramp, step = settings[1, k], np.inf
         if ramp > 0.0 and not held[k]:  # a watchdog's stop has no profile
             if timed[k]:
                 step = abs(goal) / ramp * (CONTROL_S * 1e3)
             else:
-                step = ramp * (ACCELERATION_UNIT_RAD_S2 * CONTROL_S)
+                step = ramp * (rad_s2 * CONTROL_S)
         path_rad_s[k] += min(max(goal - path_rad_s[k], -step), step)
-        error = (path_rad_s[k] - shaft_rad_s[k]) / VELOCITY_UNIT_RAD_S
-        sums[k] = _limited_sum(sums[k] + error, settings[3, k], pwm_limit[k])
-        pwm = (settings[2, k] * error + settings[3, k] * sums[k]) / PWM_FULL
+        error = (path_rad_s[k] - shaft_rad_s[k]) / rad_s
+        sums[k] = _limited_sum(sums[k] + error, settings[3, k], pwm_limit[k], full_pwm)
+        pwm = (settings[2, k] * error + settings[3, k] * sums[k]) / full_pwm
         goal_rad[k] = shaft_rad[k] + pwm / TINY_GAIN

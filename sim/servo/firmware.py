@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
-    HOMING_LIMIT,
     POSITION_MODE,
-    PWM_FULL,
     PWM_MODE,
     REVERSE,
     TORQUE_ON_BY_GOAL,
@@ -26,24 +24,21 @@ from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
 from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import (
-    MOTORS,
-    TICKS_PER_RAD,
-    TICKS_PER_REV,
     MotorColumns,
     MotorModel,
     make_drive,
 )
 from snakewalk.sim.servo.motor_output import MotorOutput
-from snakewalk.sim.servo.present_values import PRESENT, SUPPLY, PresentValues
+from snakewalk.sim.servo.present_values import PresentValues
 from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
-from snakewalk.sim.servo.register_rules import EXTENDED_RANGE_TICKS, PROFILE
+from snakewalk.sim.servo.register_rules import PROFILE
 from snakewalk.sim.servo.servo_loops import accept_goals
 from snakewalk.sim.servo.watchdog import Watchdog
 
-CENTRE_TICKS = 2048
-"""Present Position(132) of a straight joint."""
 FAR_RAD = 1e9
 """Goal of a motor that only has to push: the output saturates at its limit."""
+_NEVER = 1 << 40
+"""Beyond every goal."""
 STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
 """Startup Configuration(60)."""
 
@@ -51,7 +46,7 @@ STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
 class Firmware:
     """Servos of ``bank`` on the shafts of ``plant``, in the order of the bank's rows.
 
-    ``motors`` (S,) are the catalogue's where none are given.
+    ``motors`` (S,) are by default those of the models.
     """
 
     def __init__(
@@ -66,11 +61,13 @@ class Firmware:
         mounted = mounting or Mounting(np.ones(joints), np.zeros(joints))
         self._mounted_sign = mounted.sign
         # a whole number of positions, so that a mirrored servo's numbers are mirrored to the bit
-        self._mounted_ticks = np.rint(mounted.zero_rad * TICKS_PER_RAD)
+        self._scales = scales = bank.scales
+        self._mounted_ticks = np.rint(mounted.zero_rad * scales.positions_per_rad)
+        self._extended = np.array([bank.range_of(row, "Goal Position") for row in range(joints)]).T
         self.bank = bank
         self.plant = plant
         if motors is None:
-            motors = [MOTORS[model] for model in bank.models]
+            motors = [MotorModel.of(each) for each in bank.facts]
         self._motor = motor = MotorColumns(motors)
         around = supply_and_ambient or SupplyAndAmbient()
         usual_v = motor.nominal_v if around.supply_v is None else around.supply_v
@@ -156,12 +153,12 @@ class Firmware:
         restarted = (mode == POSITION_MODE) & ((on & ~self._last_on) | (mode != self._last_mode))
         reverse = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
         self._sign = reverse * self._mounted_sign
-        self._centre = CENTRE_TICKS + reverse * self._mounted_ticks
+        self._centre = self._scales.zero_position + reverse * self._mounted_ticks
         if restarted.any():
             self._reset_turns(restarted)
         offset = bank["Homing Offset"].astype(np.int64)
-        offset[(mode == POSITION_MODE) & (np.abs(offset) > HOMING_LIMIT)] = 0
-        self._zero = self._centre + offset - TICKS_PER_REV * self._turns
+        offset[(mode == POSITION_MODE) & (np.abs(offset) > self._scales.homing_limit)] = 0
+        self._zero = self._centre + offset - self._scales.positions_per_turn * self._turns
         self._frame = np.stack([self._sign, self._zero])
         self._last_on, self._last_mode = on, mode.copy()
         self._enabled_by_goals = bool((bank["Drive Mode"] & TORQUE_ON_BY_GOAL).any())
@@ -173,7 +170,7 @@ class Firmware:
         self.control_loops.apply_registers(on, self.plant.position_rad)
         if self.control_loops.active and not was_active:
             self._control_s = self._time_s + CONTROL_S
-        full = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
+        full = np.abs(bank["Goal PWM"].astype(float)) / self._scales.full_pwm
         drive.pwm_limit[:] = np.where(self.no_output, 0.0, full)
         self.protection.full = np.where(full > 0.0, full, 1.0)  # 0 of 0 is no effort
         self._push = np.zeros(len(bank))
@@ -188,10 +185,9 @@ class Firmware:
             drive.current_limit_a[:] = np.where(limited, goal_a, np.inf)
             self._motor_output.limited = bool(limited.any())
         single = mode == POSITION_MODE
-        low = np.where(single, bank["Min Position Limit"].astype(int), -EXTENDED_RANGE_TICKS)
-        high = np.where(single, bank["Max Position Limit"].astype(int), EXTENDED_RANGE_TICKS)
-        never = EXTENDED_RANGE_TICKS + 1
-        self._limits = np.where(tripped, [[never], [-never]], [low, high])
+        low = np.where(single, bank["Min Position Limit"].astype(int), self._extended[0])
+        high = np.where(single, bank["Max Position Limit"].astype(int), self._extended[1])
+        self._limits = np.where(tripped, [[_NEVER], [-_NEVER]], [low, high])
         self._set_drive_goals()
         self._watchdog.arm(on)
 
@@ -206,7 +202,8 @@ class Firmware:
         goal_rad = self.drive.goal_rad if plain else np.empty(len(self.bank))
         table, address, taken = self.bank.table, self._goal_address, self._accepted
         limits, frame = self._limits, self._frame
-        accept_goals(raw, rows, table, at, address, limits, frame, TICKS_PER_RAD, goal_rad, taken)
+        per_rad = self._scales.positions_per_rad
+        accept_goals(raw, rows, table, at, address, limits, frame, per_rad, goal_rad, taken)
         if self._enabled_by_goals:
             self.enable_by_goal(np.flatnonzero(taken))
         if not plain:
@@ -234,7 +231,8 @@ class Firmware:
         self._reset_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
         self._last_on[rows] = False
-        start = self.bank["Startup Configuration"]
+        names = "Startup Configuration"
+        start = self.bank[names] if names in self.bank else np.zeros(len(self.bank), np.uint8)
         for row in rows:
             if start[row] & STARTUP_RAM_RESTORE:
                 self.bank.restore_ram(int(row))
@@ -310,21 +308,22 @@ class Firmware:
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Write the present values, at least those that a read of this block shows."""
-        indirect = self.bank.indirect
+        indirect, present = self.bank.indirect, self._present_values
         gather = indirect.covers(address, length)
         stop = address + length
-        if gather or (address < SUPPLY.start and stop > PRESENT.start):
+        if gather or (address < present.motion_at.stop and stop > present.motion_at.start):
             self.refresh_motion()
-            self._present_values.path(self._frame, self._time_s)
-        if gather or (address < SUPPLY.stop and stop > SUPPLY.start):
-            self._present_values.supply()
+            present.path(self._frame, self._time_s)
+        if gather or (address < present.supply_at.stop and stop > present.supply_at.start):
+            present.supply()
         if gather:
             indirect.gather()
 
     # internals
 
     def _set_drive_goals(self) -> None:
-        goal = (self.bank["Goal Position"] - self._zero) * (self._sign / TICKS_PER_RAD)
+        per_rad = self._scales.positions_per_rad
+        goal = (self.bank["Goal Position"] - self._zero) * (self._sign / per_rad)
         if self._holding:
             goal = np.where(self._held, self._goal, goal)
         self._goal = goal
@@ -338,8 +337,10 @@ class Firmware:
         self.blocked_shaft.hold(updated)
 
     def _reset_turns(self, which: NDArray[np.bool_]) -> None:
-        ticks = np.rint(self.plant.position_rad * self._sign * TICKS_PER_RAD) + self._centre
-        self._turns[which] = np.floor(ticks / TICKS_PER_REV)[which]
+        scales = self._scales
+        turned = np.rint(self.plant.position_rad * self._sign * scales.positions_per_rad)
+        from_low = turned + self._centre - scales.lowest_position
+        self._turns[which] = np.floor(from_low / scales.positions_per_turn)[which]
 
     def _hold(self, late: NDArray[np.bool_]) -> None:
         """Hold the servos whose watchdog has run out where they are, without a profile.

@@ -1,43 +1,35 @@
-"""Constants of motors and gearboxes by servo model or by a robot's file, and the drive of them.
+"""Motors and gearboxes of servos, from the files of their models and of the robot.
 
-Torque, current and speed figures are those of the e-manual's specification tables at the voltage
-that ROBOTIS recommends (``sim.servo.models``); everything else is derived from them here. Thermal
-figures are not published: ours are marked, and only shape when a hot servo shuts down, not how it
-moves.
+A model's file has torque, current and speed at the recommended voltage; the other constants are
+derived from them here. Thermal figures are not published: they are ours, and only determine when a
+hot servo shuts down, not how it moves.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import AnyInts, Floats
 from snakewalk.config.motor import MotorConfig
-from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_catalogue import servo_model
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.compiling import compiled, readonly_array
-from snakewalk.drivers.protocol.registers import CURRENT_UNIT_A, PWM_FULL
 from snakewalk.sim.plant import ServoDrive
-from snakewalk.sim.servo.models import MODELS, ModelFacts, facts_of
+from snakewalk.sim.servo.register_rules import motor_row, simulated_models
 
-TICKS_PER_REV = 4096
-TICKS_PER_RAD = TICKS_PER_REV / math.tau
+V = TypeVar("V")
+
 _RPM = math.tau / 60.0
-_DIVISOR = 128.0
-"""K_P = Position P Gain(84) / 128, e-manual, in PWM units a tick of position error."""
-_DIVISOR_330 = 256.0
-"""The 330 models: the e-manual says 128 here too, but in recordings of a real XL330-M288 (Rhoban,
-bam) the output follows the position error at gain / 256, r > 0.998 at three gains, up to 885."""
-_CURRENT_UNIT_A = 2.69e-3
-"""Models that the register table does not list: as the others of the 12 V series (ours)."""
-_HEAVY_A = 1.6
-"""Models that stall at less heat up quicker (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotorModel:
-    """What the specification table says of one servo model."""
+    """Motor of one servo model."""
 
     nominal_v: float
     stall_torque_n_m: float
@@ -51,6 +43,32 @@ class MotorModel:
     """Heating of the housing sensor in the long run, kelvin per watt of I^2 R (ours)."""
     thermal_time_s: float
     """Time constant of that heating (ours)."""
+    positions_per_rad: float
+    full_pwm: float
+    """Goal PWM of full output."""
+
+    @staticmethod
+    def of(facts: ServoModel) -> "MotorModel":
+        """Motor of a model.
+
+        Raises:
+            ControlTableError: the model cannot be simulated.
+
+        """
+        motor, units = motor_row(facts), facts.units
+        return MotorModel(
+            motor.nominal_v,
+            motor.stall_torque_n_m,
+            motor.stall_current_a,
+            motor.no_load_rpm * _RPM,
+            motor.stall_current_a * 1e-3 if units.current_a is None else units.current_a,
+            motor.p_gain_divisor,
+            motor.standby_a,
+            motor.winding_k_per_w,
+            motor.thermal_time_s,
+            facts.positions_per_rad,
+            float(units.full_pwm or 1),
+        )
 
     @property
     def resistance_ohm(self) -> float:
@@ -77,7 +95,7 @@ class MotorModel:
         stall_a = self.nominal_v / (own.resistance_ohm or self.resistance_ohm)
         divisor = self.p_gain_divisor
         if own.p_unit_per_rad is not None:
-            divisor = TICKS_PER_RAD / PWM_FULL / own.p_unit_per_rad
+            divisor = self.positions_per_rad / self.full_pwm / own.p_unit_per_rad
         return replace(
             self,
             stall_torque_n_m=k_t * stall_a,
@@ -87,30 +105,37 @@ class MotorModel:
         )
 
 
-def _motor(model: str, facts: ModelFacts) -> MotorModel:
-    small = facts.pwm_slope is not None
-    stall_current_a = STALL_CURRENT_A[model]
-    light = small or stall_current_a < _HEAVY_A
-    return MotorModel(
-        facts.nominal_v,
-        facts.stall_torque_n_m,
-        stall_current_a,
-        facts.no_load_rpm * _RPM,
-        CURRENT_UNIT_A.get(model, _CURRENT_UNIT_A),
-        _DIVISOR_330 if small else _DIVISOR,
-        facts.standby_a,
-        12.0 if light else 6.0,
-        150.0 if light else 300.0,
-    )
+class _ByName(Mapping[str, V]):
+    """Values of the shipped models that can be simulated, made when they are looked up."""
+
+    def __init__(self, make: Callable[[ServoModel], V | None]) -> None:
+        self._make = make
+
+    def __getitem__(self, name: str) -> V:
+        facts = servo_model(name) if name in simulated_models() else None
+        value = None if facts is None else self._make(facts)
+        if value is None:
+            raise KeyError(name)
+        return value
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in simulated_models() if self._make(servo_model(name)) is not None)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
-MOTORS: Mapping[str, MotorModel] = {model: _motor(model, facts) for model, facts in MODELS.items()}
+MOTORS: Mapping[str, MotorModel] = _ByName(MotorModel.of)
+"""Motors by name of the model."""
 
 
 def known_motors(robot: RobotConfig) -> list[MotorModel | None]:
-    """Motors of a robot's J servos: the catalogue's, with the constants of its file; None: none."""
-    models = zip(robot.servo_models, robot.motors, strict=True)
-    return [MOTORS[model].with_constants(own) if model in MOTORS else None for model, own in models]
+    """Motors of a robot's J servos, with the constants of its file; None if not known."""
+    models = zip(robot.servo_records, robot.motors, strict=True)
+    return [
+        None if facts.motor is None else MotorModel.of(facts).with_constants(own)
+        for facts, own in models
+    ]
 
 
 def motors_of(robot: RobotConfig) -> list[MotorModel]:
@@ -120,9 +145,8 @@ def motors_of(robot: RobotConfig) -> list[MotorModel]:
         ControlTableError: a model cannot be simulated.
 
     """
-    for model in robot.servo_models:
-        facts_of(model)
-    return [motor for motor in known_motors(robot) if motor is not None]
+    models = zip(robot.servo_records, robot.motors, strict=True)
+    return [MotorModel.of(facts).with_constants(own) for facts, own in models]
 
 
 class MotorColumns:
@@ -143,12 +167,14 @@ class MotorColumns:
         self.resistance_ohm = column("resistance_ohm")
         self.torque_constant_n_m_a = column("torque_constant_n_m_a")
         self.back_emf_v_s = column("back_emf_v_s")
+        self.positions_per_rad = column("positions_per_rad")
+        self.full_pwm = column("full_pwm")
 
 
 def p_gain_per_rad(register: int | AnyInts, motor: MotorModel | MotorColumns) -> Floats:
     """PWM fraction per radian of position error for Position P Gain(84)."""
     gain = np.asarray(register, dtype=np.float64)
-    return np.asarray(gain / motor.p_gain_divisor * TICKS_PER_RAD / PWM_FULL)
+    return np.asarray(gain / motor.p_gain_divisor * motor.positions_per_rad / motor.full_pwm)
 
 
 def make_drive(motors: Sequence[MotorModel], supply_v: ArrayLike) -> ServoDrive:
@@ -228,12 +254,19 @@ def friction_n_m(gear: Floats, speed_rad_s: float, motor_n_m: float, load_n_m: f
     return float(friction)
 
 
-GEARBOXES: Mapping[str, Gearbox] = {
-    # Fitted to recordings of a real one with a pendulum (Rhoban, bam; five logs, three P gains),
-    # torque and back-EMF constants and P unit as in the data sheet; docs/bus.md has the terms.
-    "XL330-M288": Gearbox(1.48e-3, 0.0084, 0.0020, 0.0188, 0.376, 0.320, 0.173, 0.121),
-}
-"""Models whose friction somebody has measured."""
+def measured_gearbox(facts: ServoModel) -> Gearbox | None:
+    """Gearbox of a model with measured friction; None without."""
+    own = facts.friction
+    if own is None:
+        return None
+    return Gearbox(
+        *(own.armature_kg_m2, own.dry_n_m, own.viscous_n_m_s, own.stribeck_n_m),
+        *(own.stribeck_rad_s, own.by_motor, own.by_load, own.by_load_slow),
+    )
+
+
+GEARBOXES: Mapping[str, Gearbox] = _ByName(measured_gearbox)
+"""Gearboxes of the models with measured friction."""
 
 
 def gears_of(robot: RobotConfig) -> list[Gearbox]:

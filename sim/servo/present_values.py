@@ -8,23 +8,19 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
-    PWM_FULL,
     PWM_MODE,
     VELOCITY_MODE,
-    VELOCITY_UNIT_RAD_S,
 )
 from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.control_loops import ControlLoops
-from snakewalk.sim.servo.motor import TICKS_PER_RAD, MotorColumns
+from snakewalk.sim.servo.motor import MotorColumns
 from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.protection import Protection
 from snakewalk.sim.servo.servo_loops import write_motion
 
 IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
 """Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
-PRESENT, SUPPLY = range(120, 144), range(144, 147)
-"""Addresses of what time and shafts show, and of voltage and temperature; e-manual."""
 IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 
 
@@ -59,7 +55,12 @@ class PresentValues:
         self._stall_a, self._any_load = motor.stall_current_a, not bool(np.all(measured))
         ampere = np.where(measured, motor.current_unit_a, motor.stall_current_a / 1e3)
         self._current_units = np.stack([ampere, np.where(measured, math.inf, 1e3)])
-        self._units = np.array([VELOCITY_UNIT_RAD_S, TICKS_PER_RAD])
+        self._scales = scales = bank.scales
+        self._units = np.stack([scales.rad_s_per_velocity, scales.positions_per_rad])
+        self.motion_at = _span(bank, "Realtime Tick", "Position Trajectory")
+        """Addresses of the registers that show time and shafts."""
+        self.supply_at = _span(bank, "Present Input Voltage", "Present Temperature")
+        """Addresses of voltage and temperature."""
 
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
@@ -83,14 +84,15 @@ class PresentValues:
         bank, control_loops, (sign, zero) = self._bank, self._control_loops, frame
         path = control_loops.trajectory
         output = self._motor_output.pwm(self._plant.velocity_rad_s) * sign
-        bank["Present PWM"][:] = np.rint(output * PWM_FULL)
+        bank["Present PWM"][:] = np.rint(output * self._scales.full_pwm)
         bank["Realtime Tick"][:] = int((time_s - self._start_s) * 1e3) % 32_768
         goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
-        shown = np.where(control_loops.position, path.position * sign * TICKS_PER_RAD + zero, goal)
+        places = path.position * sign * self._scales.positions_per_rad + zero
+        shown = np.where(control_loops.position, places, goal)
         bank["Position Trajectory"][:] = np.rint(shown)
         run = control_loops.position | control_loops.velocity
         bank["Velocity Trajectory"][:] = np.rint(
-            np.where(run, path.velocity * sign / VELOCITY_UNIT_RAD_S, 0.0)
+            np.where(run, path.velocity * sign / self._scales.rad_s_per_velocity, 0.0)
         )
         ongoing = control_loops.position & path.ongoing
         bank["Moving"][:] = self.turning() | ongoing
@@ -103,7 +105,7 @@ class PresentValues:
 
     def turning(self) -> NDArray[np.bool_]:
         """(S,) faster than Moving Threshold(24)."""
-        threshold = self._bank["Moving Threshold"] * VELOCITY_UNIT_RAD_S
+        threshold = self._bank["Moving Threshold"] * self._scales.rad_s_per_velocity
         return np.asarray(np.abs(self._plant.velocity_rad_s) > threshold)
 
     def supply(self) -> None:
@@ -113,3 +115,9 @@ class PresentValues:
         bank["Present Input Voltage"][:] = np.rint(volts * 10.0)
         celsius = np.rint(self._protection.temperature_c)
         bank["Present Temperature"][:] = np.minimum(np.maximum(celsius, 0.0), 255.0)
+
+
+def _span(bank: ServoBank, first: str, last: str) -> range:
+    """Addresses from one register to the end of another."""
+    end = bank.register(last)
+    return range(bank.register(first).address, end.address + end.size)

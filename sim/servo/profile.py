@@ -6,10 +6,10 @@ Profile Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezo
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
-from snakewalk.drivers.protocol.registers import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S
 
 _READ, _WHICH = readonly_array(layout="C"), readonly_array("boolean")
 
@@ -18,9 +18,17 @@ STEP, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x00, 0x10, 0x20, 0x30
 
 
 class Trajectory:
-    """Positions (S,) that run to goals under limits of speed and acceleration (inf: none)."""
+    """Positions (S,) that run to goals under limits of speed and acceleration (inf: none).
 
-    def __init__(self, servos: int) -> None:
+    ``rad_s_per_velocity`` and ``rad_s2_per_acceleration`` (S,) are the units of the registers.
+    """
+
+    def __init__(
+        self, servos: int, rad_s_per_velocity: ArrayLike, rad_s2_per_acceleration: ArrayLike
+    ) -> None:
+        self._rad_s, self._rad_s2 = (
+            np.asarray(unit, np.float64) for unit in (rad_s_per_velocity, rad_s2_per_acceleration)
+        )
         self.position = np.zeros(servos)
         self.velocity = np.zeros(servos)
         self.goal = np.zeros(servos)
@@ -52,8 +60,8 @@ class Trajectory:
         with np.errstate(divide="ignore", invalid="ignore"):
             timed_speed = np.where(total_s > 0.0, distance / (total_s - ramp_s), np.inf)
             timed_ramp = np.where(ramp_s > 0.0, timed_speed / ramp_s, np.inf)
-        speed = np.where(velocity > 0.0, velocity * VELOCITY_UNIT_RAD_S, np.inf)
-        slope = np.where(ramp > 0.0, ramp * ACCELERATION_UNIT_RAD_S2, np.inf)
+        speed = np.where(velocity > 0.0, velocity * self._rad_s, np.inf)
+        slope = np.where(ramp > 0.0, ramp * self._rad_s2, np.inf)
         self._speed[new] = np.where(timed, timed_speed, speed)[new]
         self._ramp[new] = np.where(timed, timed_ramp, slope)[new]
         self.goal[new] = goal[new]

@@ -45,8 +45,6 @@ ALARMS: Mapping[str, int] = {
     "shock": SHOCK_ERROR,
 }
 """By the words of a fault file."""
-ALARMS_330: Mapping[str, int] = {kind: bit for kind, bit in ALARMS.items() if kind != "encoder"}
-"""Bit 3 of the 330 models is not used (e-manual, XL330, Shutdown)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,8 @@ class Protection:
 
     def alarms(self, row: int) -> Mapping[str, int]:
         """Errors that a servo can detect, and their bits."""
-        return ALARMS_330 if self._bank.has(row, "PWM Slope") else ALARMS
+        known = self._bank.facts[row].alarms
+        return {kind: bit for kind, bit in ALARMS.items() if kind in known}
 
     def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
         """Change the supply of all, or of ``rows``; None: back to the usual voltage."""

@@ -33,7 +33,7 @@ def write_le(data: Bytes, at: int, value: int, size: int) -> None:
 
 
 @compiled(
-    f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_FRAME}, {_SEEN})",
+    f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_FRAME}, {_FRAME})",
     makes_arrays=False,
 )
 def write_motion(
@@ -56,12 +56,12 @@ def write_motion(
         position_rad: (S,)
         frame: (2, S) sign of a servo's direction, and ticks at the shaft's zero.
         current_units: (2, S) ampere of one unit of the first register, and its greatest reading.
-        units: (2,) rad/s of one unit of velocity; ticks per rad.
+        units: (2, S) rad/s of one unit of velocity; ticks per rad.
 
     """
     at_current, at_velocity, at_position = places[0], places[1], places[2]
-    rad_s, ticks_per_rad = units[0], units[1]
     for row in range(len(table)):
+        rad_s, ticks_per_rad = units[0, row], units[1, row]
         sign, zero = frame[0, row], frame[1, row]
         ampere, limit = current_units[0, row], current_units[1, row]
         shown = np.rint(current_a[row] * (sign / ampere))
@@ -154,7 +154,7 @@ def is_intact(raw: Bytes) -> bool:
 
 @compiled(
     f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {readonly_array('int64', 2, 'C')},"
-    f" {_FRAME}, float64, float64[::1], boolean[::1])",
+    f" {_FRAME}, {_SEEN}, float64[::1], boolean[::1])",
     makes_arrays=False,
 )
 def accept_goals(
@@ -165,7 +165,7 @@ def accept_goals(
     address: int,
     limits: Ints,
     frame: Floats,
-    ticks_per_rad: float,
+    ticks_per_rad: Floats,
     goal_rad: Floats,
     taken: NDArray[np.bool_],
 ) -> None:
@@ -179,7 +179,7 @@ def accept_goals(
         address: of the register.
         limits: (2, S) least and greatest goal, ticks.
         frame: as in ``write_motion``.
-        ticks_per_rad: its unit.
+        ticks_per_rad: (S,)
         goal_rad: (S,) set to the goals in the shafts' frame, where taken.
         taken: (S,) set to whether a servo has taken one.
 
@@ -194,7 +194,7 @@ def accept_goals(
             ticks -= 1 << 32
         if limits[0, row] <= ticks <= limits[1, row]:
             write_le(table[row], address, ticks, 4)
-            goal_rad[row] = (ticks - frame[1, row]) * (frame[0, row] / ticks_per_rad)
+            goal_rad[row] = (ticks - frame[1, row]) * (frame[0, row] / ticks_per_rad[row])
             taken[row] = True
 
 

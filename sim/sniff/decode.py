@@ -6,7 +6,12 @@ Pings give the models of the servos; an instruction gives the meaning of its rep
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 
-from snakewalk.drivers.protocol.control_table import ControlTable, load_control_table, model_numbers
+from snakewalk.drivers.protocol.control_table import (
+    ControlTable,
+    Model,
+    load_control_table,
+    model_numbers,
+)
 from snakewalk.drivers.protocol.packet import (
     ALERT,
     BROADCAST_ID,
@@ -86,7 +91,9 @@ class Decoder:
     ``models`` are those known beforehand, by ID.
     """
 
-    def __init__(self, model: str = "XM430-W350", models: Mapping[int, str] | None = None) -> None:
+    def __init__(
+        self, model: Model = "XM430-W350", models: Mapping[int, Model] | None = None
+    ) -> None:
         self._usual = load_control_table(model)
         self._tables: dict[int, ControlTable] = {
             servo_id: load_control_table(each) for servo_id, each in (models or {}).items()
@@ -175,7 +182,10 @@ class Decoder:
         if self._last == Instruction.PING and len(packet.params) == 3:
             number = _word(packet.params, 0)
             model = model_numbers().get(number, f"model {number}")
-            if number in model_numbers():
+            known = self._tables.get(packet.servo_id, self._usual)
+            if known.model_number == number:
+                model = known.model
+            elif number in model_numbers():
                 self._tables[packet.servo_id] = load_control_table(model)
             values = {"model": model, "firmware": packet.params[2]}
         elif packet.servo_id in self._asked and packet.params:

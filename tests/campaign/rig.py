@@ -189,7 +189,7 @@ class Rig:
         self.link = SafeLink(self.chain, self.limits, self.line.clock, recovery)
         self.player = FaultPlayer(self.line, plan)
         self.clashing = any(fault.kind in ("clash", "exchange") for fault in plan.fault)
-        self._units = ServoUnits.of(self.bus.table)
+        self._units = ServoUnits.of(self.bus.table.facts)
         self._low, self._high = self._raw_limits()
         self._cycle = 0
         self._seen: JointState | None = None

@@ -26,7 +26,7 @@ def test_a_snake_is_what_it_was() -> None:
     robot = load_robot("yaw16")
     assert robot.link_count == robot.joint_count + 1 == 17
     assert robot.link_parents == tuple(range(-1, 16))
-    assert robot.mass_kg == pytest.approx(17 * robot.link_mass_kg)
+    assert robot.mass_kg == pytest.approx(17 * robot.mean_link_mass_kg)
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ def make_log(
     curve -= [curve[start, 0], curve[start : start + wavelength, 1].mean()]
     s = np.arange(0.0, 8.5, 0.05)
     planned = line(heading_rad(s), 0.05)
-    behind = (np.arange(links) + 0.5) * robot.link_length_m
+    behind = (np.arange(links) + 0.5) * robot.mean_link_length_m
 
     def body(time_s: float) -> tuple[np.ndarray, np.ndarray, float]:
         head = ETA * PULSE_M_S * max(time_s - DELAY_S, 0.0) / shrink

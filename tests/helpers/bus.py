@@ -1,5 +1,6 @@
 """Short ways to a simulated bus, for the tests of this folder."""
 
+import math
 import os
 import select
 from collections.abc import Iterator
@@ -16,7 +17,6 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.pty import IDLE_S, PtyServer
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.servo.motor import TICKS_PER_RAD
 
 ALL = 0xFE
 CARRIED_S = 10.0
@@ -91,7 +91,7 @@ def read(line: SimLine, servo_id: int, address: int, size: int, *, signed: bool 
 
 
 def rad(ticks: int) -> float:
-    return (ticks - 2048) / TICKS_PER_RAD
+    return (ticks - 2048) * math.tau / 4096
 
 
 def group_params(address: int, length: int, ids: Iterator[int] | range) -> bytes:

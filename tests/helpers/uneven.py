@@ -21,8 +21,8 @@ UNEVEN = RobotConfig(
 def spelt_out(robot: RobotConfig) -> RobotConfig:
     """The same chain, with each link's figures in a table of its own."""
     link = LinkConfig(
-        length_m=robot.link_length_m,
-        mass_kg=robot.link_mass_kg,
+        length_m=robot.mean_link_length_m,
+        mass_kg=robot.mean_link_mass_kg,
         radius_m=robot.body_radius_m,
         shape=robot.belly.shape,
     )

@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.floor_markers import marker_picture
 from snakewalk.controller.cameras.overhead_camera import CameraModel
-from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.kinematics.links import body_in_world, half_lengths_m
 from snakewalk.drivers.types import BodyPose
 
 _FINE = 16.0  # positions in 1/16 px, as cv2's shift of 4 bits
@@ -40,11 +40,11 @@ class DrawnView:
         """(H, W, 3) the robot with its head link at ``pose``; ``frame`` picks the noise."""
         robot, z_m = self.robot, self.robot.body_radius_m
         view = body_in_world(robot, pose, joint_rad)
-        half = 0.5 * robot.link_length_m * view.forward
+        half = half_lengths_m(robot)[:, None] * view.forward
         ends = [
             self.model.in_image((view.link_m + side * half)[:, :2], z_m) for side in (1.0, -1.0)
         ]
-        scale = np.hypot(*(ends[0] - ends[1]).T).mean() / robot.link_length_m
+        scale = np.hypot(*(ends[0] - ends[1]).T).sum() / robot.length_m
         image = cv2.resize(self._floor(), None, fx=_OVER, fy=_OVER, interpolation=cv2.INTER_NEAREST)
         thick = max(1, round(2.0 * robot.body_radius_m * scale * _OVER))
         for k, (one, other) in enumerate(zip(*ends, strict=True)):

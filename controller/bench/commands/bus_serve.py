@@ -209,14 +209,16 @@ def _simulated(
         line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
     else:
         line = _robot_line(robot, baud)
-        spec = ChainSpec(line.bank.ids, line.bank.models)
     player = None
     if faults is not None:
         player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
-        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), Decoder1, None
-    models = dict(zip(spec.ids, spec.models, strict=True))
-    decoder = partial(Decoder, spec.kinds[0], models)
+        spec = ChainSpec(spec.ids, (line.servos.facts.model,) * len(spec.ids))
+        decoder = partial(Decoder1, line.servos.facts)
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), decoder, None
+    spec = ChainSpec(line.bank.ids, line.bank.models)
+    models = dict(zip(line.bank.ids, line.bank.facts, strict=True))
+    decoder = partial(Decoder, line.bank.facts[0], models)
     return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
 
 
@@ -225,7 +227,7 @@ def _robot_line(name: str, baud: int | None) -> SimLine:
 
     robot = load_robot(name)
     rate = baud or robot.servo.baud
-    bank = ServoBank(robot.servo_ids, robot.servo_models, rate)
+    bank = ServoBank(robot.servo_ids, robot.servo_records, rate)
     plant = MujocoPlant(robot, load_world("flat"))
     return SimLine(
         bank,

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.controller.bench.sniff import receive, stand_between
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json
 from snakewalk.sim.ax12.decode import Decoder1
-from snakewalk.sim.ax12.table import MODEL as AX12
 from snakewalk.sim.sniff.decode import Decoder
 from snakewalk.sim.sniff.trace import read_trace
 
@@ -24,7 +24,7 @@ def sniff(
     ],
     baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="of servos whose model no ping has shown; AX-12A: Protocol 1.0")
+        str, typer.Option(help="model, or its file, of servos that no ping has shown")
     ] = "XM430-W350",
     through: Annotated[
         bool, typer.Option("--through", help="stand between a client and the device")
@@ -35,7 +35,8 @@ def sniff(
     """Decode a live or recorded exchange packet by packet."""
     if not source.exists():
         raise InputError(f"{source}: no such file or device")
-    decoder = Decoder1() if model.upper() == AX12 else Decoder(model)
+    facts = servo_model(model, Path())
+    decoder = Decoder1(facts) if facts.protocol == 1 else Decoder(facts)
     live = source.is_char_device()
     if through and not live:
         raise InputError(f"{source}: --through needs a serial device")

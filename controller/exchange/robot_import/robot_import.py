@@ -18,6 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import Assumptions, ConfigError, InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_catalogue import described_model
 from snakewalk.controller.exchange.robot_import.body_tree import (
     BodyTree,
     Hinge,
@@ -38,7 +39,6 @@ from snakewalk.controller.exchange.robot_import.model_compiler import load_model
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
-from snakewalk.sim.servo.models import MODELS
 
 _MOST_RAD: Final = 3.05
 """Half range of a joint that may turn for ever: a servo in position mode knows one turn."""
@@ -254,8 +254,9 @@ def _plan_limits(
     low, high = _TORQUE_N_M
     if efforts and low <= min(efforts) <= high:
         torque_n_m, words = min(efforts), ""
-        if servo_model in MODELS:
-            most_n_m = round(_HELD_SHARE * MODELS[servo_model].stall_torque_n_m, 3)
+        facts = described_model(servo_model, None)
+        if facts is not None and facts.motor is not None:
+            most_n_m = round(_HELD_SHARE * facts.motor.stall_torque_n_m, 3)
             if most_n_m < torque_n_m:
                 torque_n_m, words = most_n_m, f"; a {servo_model} holds {most_n_m:g}"
         keys["torque_limit_n_m"] = torque_n_m

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 KINDS: Final = (
     *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal", "schedule"),
-    *("faults", "policy"),
+    *("faults", "servo", "policy"),
 )
 """Of ``models``, known before they are built."""
 

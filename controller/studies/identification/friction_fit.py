@@ -229,12 +229,8 @@ class FrictionFit:
 
 def with_mass(robot: RobotConfig, share: float) -> RobotConfig:
     """Return the robot with the mass of each link of its spine times ``share``."""
-
-    def scaled(mass_kg: float | None) -> float | None:
-        return None if mass_kg is None else float(f"{share * mass_kg:.6g}")
-
-    links = tuple(link.model_copy(update={"mass_kg": scaled(link.mass_kg)}) for link in robot.links)
-    return robot.model_copy(update={"link_mass_kg": scaled(robot.link_mass_kg), "links": links})
+    scaled_kg = [float(f"{share * mass_kg:.6g}") for mass_kg in robot.bare_link_masses_kg]
+    return robot.with_link_masses(scaled_kg)
 
 
 def fit_friction(

@@ -24,6 +24,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import with_keys
 from snakewalk.config.motor import MotorConfig
 from snakewalk.config.robot import RobotConfig
+from snakewalk.sim.servo.motor import MOTORS
 
 
 class Constant(NamedTuple):
@@ -41,8 +42,8 @@ class Constant(NamedTuple):
     """What a file of BAM means that does not have it."""
 
 
-_XL330_P_UNIT: Final = 4096.0 / math.tau / 256.0 / 885.0
-"""Of an encoder of 4096 counts, a divisor of 256 and 885 units of the output (``docs/bus.md``)."""
+_XL330: Final = MOTORS["XL330-M288"]
+_XL330_P_UNIT: Final = _XL330.positions_per_rad / _XL330.p_gain_divisor / _XL330.full_pwm
 CONSTANTS: Final = (
     Constant("torque_constant_n_m_a", "kt", 0.05, 5.0, 0.4, math.nan),
     Constant("resistance_ohm", "R", 0.3, 20.0, 4.0, math.nan),

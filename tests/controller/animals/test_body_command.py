@@ -126,7 +126,7 @@ def test_a_log_is_read_back_pose_by_pose(log: Path, tmp_path: Path) -> None:
     robot, player = record.header.robot, GltfPlayer.read(tmp_path / "s.glb")
     assert facts["bones"] == robot.joint_count + 1
     assert facts["length_m"] == pytest.approx(robot.length_m)
-    pose, half = record.pose, 0.5 * robot.link_length_m
+    pose, half = record.pose, 0.5 * robot.mean_link_length_m
     time_s = pose.time_s - pose.time_s[0]
     for frame, at_s in enumerate(player.time_s):
         row = int(np.abs(time_s - at_s).argmin())

@@ -225,7 +225,9 @@ def test_models_are_read_from_the_servos() -> None:
     )
     truth = LIKE.model_copy(update={"joints": mixed})
     bench = Bench.of(truth, np.random.default_rng(3))
-    assert find_servos(bench.line, 0.004) == truth.models_by_id
+    assert find_servos(bench.line, 0.004) == dict(
+        zip(truth.servo_ids, truth.servo_models, strict=True)
+    )
 
 
 @dataclass

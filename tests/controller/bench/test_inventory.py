@@ -56,7 +56,7 @@ def test_the_robots_file_has_them_by_id_and_says_what_it_assumes(
     out = tmp_path / "mine.toml"
     assert call("-o", out).exit_code == 0
     robot = load_robot(str(out))
-    assert robot.models_by_id == MODELS
+    assert dict(zip(robot.servo_ids, robot.servo_models, strict=True)) == MODELS
     assert robot.servo_ids == (3, 7, 21)
     assert robot.joint_axes == "yyy"
     assert robot.servo.supply_v == pytest.approx(12.0, abs=0.2)

@@ -174,7 +174,7 @@ def test_a_device_hands_over_what_it_sees_and_says_when_it_is_gone(bench: WalkRu
     try:
         found = camera.start
         assert found.status is FrameStatus.GOOD
-        reach = 0.5 * bench.robot.link_length_m + bench.robot.body_radius_m
+        reach = 0.5 * bench.robot.mean_link_length_m + bench.robot.body_radius_m
         tip = (0.5 + reach * np.cos(0.2), 0.1 + reach * np.sin(0.2))
         assert np.hypot(*(found.line_m[[0, -1]] - tip).T).min() < 0.012
         said = [_gone(camera) for _ in range(6)]

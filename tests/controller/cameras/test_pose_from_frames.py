@@ -108,7 +108,7 @@ class ScriptedCamera:
 def detection(time_s: float, pose: BodyPose, bend: np.ndarray) -> LineDetection:
     """Exact, without an image: the line through the links, its ends in either order."""
     body = body_in_world(ROBOT, pose, bend)
-    links, half = body.link_m[:, :2], 0.5 * ROBOT.link_length_m * body.forward[:, :2]
+    links, half = body.link_m[:, :2], 0.5 * ROBOT.mean_link_length_m * body.forward[:, :2]
     corners = np.vstack([links[0] + half[0], links, links[-1] - half[-1]])
     at = np.concatenate([[0.0], np.arange(17) + 0.5, [17.0]])
     line = np.column_stack([np.interp(np.linspace(0, 17, 171), at, axis) for axis in corners.T])

@@ -9,6 +9,7 @@ import pytest
 from snakewalk.config.arrays import Floats
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import LinkConfig, RobotConfig
 from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
 from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.cameras.pose_tracking import BodyPrior
@@ -63,6 +64,21 @@ def test_the_head_is_found_in_another_light_and_beside_other_things(
 ) -> None:
     image = np.clip(np.rint(fault(PICTURE.astype(float))), 0.0, 255.0).astype(np.uint8)
     found = DETECTOR.track(image, 0.0, prior(), ROBOT)
+    assert found.fault == ""
+    assert np.hypot(*(found.head_m - HEAD)) < 0.004
+    assert found.heading_rad == pytest.approx(0.4, abs=0.01)
+
+
+def test_the_head_of_a_robot_with_unequal_links_is_found() -> None:
+    """A third of the links are as long as their default: 0.07 m; the rest are not."""
+    links = (*(LinkConfig(length_m=0.04),) * 6, *(LinkConfig(),) * 6, LinkConfig(length_m=0.12))
+    robot = RobotConfig(name="uneven", joint_axes="y" * 12, links=links)
+    bend = 0.4 * np.sin(0.3 + 0.6 * np.arange(12))
+    view = DrawnView(robot, MODEL, VIEW.size_px)
+    detector = OverheadDetector(MODEL, view.empty_floor(), robot.body_radius_m, CAMERA.shade)
+    body = body_in_world(robot, pose_at(HEAD + np.array([0.03, -0.03]), 0.48), bend)
+    believed = BodyPrior(body.link_m[:, :2], body.forward[:, :2])
+    found = detector.track(view.picture(POSE, bend), 0.0, believed, robot)
     assert found.fault == ""
     assert np.hypot(*(found.head_m - HEAD)) < 0.004
     assert found.heading_rad == pytest.approx(0.4, abs=0.01)

@@ -22,7 +22,7 @@ def link_centres_m(record: RunRecord) -> np.ndarray:
     for link in range(len(frames.names)):
         at = at + turn.apply(frames.translation_m[:, link])
         turn = turn * Rotation.from_quat(frames.quaternion[:, link])
-        back = 0.0 if link == 0 else -0.5 * record.header.robot.link_length_m
+        back = 0.0 if link == 0 else -0.5 * record.header.robot.mean_link_length_m
         centres.append(at + turn.apply([back, 0.0, 0.0]))
     return np.stack(centres, axis=1)
 

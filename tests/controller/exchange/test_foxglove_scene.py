@@ -113,7 +113,7 @@ def test_the_body_hangs_on_its_frames(messages: Messages, record: RunRecord) -> 
         (cylinder,) = first[name]["cylinders"]
         assert first[name]["frame_id"] == name
         assert first[name]["frame_locked"] is True
-        assert cylinder["size"]["z"] == pytest.approx(robot.link_length_m, rel=0.1)
+        assert cylinder["size"]["z"] == pytest.approx(robot.mean_link_length_m, rel=0.1)
         assert cylinder["size"]["x"] == pytest.approx(2.0 * robot.body_radius_m)
     for k, message in enumerate(messages["/tf"]):
         assert [t["child_frame_id"] for t in message["transforms"]] == list(frames.names)

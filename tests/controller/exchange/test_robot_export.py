@@ -79,7 +79,7 @@ def test_a_urdf_of_a_body_with_legs_is_refused_not_written_without_them() -> Non
 def test_the_head_of_the_urdf_weighs_what_it_does() -> None:
     robot = load_robot("xl330-16")
     text = urdf_text(robot)
-    assert text.count(f'<mass value="{robot.link_mass_kg!r}"') == robot.joint_count + 1
+    assert text.count(f'<mass value="{robot.mean_link_mass_kg!r}"') == robot.joint_count + 1
 
 
 def test_export_writes_what_is_asked_for(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_an_arc_is_met_exactly_by_yaw_joints(radius_m: float) -> None:
     """Links are chords: each joint turns by twice the angle between chord and tangent."""
     robot = load_robot("yaw16")
     fit = fit_backbone(robot, arc(radius_m))
-    bend = 2.0 * np.arcsin(robot.link_length_m / (2.0 * radius_m))
+    bend = 2.0 * np.arcsin(robot.mean_link_length_m / (2.0 * radius_m))
     np.testing.assert_allclose(np.abs(fit.joint_rad), bend, atol=1e-5)
     assert len(set(np.sign(fit.joint_rad))) == 1
     assert fit.residual_m < 1e-6
@@ -84,8 +84,8 @@ def test_first_step_is_the_closed_form_of_a_helix() -> None:
     joints = fit_backbone(robot, helix(0.15, 0.4), refine=False).joint_rad
     k = np.cos(0.4) ** 2 / 0.15
     torsion = np.sin(0.4) * np.cos(0.4) / 0.15
-    amplitude = 2.0 * k * np.sin(torsion * robot.link_length_m) / torsion
-    at = (np.arange(32) + 1.0) * robot.link_length_m
+    amplitude = 2.0 * k * np.sin(torsion * robot.mean_link_length_m) / torsion
+    at = (np.arange(32) + 1.0) * robot.mean_link_length_m
     for own in (robot.yaw_joints, robot.pitch_joints):
         turn = torsion * at[list(own)]
         basis = np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -106,7 +106,7 @@ def test_links_keep_their_length_and_joints_their_limits_on_any_curve(name: str)
         )
         fit = fit_backbone(robot, curve)
         lengths = np.linalg.norm(np.diff(fit.points_m, axis=0), axis=1)
-        np.testing.assert_allclose(lengths, robot.link_length_m, atol=1e-12)
+        np.testing.assert_allclose(lengths, robot.mean_link_length_m, atol=1e-12)
         assert (np.abs(fit.joint_rad) <= np.array(robot.limit_rad) + 1e-12).all()
         beside = np.linalg.norm(fit.points_m[:, None] - curve[None], axis=2).min(axis=1)
         np.testing.assert_allclose(fit.distance_m, beside, atol=3e-3)

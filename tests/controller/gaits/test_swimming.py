@@ -87,7 +87,7 @@ def test_every_mode_swims_forward_as_the_planar_model_says(mode: str) -> None:
     time_s = np.concatenate([[0.0], run.time_s])
     moved = CubicSpline(time_s, np.vstack([np.zeros(16), run.joint_rad]))
     rate = moved.derivative()
-    r, link, mass = YAW16.body_radius_m, YAW16.link_length_m, YAW16.link_mass_kg
+    r, link, mass = YAW16.body_radius_m, YAW16.mean_link_length_m, YAW16.mean_link_mass_kg
     way = swim(
         17,
         link,
@@ -142,10 +142,10 @@ def test_a_straight_body_is_braked_by_the_water_as_written() -> None:
         start = plant.link_positions_m.mean(axis=0)[axis]
         plant.mechanics.start_at_rest()
         plant.advance(1.0, a_still_drive(YAW16))
-        k = per_m * YAW16.link_length_m / YAW16.link_mass_kg
+        k = per_m * YAW16.mean_link_length_m / YAW16.mean_link_mass_kg
         way = plant.link_positions_m.mean(axis=0)[axis] - start
         assert way == pytest.approx(np.log(1.0 + k) / k, rel=0.02)
-        lost = 0.5 * 17 * YAW16.link_mass_kg * (1.0 - 1.0 / (1.0 + k) ** 2)
+        lost = 0.5 * 17 * YAW16.mean_link_mass_kg * (1.0 - 1.0 / (1.0 + k) ** 2)
         assert plant.friction_loss_j == pytest.approx(lost, rel=0.03)
 
 

@@ -55,7 +55,7 @@ def test_neighbouring_links_meet_at_the_joint() -> None:
     rng = np.random.default_rng(1)
     for robot in (YAW, BOTH):
         view = body_in_world(robot, pose(0.7), rng.uniform(-1, 1, 16))
-        half = 0.5 * robot.link_length_m
+        half = 0.5 * robot.mean_link_length_m
         rear = view.link_m[:-1] - half * view.forward[:-1]
         front = view.link_m[1:] + half * view.forward[1:]
         np.testing.assert_allclose(rear, front, atol=1e-12)

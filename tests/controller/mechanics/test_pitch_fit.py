@@ -57,7 +57,7 @@ def test_a_gain_bends_the_body_by_more_than_fits_up_to_the_joints_limit() -> Non
     np.testing.assert_allclose(more.goal_rad, 1.12 * fits.goal_rad)
     assert more.residual_m > fits.residual_m
     most = PitchFitter(BOTH, ridge(-0.08), 100.0)(place, along)
-    assert np.abs(most.goal_rad).max() == BOTH.pitch_limit_rad
+    assert np.abs(most.goal_rad).max() == BOTH.limit_rad[BOTH.pitch_joints[0]]
 
 
 def test_in_a_valley_the_signs_turn_over() -> None:
@@ -108,7 +108,7 @@ def pose(head_m: np.ndarray, heading: float) -> BodyPose:
 
 def test_goals_stay_within_the_joint_limits() -> None:
     goals = PitchFitter(BOTH, ridge(2.0))((0.9, 0.0), np.zeros(17)).goal_rad
-    assert np.abs(goals).max() <= BOTH.pitch_limit_rad
+    assert np.abs(goals).max() <= BOTH.limit_rad[BOTH.pitch_joints[0]]
 
 
 def test_links_that_differ_lie_on_an_incline_too() -> None:

@@ -26,6 +26,7 @@ from tests.helpers.uneven import spelt_out
 
 SNAKE = FrictionConfig(along=0.1, across=0.7)
 ROBOT = load_robot("yaw16")
+LINK_KG = ROBOT.mean_link_mass_kg
 STRAIGHT = TabulatedPath.of(np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
 START = PlanarPose(np.zeros(2), 0.0)
 
@@ -114,7 +115,7 @@ def test_it_is_the_force_balance_of_single_steps_added_up() -> None:
         at = head - np.arange(1, 101)
         fine = np.interp(at, np.arange(len(whole)), whole)
         heading = retarget.group_headings_rad(fine)[retarget.group_of_link]
-        step = np.stack([np.cos(heading), np.sin(heading)], axis=1) * ROBOT.link_length_m
+        step = np.stack([np.cos(heading), np.sin(heading)], axis=1) * ROBOT.mean_link_length_m
         points = 0.5 * step - np.cumsum(step, axis=0)
         return points - points.mean(axis=0), heading
 
@@ -234,10 +235,10 @@ def test_links_spelt_out_roll_the_same_to_the_digit() -> None:
 def test_a_link_that_weighs_nothing_does_not_slow_the_others() -> None:
     """A last link of a hundredth of the weight: the body goes as one that has no such link."""
     light = ROBOT.model_copy(
-        update={"links": (*(LinkConfig(),) * 16, LinkConfig(mass_kg=0.01 * ROBOT.link_mass_kg))}
+        update={"links": (*(LinkConfig(),) * 16, LinkConfig(mass_kg=0.01 * LINK_KG))}
     )
     heavy = ROBOT.model_copy(
-        update={"links": (*(LinkConfig(),) * 16, LinkConfig(mass_kg=30.0 * ROBOT.link_mass_kg))}
+        update={"links": (*(LinkConfig(),) * 16, LinkConfig(mass_kg=30.0 * LINK_KG))}
     )
     gone = [
         float(roll(Rollout(robot, SNAKE, None, 100), sine(102, 60)[None]).along_m[0])

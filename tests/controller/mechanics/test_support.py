@@ -12,7 +12,7 @@ from tests.helpers.uneven import UNEVEN
 
 ROBOT = load_robot("alternating16")
 L = ROBOT.joint_count + 1
-WEIGHT_N = ROBOT.link_mass_kg * GRAVITY_M_S2
+WEIGHT_N = ROBOT.mean_link_mass_kg * GRAVITY_M_S2
 
 
 def torques_n_m(joint_rad: np.ndarray, bears_n: np.ndarray) -> np.ndarray:

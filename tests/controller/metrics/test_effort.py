@@ -27,7 +27,7 @@ def test_a_cost_is_energy_over_weight_and_way_while_the_pulse_moves(record: RunR
     n, pose, robot = summary(integrated(record)), record.pose, record.header.robot
     rows = np.flatnonzero(pose.pulse_m_s > 0.0)
     span_s = pose.time_s[rows[-1]] - pose.time_s[rows[0]]
-    weight_n = robot.link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
+    weight_n = robot.mean_link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
     carried_j = weight_n * travelled_m(pose, rows[0], rows[-1])
     whole_s = record.cycle.time_s[-1] - record.cycle.time_s[0]
     assert n.energy_source == "integrated"
@@ -43,7 +43,7 @@ def test_without_waypoints_the_way_is_straight(record: RunRecord) -> None:
     still = replace(pose, pulse_m_s=np.zeros_like(pose.pulse_m_s))
     n = summary(replace(integrated(record), header=replace(header, plan=plan), pose=still))
     robot = header.robot
-    weight_n = robot.link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
+    weight_n = robot.mean_link_mass_kg * (robot.joint_count + 1) * GRAVITY_M_S2
     carried_j = weight_n * float(np.linalg.norm(pose.centre_m[-1] - pose.centre_m[0]))
     span_s = pose.time_s[-1] - pose.time_s[0]
     assert n.electrical_cost_of_transport == pytest.approx(WATTS * span_s / carried_j, rel=1e-5)

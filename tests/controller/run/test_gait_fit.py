@@ -46,7 +46,7 @@ def test_a_helix_becomes_the_angles_of_the_library(tmp_path: Path) -> None:
         np.testing.assert_allclose(file["joint_rad"], fit.joint_rad, atol=1e-9)
         apart = np.linalg.norm(np.diff(file["points_m"], axis=0), axis=1)
         assert str(file["robot"]) == robot.name
-    np.testing.assert_allclose(apart, robot.link_length_m)
+    np.testing.assert_allclose(apart, robot.mean_link_length_m)
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

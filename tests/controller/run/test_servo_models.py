@@ -9,8 +9,9 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig, ServoConfig
+from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.repertoire import repertoire_recording
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
@@ -20,10 +21,9 @@ from snakewalk.controller.studies import tune
 from snakewalk.controller.studies.sweep_measure import Measurement, measure
 from snakewalk.controller.studies.sweep_points import Point
 from snakewalk.drivers.chain.joint_codec import JointUnits
-from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.registers import ServoUnits
 from snakewalk.drivers.safety.limits import SafetyLimits
-from snakewalk.sim.servo.models import MODELS
+from snakewalk.sim.servo.register_rules import simulated_models
 from tests.helpers.in_process import leave_out_pages, work_in_this_process
 
 _DOCS = Path(__file__).resolve().parents[3] / "docs"
@@ -124,15 +124,15 @@ def test_a_supply_that_the_servos_do_not_take_is_refused_with_theirs(folder: Pat
 
 
 def test_a_limit_belongs_to_the_servo_and_can_trip() -> None:
-    for model, stall_a in STALL_CURRENT_A.items():
-        robot = _robot(ServoConfig(model=model))
+    for model in simulated_models():
+        robot, stall_a = _robot(ServoConfig(model=model)), servo_model(model).stall_current_a
+        assert stall_a is not None
         limit_a = SafetyLimits.from_config(robot, SafetyConfig()).current_limit_a
         assert 0.8 * stall_a < limit_a < stall_a
-    assert set(MODELS) == set(STALL_CURRENT_A)
     with pytest.raises(ValueError, match=r"XL330-M288 draws 1.47 A at most and would never trip"):
         _robot(ServoConfig(model="XL330-M288", supply_v=5.0, over_current_a=2.0))
-    with pytest.raises(ValueError, match="stall current of PH42-020-S300 is not known"):
-        _robot(ServoConfig(model="PH42-020-S300", supply_v=24.0))
+    with pytest.raises(ValueError, match="stall current of PH54-100-S500 is not known"):
+        _robot(ServoConfig(model="PH54-100-S500", supply_v=24.0))
 
 
 def test_a_runs_limit_that_no_servo_reaches_is_refused(folder: Path) -> None:
@@ -148,7 +148,7 @@ def test_protocol_1_is_refused_with_what_it_lacks(folder: Path) -> None:
 
 
 def test_load_is_read_as_its_share_of_the_stall_current() -> None:
-    units = ServoUnits.of(load_control_table("XL430-W250"))
+    units = ServoUnits.of(servo_model("XL430-W250"))
     assert not units.measures_current
     assert units.current_a(np.array([-1000, 0, 500])) == pytest.approx([-1.3, 0.0, 0.65])
     joints = JointUnits.of(_robot(ServoConfig(model="XL430-W250")), [units, units])

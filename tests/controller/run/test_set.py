@@ -65,7 +65,7 @@ def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(
         record = read_log(Path(str(told["log"])))
         header = record.header
         assert header.world.friction.across == across
-        assert header.robot.link_mass_kg == 0.2
+        assert header.robot.mean_link_mass_kg == 0.2
         assert header.run.start_heading_rad == pytest.approx(math.pi / 2.0)
         again = read_log(replay(record, tmp_path / f"{across}.mcap"))
         assert differences(record, again, 1e-12, 1e-12).same
@@ -92,7 +92,7 @@ def test_a_table_that_a_file_leaves_out_is_made() -> None:
 def test_angles_are_also_in_degrees() -> None:
     keys = {"robot.yaw_limit_deg": 80, "run.start_heading_deg": -45.0}
     walk = prepare_walk("flat-square", keys=keys)
-    assert walk.robot.yaw_limit_rad == pytest.approx(math.radians(80.0))
+    assert walk.robot.limit_rad[0] == pytest.approx(math.radians(80.0))
     assert walk.run.start_heading_rad == pytest.approx(-math.pi / 4.0)
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import LinkConfig, RobotConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, pose_at
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.walk.side_roll import MOST_TURNS, RollPlan, RollPlanner, SideRolls
@@ -49,6 +50,17 @@ def test_a_roll_ends_before_unsafe_ground_and_on_level_ground() -> None:
         len(RollPlanner(ROBOT, level).to_go_m(target_m, ALONG, np.pi / 2, -1.0)) - 1
     )
     assert 0.5 <= reach_m < 0.5 + GIRTH_M
+
+
+def test_an_arc_is_as_long_as_the_links_of_the_robot() -> None:
+    links = (LinkConfig(length_m=0.12), *(LinkConfig(length_m=0.03),) * 15, LinkConfig())
+    robot = RobotConfig(name="uneven", joint_axes="yp" * 8, links=links)
+    centre_m = np.array([1.0, 2.0])
+    arc_m = RollPlanner(robot, HILL)._arc_m(centre_m, 0.3, 1.5)
+    np.testing.assert_allclose(arc_m.mean(axis=0), centre_m, atol=1e-12)
+    apart_m = np.hypot(*np.diff(arc_m, axis=0).T)
+    lengths_m = np.array(robot.link_lengths_m)
+    np.testing.assert_allclose(apart_m, 0.5 * (lengths_m[1:] + lengths_m[:-1]), rtol=0.03)
 
 
 class Scene:

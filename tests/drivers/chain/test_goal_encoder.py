@@ -5,12 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.drivers.chain import joint_codec
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, encode_goals
 from snakewalk.drivers.protocol.registers import ServoUnits
 from tests.oracles.raw_positions import raw_positions
 
-UNITS = ServoUnits(2048, 2.0 * np.pi / 4096, 0.02, 0.00269)
+UNITS = ServoUnits.of(servo_model("XM430-W350"))
 LIMITS = np.array([[1024, 3072], [1500, 2600], [0, 4095]], np.int32)
 ONES = np.ones(3)
 JOINTS = JointUnits(
@@ -20,6 +21,9 @@ JOINTS = JointUnits(
     ONES * UNITS.a_per_current,
     LIMITS,
     ONES > 0.0,
+    ONES > 0.0,
+    ONES * UNITS.stall_current_a,
+    np.full(3, UNITS.full_pwm, np.int32),
 )
 both_ways = pytest.mark.parametrize(
     "loop", [encode_goals, encode_goals.py_func], ids=["compiled", "interpreted"]

@@ -31,7 +31,7 @@ def test_every_raw_value_is_scaled_by_its_unit(
     model: str, loop: Callable[..., None], sign: Literal[1, -1], raw: list[tuple[int, int, int]]
 ) -> None:
     table = load_control_table(model)
-    units = ServoUnits.of(table)
+    units = ServoUnits.of(table.facts)
     blocks = [
         b"".join(v.to_bytes(n, "little", signed=True) for v, n in zip(each, (2, 4, 4), strict=True))
         for each in raw

@@ -9,12 +9,13 @@ import pytest
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.drivers.protocol.packet import ALERT, Instruction, ResultError, StatusPacket
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain
-from snakewalk.sim.servo.models import MODELS
+from snakewalk.sim.servo.motor import MOTORS
 from snakewalk.sim.servo.protection import ALARMS
 from tests.helpers.bus import ALL, ask, exchange, goals, group_params, read, write
 from tests.sim.faults.test_faults import fault, wait
@@ -171,7 +172,7 @@ def test_a_register_that_some_lack_is_written_to_those_that_have_it(
     line: SimLine, servos: str
 ) -> None:
     """Goal Current(102), which XL430 and XC430 have not, by sync write and by bulk write."""
-    has = [MODELS[model].current_limit is not None for model in models(servos)]
+    has = [servo_model(model).measures_current for model in models(servos)]
     entry = (77).to_bytes(2, "little")
     together = b"".join(bytes((each,)) + entry for each in IDS)
     assert ask(line, ALL, Instruction.SYNC_WRITE, bytes((102, 0, 2, 0)) + together) == []
@@ -202,7 +203,7 @@ def test_backup_outlives_a_factory_reset_and_a_power_cut(line: SimLine) -> None:
 def test_indirect_addresses_read_and_write(line: SimLine, servos: str) -> None:
     """Both blocks; the 330 models have the first alone."""
     for servo, model in zip(IDS, models(servos), strict=True):
-        small = MODELS[model].pwm_slope is not None
+        small = len(servo_model(model).indirect) == 1
         for address, data in ((168, 224),) if small else ((168, 224), (578, 634)):
             for k in range(4):
                 assert write(line, servo, address + 2 * k, 116 + k, 2) == 0
@@ -279,7 +280,7 @@ def test_a_fast_answer_is_spoiled_if_one_that_writes_it_is_named(
 
 @pytest.mark.parametrize("kind", ALARMS)
 def test_an_error_is_seen_by_the_servo_named(servos: str, kind: str) -> None:
-    if kind == "encoder" and MODELS[models(servos)[2]].pwm_slope is not None:
+    if kind not in servo_model(models(servos)[2]).alarms:
         with pytest.raises(ConfigError, match=r"servo 3 detects overload, .* only"):
             make(servos, fault(kind, ids=[3]))
         return
@@ -340,7 +341,7 @@ def test_a_supply_without_names_reaches_all(servos: str) -> None:
     wait(line, 0.1)
     assert line.shown("Present Input Voltage").tolist() == [40] * 4
     wait(line, 0.4)
-    nominal = [round(10 * MODELS[model].nominal_v) for model in models(servos)]
+    nominal = [round(10 * MOTORS[model].nominal_v) for model in models(servos)]
     assert line.shown("Present Input Voltage") == pytest.approx(nominal, abs=1)
 
 

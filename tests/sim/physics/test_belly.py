@@ -58,7 +58,7 @@ def test_the_ends_of_a_capsule_are_gauss_points_unless_it_is_slender() -> None:
 def test_a_capsule_bridges_a_trench_that_a_ball_falls_into(belly: BellyConfig, sinks: bool) -> None:
     """5 cm wide under the middle of the third link of a limp body, which hangs from its hinges."""
     x = 0.01 * np.arange(-200, 201)
-    edge = -2.0 * ROBOT.link_length_m
+    edge = -2.0 * ROBOT.mean_link_length_m
     trench = profile(np.where(np.abs(x - edge) < 0.021, 0.0, 0.2), 0.01)
     limp = robot(belly).model_copy(update={"joint_axes": "p" * 16})
     body = MujocoPlant(limp, FLAT, trench)

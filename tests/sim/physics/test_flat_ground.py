@@ -6,7 +6,7 @@ from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.heightfield import HeightField
 from tests.helpers.physics import ROBOT, a_body, a_drive, serpenoid
 
-START = np.array([-0.5 * ROBOT.joint_count * ROBOT.link_length_m, 0.0, 0.0])
+START = np.array([-0.5 * ROBOT.joint_count * ROBOT.mean_link_length_m, 0.0, 0.0])
 """Centre of a straight body with its head at 0."""
 
 

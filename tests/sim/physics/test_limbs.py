@@ -48,7 +48,7 @@ def expected_m(pair: int, side: float, swing: float, lift: float) -> np.ndarray:
     out = first + second * np.cos(lift)
     return np.array(
         [
-            -limb.link * ROBOT.link_length_m + out * np.sin(swing),
+            -limb.link * ROBOT.mean_link_length_m + out * np.sin(swing),
             side * (limb.hip_m + out * np.cos(swing)),
             second * np.sin(lift),
         ]
@@ -122,7 +122,7 @@ def centre_m(body: MujocoPlant) -> np.ndarray:
 
 
 ROBOT_SHARES = np.array(
-    [ROBOT.link_mass_kg] * ROBOT.link_count + [HIND.segment_mass_kg] * len(ROBOT.limb_joints)
+    [ROBOT.mean_link_mass_kg] * ROBOT.link_count + [HIND.segment_mass_kg] * len(ROBOT.limb_joints)
 )
 ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
 

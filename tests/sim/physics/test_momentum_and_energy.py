@@ -9,7 +9,7 @@ from snakewalk.config.constants import GRAVITY_M_S2
 from tests.helpers.physics import ROBOT, a_body, a_drive, serpenoid
 
 ICE = (1e-9, 1e-9)
-MASS_KG = ROBOT.link_mass_kg * (ROBOT.joint_count + 1)
+MASS_KG = ROBOT.mean_link_mass_kg * (ROBOT.joint_count + 1)
 
 
 def throw(body, forward_m_s: float = 0.0, left_m_s: float = 0.0) -> None:

@@ -32,7 +32,7 @@ def crawl(mu: tuple[float, ...], step_s: float) -> tuple[Floats, Floats, Floats]
 
 def reference(mu: tuple[float, ...], time_s: Floats, joints: Floats, at_s: Floats) -> Floats:
     """Centre of mass (len(at_s), 2) of a body that makes these shapes."""
-    m, r, length = ROBOT.link_mass_kg, ROBOT.body_radius_m, ROBOT.link_length_m
+    m, r, length = ROBOT.mean_link_mass_kg, ROBOT.body_radius_m, ROBOT.mean_link_length_m
     spin, points = m * (3 * r**2 + length**2) / 12, tuple(belly_points_m(ROBOT, 1)[0, :, 0])
     body = PlanarBody(
         ROBOT.joint_count + 1,

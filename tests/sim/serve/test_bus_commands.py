@@ -62,7 +62,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
     [
         (("serve", "--servos", "1-300"), "ID 300: a servo has 0 to 252"),
         (("serve", "--servos", "1", "--baud", "1234"), "1234 baud: XM430-W350 has 9600"),
-        (("serve", "--servos", "1:XL-9"), "XL-9: not simulated"),
+        (("serve", "--servos", "1:XL-9"), "XL-9: no such servo model"),
         (("serve", "--pace", "0"), "pace 0: must be above 0"),
         (("serve", "--faults", "nowhere.toml"), "nowhere.toml: No such file"),
         (("serve", "--servos", "1-4", "--imu", "4"), "--imu 4: a servo has this ID"),

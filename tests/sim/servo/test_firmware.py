@@ -9,7 +9,7 @@ from snakewalk.drivers.protocol.packet import ALERT, Instruction, ResultError
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.servo.motor import MOTORS, TICKS_PER_RAD, make_drive, p_gain_per_rad
+from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
 from snakewalk.sim.servo.protection import SupplyAndAmbient
 from tests.helpers.bus import a_line, ask, rad, read, write
 
@@ -43,7 +43,7 @@ def test_motor_constants_give_back_the_specification_table() -> None:
 
 def test_p_gain_is_the_manuals_formula() -> None:
     """100 ticks of error at gain 800: 100 * 800 / 128 = 625 of 885 PWM units."""
-    fraction = p_gain_per_rad(800, XM430) * 100 / TICKS_PER_RAD
+    fraction = p_gain_per_rad(800, XM430) * 100 / XM430.positions_per_rad
     assert fraction == pytest.approx(625 / 885)
 
 

@@ -5,17 +5,20 @@ import math
 import numpy as np
 import pytest
 
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.drivers.protocol.packet import Instruction, ResultError
-from snakewalk.drivers.protocol.registers import ACCELERATION_UNIT_RAD_S2, VELOCITY_UNIT_RAD_S
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-from snakewalk.sim.servo.models import MODELS
 from snakewalk.sim.servo.profile import Trajectory
+from snakewalk.sim.servo.register_rules import simulated_models
 from tests.helpers.bus import a_line, ask, group_params, read, write
 
 RUN = ((64, 1, 1),)
+
+XM430 = servo_model("XM430-W350")
+RAD_S, RAD_S2 = XM430.rad_s_per_velocity, XM430.rad_s2_per_acceleration
 
 
 def setup(line: SimLine, *writes: tuple[int, int, int], servo: int = 1) -> None:
@@ -28,14 +31,16 @@ def wait(line: SimLine, seconds: float) -> None:
     line.settle()
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", [name for name in simulated_models() if servo_model(name).ram_from == 64]
+)
 def test_every_model_of_the_x_series_moves_where_it_is_told(model: str) -> None:
     line = SimLine(ServoBank([1], model), BenchPlant(1, inertia_kg_m2=5e-4, dry_n_m=0.0))
     assert read(line, 1, 0, 2) == load_control_table(line.bank.models[0]).model_number
     setup(line, *RUN, (116, 2500, 4))
     wait(line, 2.0)
     assert read(line, 1, 132, 4) == pytest.approx(2500, abs=15)
-    measures = MODELS[model].current_limit is not None
+    measures = servo_model(model).measures_current
     assert (write(line, 1, 102, 10, 2) == 0) == measures
     write(line, 1, 64, 0, 1)
     assert (write(line, 1, 11, 5, 1) == 0) == measures
@@ -56,7 +61,7 @@ def test_velocity_mode_turns_at_its_goal_whatever_the_load(model: str, goal: int
 def test_velocity_mode_ramps_by_its_profile_acceleration() -> None:
     line = SimLine(ServoBank([1]), BenchPlant(1))
     setup(line, (11, 1, 1), (108, 10, 4), *RUN, (104, 100, 4))
-    ramp_s = 100 * VELOCITY_UNIT_RAD_S / (10 * ACCELERATION_UNIT_RAD_S2)
+    ramp_s = 100 * RAD_S / (10 * RAD_S2)
     wait(line, 0.5 * ramp_s - 0.02)
     assert read(line, 1, 136, 4) == pytest.approx(50, abs=3)
     wait(line, ramp_s)
@@ -68,8 +73,8 @@ def test_velocity_mode_ramps_by_its_profile_acceleration() -> None:
     [(100, 0, 0x10), (100, 50, 0x30), (100, 4, 0x20)],
 )
 def test_a_profile_takes_the_time_of_its_shape(velocity: int, acceleration: int, kind: int) -> None:
-    path, goal = Trajectory(1), np.array([1.0])
-    speed, slope = velocity * VELOCITY_UNIT_RAD_S, acceleration * ACCELERATION_UNIT_RAD_S2
+    path, goal = Trajectory(1, RAD_S, RAD_S2), np.array([1.0])
+    speed, slope = velocity * RAD_S, acceleration * RAD_S2
     path.set_goals(
         goal, np.array([float(velocity)]), np.array([float(acceleration)]), np.array([False])
     )
@@ -91,7 +96,7 @@ def test_a_profile_takes_the_time_of_its_shape(velocity: int, acceleration: int,
 
 
 def test_a_time_based_profile_arrives_on_time() -> None:
-    path = Trajectory(2)
+    path = Trajectory(2, RAD_S, RAD_S2)
     path.set_goals(np.array([1.0, -0.3]), np.full(2, 800.0), np.full(2, 200.0), np.full(2, True))
     for _ in range(790):
         path.advance(1e-3, np.ones(len(path.goal), bool))

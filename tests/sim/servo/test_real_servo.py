@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from snakewalk.config.loader import load_robot, with_keys
-from snakewalk.drivers.protocol.registers import PWM_FULL
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
@@ -51,8 +50,8 @@ def test_output_register_follows_the_error_at_the_models_gain(shared_data: Path,
     error_rad = column["goal_position"] - column["position"]
     fit = (column["torque_enable"] > 0) & (np.abs(load) < 800)
     slope = (error_rad[fit] @ load[fit]) / (error_rad[fit] @ error_rad[fit])
-    assert slope == pytest.approx(p_gain_per_rad(int(log["kp"]), XL330) * PWM_FULL, rel=0.02)
-    assert np.abs(load).max() <= PWM_FULL
+    assert slope == pytest.approx(p_gain_per_rad(int(log["kp"]), XL330) * XL330.full_pwm, rel=0.02)
+    assert np.abs(load).max() <= XL330.full_pwm
 
 
 def test_the_pendulum_is_followed_at_every_gain_and_thrice_as_well_as_without_friction(

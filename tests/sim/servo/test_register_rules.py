@@ -127,7 +127,7 @@ def test_factory_reset_keeps_what_was_asked() -> None:
     [
         ([1, 1], "XM430-W350", 57_600, "share an ID"),
         ([1, 253], "XM430-W350", 57_600, "ID 253: a servo has 0 to 252"),
-        ([1], "XL-320", 57_600, "XL-320: not simulated"),
+        ([1], "XL-320", 57_600, "XL-320: no such servo model"),
         ([1], "XM430-W350", 123, "123 baud"),
         ([1], "XL330-M288", 4_500_000, "4500000 baud: XL330-M288 has"),
     ],

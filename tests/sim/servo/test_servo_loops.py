@@ -43,7 +43,7 @@ def test_motion_is_shown_in_the_registers_units_little_endian(how: Any) -> None:
     table = np.zeros((2, 20), np.uint8)
     shafts = (np.array([1.0, -9.0]), np.array([-0.5, 0.25]), np.array([0.5, -2.0]))
     frame = np.array([[1.0, -1.0], [2048.0, 100.0]])
-    places, units = np.array([0, 4, 8]), np.array([0.25, 1000.0])
+    places, units = np.array([0, 4, 8]), np.array([[0.25, 0.25], [1000.0, 1000.0]])
     current_units = np.array([[0.01, 0.01], [500.0, 500.0]])
     how(servo_loops.write_motion)(table, places, *shafts, frame, current_units, units)
     assert table[:, 0:2].copy().view("<i2")[:, 0].tolist() == [100, 500]  # the second at its limit
@@ -72,7 +72,7 @@ def test_goals_within_limits_are_taken_and_others_leave_no_trace(how: Any) -> No
         4,
         limits,
         frame,
-        1000.0,
+        np.full(3, 1000.0),
         goal_rad,
         taken,
     )

@@ -1,0 +1,296 @@
+"""A robot: one chain of links, joints and servos, with or without legs."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.robot.joint_values import JointValues
+from snakewalk.config.robot.keys import READ_INSTEAD, Unreadable
+from snakewalk.config.robot.servo import LAST_ID
+from snakewalk.config.robot.spelling import canonical_joints, canonical_links
+
+_LIMIT_SHARE = 2.0 / 2.3
+"""Share of the stall current at which a run stops (ours): 2 A for an XM430."""
+
+
+class RobotConfig(JointValues):
+    """A chain of links joined by servos, with or without legs; metres, index 0 is the head.
+
+    The order of the joints is that of the servos on the bus: first those of the spine from head to
+    tail, then those of the legs, pair by pair from tail to head, left before right, hip before
+    foot.
+    """
+
+    @model_validator(mode="after")
+    def _axes_of_the_joints(self) -> Self:
+        """Take ``joint_axes`` from the joints if the file does not give it."""
+        if not self.joint_axes:
+            axes = [joint.axis for joint in self.joints]
+            known = "".join(axis for axis in axes if axis is not None)
+            if not known or len(known) < len(axes):
+                raise ValueError(
+                    "joint_axes: is required: a letter for each joint, or axis in each of joints"
+                )
+            object.__setattr__(self, "joint_axes", known)  # frozen from here on
+        return self
+
+    @model_validator(mode="after")
+    def _joints_are_the_chains(self) -> Self:
+        if not self.joints:
+            return self
+        if len(self.joints) != self.joint_count:
+            raise ValueError(
+                f"joints: {len(self.joints)} of them, but joint_axes has {self.joint_count}"
+                if not self.limbs
+                else f"joints: {len(self.joints)} of them, but spine and legs have "
+                f"{self.joint_count}"
+            )
+        for number, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True), 1):
+            if joint.axis not in (None, axis):
+                raise ValueError(
+                    f"joints: axis of joint {number} is {joint.axis}, joint_axes says {axis}"
+                )
+            if joint.current_limit_a is not None and axis != "p":
+                raise ValueError(
+                    f"joints: current_limit_a of joint {number}: only pitch joints have one"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _links_make_a_spine(self) -> Self:
+        if not self.links:
+            return self
+        if len(self.links) != self.link_count:
+            raise ValueError(
+                f"links: {len(self.links)} of them, but a spine of {self.link_count - 1} joints "
+                f"has {self.link_count}"
+            )
+        lengths_m, radii_m = self.link_lengths_m, self.link_radii_m
+        if lengths_m[0] == 0.0 or lengths_m[-1] == 0.0:
+            raise ValueError("links: length_m of the head and of the tail must be over 0")
+        for k in range(1, self.link_count - 1):
+            if lengths_m[k] == 0.0 and self.joint_axes[k - 1] == self.joint_axes[k]:
+                raise ValueError(
+                    f"links: length_m of link {k} is 0: the axes of the joints before and behind "
+                    f"it must differ, both are {self.joint_axes[k]}"
+                )
+            if lengths_m[k] == 0.0 == lengths_m[k + 1]:
+                raise ValueError(
+                    f"links: length_m of links {k} and {k + 1} is 0: a module has two axes at most"
+                )
+        if self.body_profile is not None and len(set(radii_m)) > 1:
+            raise ValueError("links: radius_m and body_profile: one of them says the radii")
+        if self.body_radius_m != max(radii_m):
+            raise ValueError(
+                f"body_radius_m = {self.body_radius_m:g}: is the thickest link's, {max(radii_m):g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _limbs_stand_on_the_spine(self) -> Self:
+        at = [pair.link for pair in self.limbs]
+        if any(link >= self.link_count for link in at):
+            raise ValueError(f"limbs: link {max(at)} of {self.link_count}: 0 is the head")
+        if any(after >= before for before, after in pairwise(at)):
+            raise ValueError(
+                "limbs: each at a link of its own, from the tail to the head: "
+                f"{sorted(set(at), reverse=True)}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _ids_fit_the_bus(self) -> Self:
+        ids = self.servo_ids
+        if max(ids) > LAST_ID:
+            raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to {LAST_ID}")
+        twice = sorted(each for each, count in Counter(ids).items() if count > 1)
+        if twice:
+            raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")
+        return self
+
+    @model_validator(mode="after")
+    def _imu_is_on_the_spine(self) -> Self:
+        if self.imu is not None and self.imu.link >= self.link_count:
+            raise ValueError(f"imu: link {self.imu.link} of {self.link_count}: 0 is the head")
+        if self.imu is not None and self.imu.id in self.servo_ids:
+            raise ValueError(f"imu: id {self.imu.id} is a joint's")
+        return self
+
+    @model_validator(mode="after")
+    def _stereo_head_is_on_the_spine(self) -> Self:
+        if self.stereo_head is not None and self.stereo_head.link >= self.link_count:
+            raise ValueError(
+                f"stereo_head: link {self.stereo_head.link} of {self.link_count}: 0 is the head"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _power_is_for_the_chain(self) -> Self:
+        if self.power is None:
+            return self
+        for each, count in Counter(self.power.inject_ids).items():
+            if each not in self.servo_ids:
+                raise ValueError(f"power: inject_ids: ID {each} is not of this robot")
+            if count > 1:
+                raise ValueError(f"power: inject_ids: ID {each} is named twice")
+        cables = len(self.power.cables_ohm)
+        if cables not in (0, self.joint_count - 1):
+            raise ValueError(
+                f"power: cables_ohm: {cables} of them; {self.joint_count} servos have "
+                f"{self.joint_count - 1} cables between them"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _ports_have_every_id(self) -> Self:
+        if not self.ports:
+            return self
+        needed = [*self.servo_ids, *(() if self.imu is None else (self.imu.id,))]
+        told = Counter(each for port in self.ports for each in port.ids)
+        names = Counter(port.port for port in self.ports)
+        for what, wrong in (
+            ("is on none of them", [each for each in needed if each not in told]),
+            ("is on more than one", [each for each, count in told.items() if count > 1]),
+            ("is not of this robot", [each for each in told if each not in needed]),
+        ):
+            if wrong:
+                raise ValueError(f"ports: ID {', '.join(map(str, sorted(wrong)))} {what}")
+        twice = [name for name, count in names.items() if count > 1]
+        if twice:
+            raise ValueError(f"ports: {twice[0]} is named twice: one table a port")
+        bare = [port.port for port in self.ports if not set(port.ids) & set(self.servo_ids)]
+        if bare:
+            raise ValueError(f"ports: {bare[0]} has no servo: an IMU shares a segment's port")
+        if len(self.ports) == 1:
+            raise ValueError("ports: only one: leave the table out, and name it by --port")
+        return self
+
+    @model_validator(mode="after")
+    def _models_can_run(self) -> Self:
+        try:
+            records = dict(zip(self.servo_models, self.servo_records, strict=True))
+        except ConfigError as error:
+            raise ValueError(f"servo: {error}") from None
+        for model, facts in records.items():
+            if facts.protocol == 1:
+                raise ValueError(
+                    f"servo: model {model} speaks Protocol 1.0, which has no group read and no "
+                    "watchdog that a run could rely on; a run needs a servo of Protocol 2.0, such "
+                    "as XL430-W250 (for programs of your own: snakewalk bus serve --servos "
+                    "1-4:AX-12A)"
+                )
+            missing = facts.missing_for_a_run()
+            if missing:
+                raise ValueError(
+                    f"servo: the file of {model} lacks {', '.join(missing)}, which a run needs"
+                )
+            if self.servo.over_current_a is None and facts.stall_current_a is None:
+                raise ValueError(
+                    f"servo: over_current_a is missing: the stall current of {model} is not known"
+                )
+        if self.servo.over_current_a is not None:
+            self.check_over_current("servo: over_current_a", self.servo.over_current_a)
+        return self
+
+    def check_over_current(self, name: str, limit_a: float) -> None:
+        """Reject a limit that a servo cannot reach, which would never trip.
+
+        Raises:
+            ValueError: the limit is not below the stall current of each servo.
+
+        """
+        for facts in self.servo_records:
+            stall_a = facts.stall_current_a
+            if stall_a is not None and limit_a >= stall_a:
+                raise ValueError(
+                    f"{name} = {limit_a:g}: {facts.model} draws {stall_a:g} A at most and would "
+                    f"never trip; leave it out for {_LIMIT_SHARE * stall_a:.2f} A"
+                )
+
+    @property
+    def over_current_a(self) -> float:
+        """Current at which a run without a limit stops: that of the weakest servo."""
+        if self.servo.over_current_a is not None:
+            return self.servo.over_current_a
+        stall_a = [a for facts in self.servo_records if (a := facts.stall_current_a) is not None]
+        return round(_LIMIT_SHARE * min(stall_a), 3)
+
+    @model_validator(mode="after")
+    def _ranges_are_within_a_turn(self) -> Self:
+        """Check that each joint's range is within one turn of its servo, which is all it knows."""
+        for joint, (limit_rad, facts) in enumerate(
+            zip(self.limit_rad, self.servo_records, strict=True)
+        ):
+            most_rad = math.pi - facts.rad_per_position
+            beyond = limit_rad + abs(self.zeros_rad[joint])
+            if beyond > most_rad:
+                raise ValueError(
+                    f"{self.joint_name(joint)}: zero_rad {self.zeros_rad[joint]:g} with a limit of "
+                    f"{limit_rad:g} rad leaves the servo's turn by {beyond - most_rad:.3f} rad: "
+                    "mount the horn nearer to the servo's centre, or lower limit_rad"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _rails_hold_the_body(self) -> Self:
+        width_m = self.belly.width_m
+        if width_m is None and "rails" in self.link_shapes:
+            raise ValueError('links: shape rails needs belly.shape = "rails" and its width_m')
+        if width_m is not None and width_m <= 2.0 * self.body_radius_m:
+            raise ValueError("belly.width_m must be over twice body_radius_m")
+        return self
+
+    @model_validator(mode="after")
+    def _profile_is_relative(self) -> Self:
+        if any(not 0.05 < radius <= 1.0 for radius in self.body_profile or ()):
+            raise ValueError("body_profile must be over 0.05 and at most 1 everywhere")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_empty_records(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave the key out of files and logs of robots with shipped models only."""
+        data: dict[str, Any] = handler(self)
+        if not self.described_models:
+            data.pop("described_models", None)
+        return data
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Name the property that has the value of each link or joint."""
+            if name in READ_INSTEAD:
+                raise AttributeError(
+                    f"{name} is not the value of every link or joint; read {READ_INSTEAD[name]}"
+                )
+            return super().__getattr__(name)
+
+    @model_validator(mode="after")
+    def _is_spelled_canonically(self) -> Self:
+        """Spell the same robot the same way, whatever its file looks like."""
+        for keys in (canonical_links(self), canonical_joints(self)):
+            self.__dict__.update(keys)  # frozen from here on
+        return self
+
+    def with_link_masses(self, masses_kg: Sequence[float]) -> "RobotConfig":
+        """Return the robot with other masses (L,) of its links, without a stereo head's mast.
+
+        Raises:
+            ValidationError: a mass is out of range.
+
+        """
+        links = [
+            {"length_m": length_m, "radius_m": radius_m, "shape": shape, "mass_kg": float(mass_kg)}
+            for length_m, radius_m, shape, mass_kg in zip(
+                self.link_lengths_m, self.link_radii_m, self.link_shapes, masses_kg, strict=True
+            )
+        ]
+        return RobotConfig.model_validate(self.model_dump() | {"links": links})
+
+
+for _key in READ_INSTEAD:
+    setattr(RobotConfig, _key, Unreadable())

@@ -1,0 +1,149 @@
+"""Values of each joint and servo, derived from the parsed keys."""
+
+import math
+from functools import cache
+from typing import TypeVar
+
+from snakewalk.config.motor import MotorConfig
+from snakewalk.config.robot.keys import parsed
+from snakewalk.config.robot.link_values import LinkValues
+from snakewalk.config.servo_catalogue import servo_model
+from snakewalk.config.servo_model import ServoModel
+
+N = TypeVar("N", int, float)
+
+
+class JointValues(LinkValues):
+    """Robot with the values of its joints and servos, in the order of the bus."""
+
+    @property
+    def servo_ids(self) -> tuple[int, ...]:
+        """Bus ID of each servo."""
+        first = self.servo.first_id
+        if not self.joints:
+            return tuple(range(first, first + self.joint_count))
+        return tuple(first + k if j.id is None else j.id for k, j in enumerate(self.joints))
+
+    @property
+    def servo_models(self) -> tuple[str, ...]:
+        """Model of each servo."""
+        if not self.joints:
+            return (self.servo.model,) * self.joint_count
+        return tuple(joint.model or self.servo.model for joint in self.joints)
+
+    @property
+    def servo_records(self) -> tuple[ServoModel, ...]:
+        """Record of each servo's model.
+
+        Raises:
+            ConfigError: a model is not known.
+
+        """
+        described = {each.model: each for each in self.described_models}
+        models = self.servo_models
+        known = {name: described.get(name) or servo_model(name) for name in dict.fromkeys(models)}
+        return tuple(known[name] for name in models)
+
+    @property
+    def motors(self) -> tuple[MotorConfig | None, ...]:
+        """Motor constants of each servo; None: those of its model."""
+        own, of = self.servo.motor, self.servo.model
+        return tuple(own if model == of else None for model in self.servo_models)
+
+    @property
+    def models_by_id(self) -> dict[int, ServoModel]:
+        """Record of each servo's model by its bus ID."""
+        return dict(zip(self.servo_ids, self.servo_records, strict=True))
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """-1 for each servo that is mounted the other way round, else 1."""
+        return tuple(j.sign for j in self.joints) or (1,) * self.joint_count
+
+    @property
+    def zeros_rad(self) -> tuple[float, ...]:
+        """Angle of each servo, from its own zero, when its joint is straight."""
+        return tuple(j.zero_rad for j in self.joints) or (0.0,) * self.joint_count
+
+    @property
+    def position_p_gains(self) -> tuple[int, ...]:
+        """Position P Gain of each servo."""
+        stiff, soft = self.servo.position_p_gain, self.servo.pitch_p_gain
+        usual = tuple(soft if axis == "p" else stiff for axis in self.all_axes)
+        return self._own("position_p_gain", usual)
+
+    @property
+    def position_i_gains(self) -> tuple[int, ...]:
+        """Position I Gain of each servo."""
+        return self._own("position_i_gain", (self.servo.position_i_gain,) * self.joint_count)
+
+    @property
+    def position_d_gains(self) -> tuple[int, ...]:
+        """Position D Gain of each servo."""
+        return self._own("position_d_gain", (self.servo.position_d_gain,) * self.joint_count)
+
+    @property
+    def current_limits_a(self) -> tuple[float, ...]:
+        """Goal current of each joint; infinite for joints that do not lift the spine."""
+        pitch_a = self.servo.pitch_current_limit_a
+        usual = tuple(pitch_a if axis == "p" else math.inf for axis in self.all_axes)
+        return self._own("current_limit_a", usual)
+
+    @property
+    def armatures_kg_m2(self) -> tuple[float, ...]:
+        """Inertia of rotor and gears at each joint's shaft."""
+        return self._own("armature_kg_m2", (self.servo.armature_kg_m2,) * self.joint_count)
+
+    @property
+    def gear_drags_n_m_s(self) -> tuple[float, ...]:
+        """Viscous loss of the gears at each joint's shaft."""
+        return self._own("gear_drag_n_m_s", (self.servo.gear_drag_n_m_s,) * self.joint_count)
+
+    def _own(self, key: str, usual: tuple[N, ...]) -> tuple[N, ...]:
+        """Value of a key for each joint; ``usual`` for a joint without one."""
+        if not self.joints:
+            return usual
+        own = (getattr(joint, key) for joint in self.joints)
+        return tuple(u if o is None else o for o, u in zip(own, usual, strict=True))
+
+    def joint_name(self, joint: int) -> str:
+        """Name of a joint in all messages: its number from the head, which is 1, and its servo ID.
+
+        The name of a leg's joint includes its side and the link of the spine; that of a robot with
+        several ports includes the port.
+        """
+        servo_id = self.servo_ids[joint]
+        on = "".join(f" on {each.port}" for each in self.ports if servo_id in each.ids)
+        name = f"joint {joint + 1} (ID {servo_id}{on})"
+        if joint < len(self.joint_axes):
+            return name
+        limb = self.limb_joints[joint - len(self.joint_axes)]
+        return f"{name} of the {limb.side} leg at link {self.limbs[limb.pair].link}"
+
+    @property
+    def yaw_joints(self) -> tuple[int, ...]:
+        """Indices of the spine's yaw joints."""
+        return _joints_about(self.joint_axes, "y")
+
+    @property
+    def pitch_joints(self) -> tuple[int, ...]:
+        """Indices of the spine's pitch joints."""
+        return _joints_about(self.joint_axes, "p")
+
+    @property
+    def limit_rad(self) -> tuple[float, ...]:
+        """Half range of each joint, rad."""
+        yaw_rad, pitch_rad = parsed(self, "yaw_limit_rad"), parsed(self, "pitch_limit_rad")
+        spine = tuple(yaw_rad if axis == "y" else pitch_rad for axis in self.joint_axes)
+        legs = (
+            (pair.yaw_limit_rad if axis == "y" else pair.roll_limit_rad)
+            for pair in self.limbs
+            for axis in 2 * pair.joint_axes
+        )
+        return self._own("limit_rad", spine + tuple(legs))
+
+
+@cache
+def _joints_about(axes: str, axis: str) -> tuple[int, ...]:
+    """Indices of the joints with this axis; cached because gaits ask in every cycle."""
+    return tuple(i for i, other in enumerate(axes) if other == axis)

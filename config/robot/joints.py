@@ -1,0 +1,50 @@
+"""Joints, as a robot's file gives them."""
+
+import math
+from typing import Literal
+
+from pydantic import Field
+
+from snakewalk.config.base import Strict
+from snakewalk.config.robot.servo import LAST_ID
+
+
+class JointConfig(Strict):
+    """Values of one joint, `[[joints]]` from the head; the other joints have those of the chain."""
+
+    axis: Literal["y", "p"] | None = Field(
+        None, description="y = yaw, p = pitch; required for every joint unless joint_axes is given"
+    )
+    id: int | None = Field(
+        None, ge=0, le=LAST_ID, description="ID of its servo; default: counted from servo.first_id"
+    )
+    model: str | None = Field(None, description="default: servo.model")
+    sign: Literal[1, -1] = Field(1, description="-1 if its servo is mounted the other way round")
+    zero_rad: float = Field(
+        0.0,
+        ge=-math.pi,
+        le=math.pi,
+        description="angle of its servo, from the servo's zero, when the joint is straight; "
+        "rounded to the nearest position of the servo",
+    )
+    limit_rad: float | None = Field(
+        None, gt=0.05, le=3.1, description="default: yaw_limit_rad or pitch_limit_rad"
+    )
+    position_p_gain: int | None = Field(
+        None, ge=0, le=16383, description="default: servo.position_p_gain or servo.pitch_p_gain"
+    )
+    position_i_gain: int | None = Field(
+        None, ge=0, le=16383, description="default: servo.position_i_gain"
+    )
+    position_d_gain: int | None = Field(
+        None, ge=0, le=16383, description="default: servo.position_d_gain"
+    )
+    current_limit_a: float | None = Field(
+        None, gt=0.0, description="for a pitch joint; default: servo.pitch_current_limit_a"
+    )
+    armature_kg_m2: float | None = Field(
+        None, ge=0.0, le=1.0, description="default: servo.armature_kg_m2"
+    )
+    gear_drag_n_m_s: float | None = Field(
+        None, ge=0.0, le=10.0, description="default: servo.gear_drag_n_m_s"
+    )

@@ -1,0 +1,102 @@
+"""Top-level keys of a robot's file.
+
+A key that `[[links]]` or `[[joints]]` may replace holds for only some of them, so code cannot read
+it: `robot.link_length_m` raises. `link_values` and `joint_values` give the value of each link and
+joint.
+"""
+
+from typing import Any, Final, NoReturn
+
+from pydantic import Field
+
+from snakewalk.config.base import Name, Strict
+from snakewalk.config.camera import StereoHeadConfig
+from snakewalk.config.robot.imu import ImuConfig
+from snakewalk.config.robot.joints import JointConfig
+from snakewalk.config.robot.limbs import LimbsConfig
+from snakewalk.config.robot.links import BellyConfig, LinkConfig
+from snakewalk.config.robot.ports import PortConfig
+from snakewalk.config.robot.power import PowerConfig
+from snakewalk.config.robot.servo import ServoConfig
+from snakewalk.config.servo_model import ServoModel
+
+
+class RobotKeys(Strict):
+    """A robot's file as it is parsed."""
+
+    name: Name
+    joint_axes: str = Field(
+        "",
+        pattern=r"^[yp]*$",
+        description="required, unless every joint of `[[joints]]` has its axis: one letter a joint "
+        "from the head, y = yaw, p = pitch",
+    )
+    joints: tuple[JointConfig, ...] = Field(
+        (), description="one for each joint, or none: then all are alike"
+    )
+    links: tuple[LinkConfig, ...] = Field(
+        (), description="one for each link of the spine, or none: then all are alike"
+    )
+    link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
+    body_radius_m: float = Field(0.03, gt=0.002, le=0.5)
+    body_profile: tuple[float, ...] | None = Field(
+        None,
+        min_length=2,
+        max_length=200,
+        description="radii over body_radius_m at equal stations, head to tail, each over "
+        "0.05 and at most 1; for the look and the ground step (snakewalk body measures it)",
+    )
+    belly: BellyConfig = BellyConfig()
+    link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="of each link")
+    yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
+    pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
+    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="what a plan may ask")
+    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="what a plan may ask")
+    torque_limit_n_m: float = Field(2.0, gt=0.0, description="what a plan may ask of a joint")
+    limbs: tuple[LimbsConfig, ...] = Field(
+        (), description="pairs of legs, from the tail to the head: tables [[limbs]]"
+    )
+    servo: ServoConfig = ServoConfig()
+    described_models: tuple[ServoModel, ...] = Field(
+        (),
+        description="records of models that are not shipped; loading a robot fills it from the "
+        "files that `model` names",
+    )
+    imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
+    stereo_head: StereoHeadConfig | None = Field(
+        None, description="a table [stereo_head]; default: there is none"
+    )
+    power: PowerConfig | None = Field(
+        None, description="a table [power]; default: the cables between servos take nothing"
+    )
+    ports: tuple[PortConfig, ...] = Field(
+        (),
+        description="tables [[ports]], where segments of the chain are on adapters of their own, "
+        "for --port robot; default: all servos are on the one port of --port",
+    )
+
+
+READ_INSTEAD: Final = {
+    "link_length_m": "link_lengths_m",
+    "link_mass_kg": "link_masses_kg",
+    "yaw_limit_rad": "limit_rad",
+    "pitch_limit_rad": "limit_rad",
+}
+"""Keys that code cannot read, and the property that gives the value of each link or joint."""
+
+
+class Unreadable:
+    """Data descriptor in front of a parsed key: it has no value, and pydantic still stores one."""
+
+    def __get__(self, robot: object, owner: type) -> NoReturn:
+        """Raise AttributeError; Python then calls ``RobotConfig.__getattr__``."""
+        raise AttributeError
+
+    def __set__(self, robot: object, value: object) -> NoReturn:
+        """Raise AttributeError: a robot is frozen."""
+        raise AttributeError
+
+
+def parsed(robot: RobotKeys, key: str) -> Any:
+    """Value of a key as it was parsed; for this package only."""
+    return robot.__dict__[key]

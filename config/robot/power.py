@@ -1,0 +1,34 @@
+"""Cables and leads of the supply."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from snakewalk.config.base import Strict
+
+
+class PowerConfig(Strict):
+    """Cables from servo to servo, and where leads of the supply end (docs/bus.md)."""
+
+    inject_ids: tuple[int, ...] = Field(
+        (), description="servos at which a lead of the supply ends; default: the first of the chain"
+    )
+    cable_ohm: float = Field(
+        0.055,
+        gt=0.0,
+        le=100.0,
+        description="of a cable between neighbours, both conductors and all four contacts: 180 mm "
+        "of AWG 21, and contacts of 10 milliohm, the most that new ones have",
+    )
+    cables_ohm: tuple[float, ...] = Field(
+        (), description="of each cable from the head, where they differ"
+    )
+    lead_ohm: float = Field(
+        0.02, gt=0.0, le=100.0, description="of a lead from the supply, there and back"
+    )
+
+    @model_validator(mode="after")
+    def _resistances_are_positive(self) -> Self:
+        if any(not 0.0 < each <= 100.0 for each in self.cables_ohm):
+            raise ValueError("cables_ohm: each over 0 and at most 100")
+        return self

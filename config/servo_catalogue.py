@@ -1,0 +1,160 @@
+"""Servo models by name, by number or by file."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.strict_toml import checked, read_toml
+
+FOLDER: Final = Path(__file__).parent / "servos"
+"""One file for each shipped model."""
+_MOST_FILES: Final = 5
+"""Longest chain of files that are each like the next (ours)."""
+
+
+def printed_name(name: str) -> str:
+    """Name of a model as printed on the servo: capitals, ``-`` for ``_``."""
+    return name.removesuffix(".model").upper().replace("_", "-")
+
+
+@cache
+def shipped_models() -> tuple[str, ...]:
+    """Names of the shipped models, sorted."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
+    """Model of a shipped name, in any case, or of a ``.toml`` file.
+
+    Args:
+        name_or_path: ``XM430-W350``, or a path, relative to ``beside`` if the file is there.
+        beside: folder of the file that names the model. A name that is not shipped is looked up in
+            its folder ``servos``.
+
+    Raises:
+        ConfigError: there is no such model; or the faults of its file, one line each.
+
+    """
+    path = model_file(name_or_path, beside)
+    if path is None:
+        shown = ", ".join(shipped_models())
+        raise ConfigError(
+            f"{name_or_path}: no such servo model; shipped are {shown}; describe another one in a "
+            "file: docs/how-to/add-a-servo-model.md"
+        )
+    return _shipped(path.stem) if path.parent == FOLDER else _read(path)
+
+
+def model_file(name_or_path: str, beside: Path | None = None) -> Path | None:
+    """File of a model, as ``servo_model`` finds it; None if there is none."""
+    folders = [] if beside is None else [beside]
+    if name_or_path.endswith(".toml"):
+        found = [folder / name_or_path for folder in folders] + [Path(name_or_path)]
+    else:
+        own = [folder / "servos" / f"{name_or_path}.toml" for folder in folders]
+        found = [FOLDER / f"{printed_name(name_or_path)}.toml", *own]
+    return next((path for path in found if path.is_file()), None)
+
+
+def described_model(name_or_path: str, beside: Path | None) -> ServoModel | None:
+    """Model of a file that is not shipped; None for the name of another model.
+
+    Raises:
+        ConfigError: the faults of the file.
+
+    """
+    path = model_file(name_or_path, beside)
+    if path is None and name_or_path.endswith(".toml"):
+        raise ConfigError(f"{name_or_path}: no such file")
+    return None if path is None or path.parent == FOLDER else _read(path)
+
+
+def models_by_number(folder: Path | None = None) -> Mapping[int, str]:
+    """Names of the known models of Protocol 2.0 by model number.
+
+    With a ``folder``, also those whose files are in its folder ``servos``.
+
+    Raises:
+        ConfigError: the faults of such a file.
+
+    """
+    files = [] if folder is None else sorted((folder / "servos").glob("*.toml"))
+    if not files:
+        return _shipped_by_number()
+    own = [_read(path) for path in files]
+    return _shipped_by_number() | {m.model_number: m.model for m in own if m.protocol == 2}
+
+
+@cache
+def _shipped_by_number() -> Mapping[int, str]:
+    models = {name: _shipped_data(name)[0] for name in shipped_models()}  # schemas take longer
+    numbers = {m["model_number"]: name for name, m in models.items() if m.get("protocol", 2) == 2}
+    return MappingProxyType(numbers)
+
+
+@cache
+def _shipped(name: str) -> ServoModel:
+    data, text = _shipped_data(name)
+    return checked(ServoModel, data, str(FOLDER / f"{name}.toml"), text)
+
+
+@cache
+def _shipped_data(name: str) -> tuple[dict[str, Any], str]:
+    """Data of a shipped model, together with those of the model that it is like, and its text."""
+    path = FOLDER / f"{name}.toml"
+    data, text = read_toml(path)
+    return _merged(path, data, 1), text
+
+
+def _read(path: Path) -> ServoModel:
+    data, text = read_toml(path)
+    return checked(ServoModel, _merged(path, data, 1), str(path), text)
+
+
+def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
+    """Data of a file together with those of the model that it is like.
+
+    Raises:
+        ConfigError: the other model does not exist, or lacks a register of ``without``.
+
+    """
+    own = dict(data)
+    like, without = own.pop("like", None), own.pop("without", [])
+    if like is None and not without:
+        return own
+    if not isinstance(like, str):
+        raise ConfigError(f"{path}: like: must name a model, or a file")
+    if not (isinstance(without, list) and all(isinstance(name, str) for name in without)):
+        raise ConfigError(f"{path}: without: must be a list of registers")
+    other = model_file(like, path.parent)
+    if other is None:
+        raise ConfigError(f"{path}: like: {like}: no such servo model")
+    if depth == _MOST_FILES:
+        raise ConfigError(f"{path}: like: more than {_MOST_FILES} files that are each like another")
+    shipped = other.parent == FOLDER
+    base = (
+        _shipped_data(other.stem)[0] if shipped else _merged(other, read_toml(other)[0], depth + 1)
+    )
+    base = dict(base)
+    registers = dict(base.get("registers", {}))
+    unknown = [name for name in without if name not in registers]
+    if unknown:
+        raise ConfigError(f"{path}: without: {like} has no register {unknown[0]}")
+    base["registers"] = {name: row for name, row in registers.items() if name not in without}
+    for key in ("source", "friction"):  # they were found out for the other model
+        base.pop(key, None)
+    return _over(base, own)
+
+
+def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Values of ``own`` over those of ``base``, table by table."""
+    merged = dict(base)
+    for key, value in own.items():
+        below = merged.get(key)
+        both = isinstance(value, dict) and isinstance(below, dict)
+        merged[key] = _over(below, value) if both else value
+    return merged
