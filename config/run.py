@@ -1,7 +1,7 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -13,7 +13,7 @@ from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
 
-MotionName = Literal[
+MOTIONS: Final = (
     "walk",
     "walk-printed",
     "walk-blind",
@@ -23,7 +23,11 @@ MotionName = Literal[
     "playback",
     "repertoire",
     "source",
-]
+)
+"""Motions that need no plug-in."""
+_ALONG_WAYPOINTS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
+MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
+"""A motion of ``MOTIONS``, or the name of a plug-in."""
 
 FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
 """Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
@@ -163,6 +167,11 @@ class SafetyConfig(Strict):
     recovery: Literal["stop", "confirm", "resume"] = Field(
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
     )
+    lost_observer: Literal["stop", "warn"] = Field(
+        "stop",
+        description="when the page, the ROS node or the gamepad, each with an E-STOP, ends or does "
+        "not respond during a run: torque off, or a warning",
+    )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
     overload_reboots: int = Field(
         0,
@@ -279,7 +288,7 @@ class RunConfig(Strict):
             raise ValueError("motion gait needs a table [gait] with its name")
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
             raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
-        pathless = {"gait", "playback", "source"} | ({"repertoire"} if self.repertoire else set())
-        if self.motion not in pathless and not self.waypoints_m:
+        planned = self.motion == "repertoire" and not self.repertoire
+        if (planned or self.motion in _ALONG_WAYPOINTS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

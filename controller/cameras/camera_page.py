@@ -37,7 +37,7 @@ class CameraPage:
 
         self._camera, self._watch = camera, watch
         self._server, self.url = open_page(host, port)
-        """To be opened in a browser; holds the token where one is asked for."""
+        """To be opened in a browser; contains the token."""
         blank = np.full((camera.height_px, camera.width_px, 3), 230, np.uint8)
         panel = self._server.gui.add_panel()
         with panel.add_tab(f"camera {watch.name}"):

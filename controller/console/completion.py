@@ -44,9 +44,9 @@ def _shipped(kind: str) -> list[str]:
 
         return list(GAITS)
     if kind == "spine gaits":
-        from snakewalk.controller.animals.mesh.body_motion import SWIMMERS  # noqa: PLC0415
+        from snakewalk.controller.gaits.registry import SPINE_GAITS  # noqa: PLC0415  --help stays quick
 
-        return list(SWIMMERS)
+        return list(SPINE_GAITS)
     from snakewalk.config.loader import shipped  # noqa: PLC0415  --help stays quick
 
     return list(shipped(kind))  # type: ignore[arg-type]

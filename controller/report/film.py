@@ -14,9 +14,9 @@ from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.controller.track.bone_motion import BoneMotion
 
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import SkinLook

@@ -29,6 +29,13 @@ from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.types import BodyPose, JointState
+from snakewalk.sim.line.clock import RealTimeClock
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.physics.split_plant import SplitPlant
+from snakewalk.sim.plant import Mounting
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.motor import motors_of
+from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 FILE_PORTS: Final = "robot"
 """``--port`` of a robot whose file names the ports of its segments."""
@@ -51,6 +58,8 @@ class Backend:
     """What the motors have taken in and done so far."""
     twin: Callable[[], Twin] | None = None
     """Makes a second body, on which motion is tried; None where time does not wait for it."""
+    lay_down: Callable[[InitialPose], None] | None = None
+    """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
 
 
 def simulated(
@@ -74,12 +83,8 @@ def simulated(
 
     """
     require_extra("simulated runs need", "mujoco")
-    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
     from snakewalk.sim.physics.twin import PlantTwin  # noqa: PLC0415
-    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
-    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
-    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     if deviation is None:
         deviation = Deviation.of_run(run.deviation, robot)
@@ -102,6 +107,13 @@ def simulated(
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
     )
+
+    def lay_down(pose: InitialPose) -> None:
+        line.settle()
+        shaft_rad = deviation.shaft_rad(pose.joint_rad)
+        plant.lay_down(run.start_m, pose.heading_rad, shaft_rad)
+        line.firmware.hold_position()
+
     drive = line.firmware.drive
     if deviation.torque is not None:
         drive.torque_constant_n_m_a[:] *= deviation.torque
@@ -114,6 +126,7 @@ def simulated(
         lambda: line.busy_s,
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
         lambda: PlantTwin(robot, world, ground),
+        lay_down,
     )
 
 
@@ -176,14 +189,7 @@ def split(
 
     """
     require_extra("simulated servos need", "mujoco")
-    from snakewalk.sim.line.clock import RealTimeClock  # noqa: PLC0415
-    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
-    from snakewalk.sim.physics.split_plant import SplitPlant  # noqa: PLC0415
-    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
-    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
-    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
-    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]

@@ -20,13 +20,14 @@ from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import (
+    changed,
     is_gait,
     prepare_gait,
     prepare_job,
     with_compliance,
 )
-from snakewalk.controller.run.gait_run import GaitRun
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.terrain.summary import path_relief
 from snakewalk.controller.track.readers.load import load_track
 
@@ -107,7 +108,7 @@ class Trial:
 
 def prepare_case(
     case: Case, seed: int, spread_m: float, changes: Mapping[str, object]
-) -> WalkRun | GaitRun:
+) -> PreparedRun:
     """Prepare one trial's run; its start is moved by a normal deviate, drawn from the seed.
 
     A walk's start on unsafe ground is drawn again, so that the moved start does not fail by itself.
@@ -117,9 +118,9 @@ def prepare_case(
 
     """
     found = _prepared(case, seed, changes)
-    found = replace(found, run=with_compliance(found.run, case.compliance))
+    found = changed(found, run=with_compliance(found.run, case.compliance))
     if case.relief != 1.0:
-        found = replace(found, world=found.world.with_relief(case.relief))
+        found = changed(found, world=found.world.with_relief(case.relief))
     if spread_m == 0.0:
         return found
     relief = found.planner.relief if isinstance(found, WalkRun) else None
@@ -128,14 +129,14 @@ def prepare_case(
         x_m, y_m = start_m + spread_m * rng.standard_normal(2)
         if relief is None or relief.safe(x_m, y_m):
             moved = found.run.model_copy(update={"start_m": (float(x_m), float(y_m))})
-            return replace(found, run=moved)
+            return changed(found, run=moved)
     raise InputError(
         f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
         f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
     )
 
 
-def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun | GaitRun:
+def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> PreparedRun:
     given = {"robot": case.robot, "world": case.world}
     options: dict[str, Any] = dict(changes) | {k: v for k, v in given.items() if v is not None}
     seconds = options.pop("seconds", None)
@@ -214,7 +215,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
         return replace(trial, cause="error", why=f"{type(error).__name__}: {error}")
 
 
-def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
+def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
     with TemporaryDirectory() as folder:
         finished = execute(prepared, Path(folder), stoppable=False)
         stood = ground_contact(finished.record, prepared.ground)

@@ -19,7 +19,7 @@ from snakewalk.sim.imu import Imu
 from snakewalk.sim.physics.body import build_model
 from snakewalk.sim.physics.mechanics import Mechanics, PhysicsError
 from snakewalk.sim.physics.obstacles import place_at_obstacle, start_fault
-from snakewalk.sim.physics.placing import float_at, place
+from snakewalk.sim.physics.placing import float_at, lay_down, place
 from snakewalk.sim.physics.stepper import CompiledSteps
 from snakewalk.sim.plant import LinkMotion, ServoDrive
 
@@ -142,6 +142,22 @@ class MujocoPlant:
         fault = start_fault(self.mechanics, self.world)
         if fault is not None:
             raise InputError(f"world {self.world.name}: {fault}")
+
+    def lay_down(
+        self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
+    ) -> None:
+        """Put the body elsewhere on its level floor, at rest, between two steps.
+
+        It is quick enough for a running control loop, since the body does not settle; time, energy
+        and distance continue.
+
+        Raises:
+            ValueError: ``joint_rad`` is not (J,), or the ground is not a level, open floor.
+
+        """
+        if self.world.ground.kind != "flat" or self.world.obstacle is not None:
+            raise ValueError(f"world {self.world.name}: not a level, open floor")
+        lay_down(self.mechanics, self.robot, start_m, heading_rad, joint_rad)
 
     def set_state(self, before: Floats, now: Floats, dt_s: float) -> None:
         """Put it at MuJoCo's coordinates ``now`` (7 + J,), where it came from ``before`` in dt_s.

@@ -263,6 +263,17 @@ class Firmware:
         self.apply_registers()
         return not self.bank["Hardware Error Status"][row]
 
+    def hold_position(self) -> None:
+        """Give every servo its present position as goal, at rest: its shaft was put elsewhere."""
+        torque, goal = self.bank["Torque Enable"], self.bank["Goal Position"]
+        on = torque.copy()
+        torque[:] = 0
+        self.apply_registers()
+        self.refresh()
+        goal[:] = self.bank["Present Position"]
+        torque[:] = on
+        self.apply_registers()
+
     def block_shafts(self, rows: NDArray[np.intp]) -> None:
         """Block shafts where they are."""
         for row in rows:

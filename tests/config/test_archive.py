@@ -238,8 +238,7 @@ def test_json_from_outside_is_parsed_in_one_place() -> None:
     """
     own = {
         *("config/archive.py", "controller/runlog/reader.py", "drivers/safety/stop_button.py"),
-        *("controller/ros/command_codec.py", "controller/runlog/row_line.py"),
-        *("controller/view/browser_gamepad.py", "controller/run/watcher.py"),
+        *("controller/runlog/row_line.py", "controller/run/watcher.py"),
     }
     root = Path(__file__).parents[2]
     found = {

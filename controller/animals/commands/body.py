@@ -10,13 +10,21 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.animals.mesh import body_model as model
+from snakewalk.controller.animals.mesh.body_model import pose, straight
+from snakewalk.controller.animals.mesh.body_motion import animated
+from snakewalk.controller.animals.mesh.mesh import body_mesh
+from snakewalk.controller.animals.mesh.rig import spine_rig
+from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,12 +32,17 @@ if TYPE_CHECKING:
 
     from snakewalk.controller.animals.mesh.body_model import BodyModel
     from snakewalk.controller.animals.mesh.body_skin import BodySkin
-    from snakewalk.controller.animals.mesh.mesh import Mesh
+    from snakewalk.controller.images.mesh import Mesh
 
     Floats = NDArray[np.float64]
     Image = NDArray[np.uint8]
 
 
+@command(
+    "body",
+    group=RECORDINGS,
+    examples=("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj"),
+)
 def body(
     track: Annotated[
         str,
@@ -153,9 +166,6 @@ class _Made:
 
     def solid(self, body: _Measured, skeleton: Floats | None, image: Path | None) -> None:
         """Write the ellipses along a skeleton; None is straight."""
-        from snakewalk.controller.animals.mesh.body_model import straight  # noqa: PLC0415
-        from snakewalk.controller.animals.mesh.mesh import body_mesh  # noqa: PLC0415
-
         one = body.model
         mesh = body_mesh(one, straight() if skeleton is None else skeleton)
         files = self._write(mesh, body.texture)
@@ -185,8 +195,6 @@ class _Made:
         if animate is None:
             files = self._write(skin.mesh, body.texture)
         else:
-            from snakewalk.controller.animals.mesh.body_motion import animated  # noqa: PLC0415
-            from snakewalk.controller.animals.mesh.rig import spine_rig  # noqa: PLC0415
             from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415
 
             if self.output.suffix.lower() != ".glb":
@@ -264,9 +272,6 @@ def _measure(
     track: str, image: Path | None, frame: int, side: Path | None, aspect: float
 ) -> _Measured:
     """Widths of a recording, and its texture from a picture."""
-    from snakewalk.controller.animals.mesh import body_model as model  # noqa: PLC0415  heavy
-    from snakewalk.controller.track.readers.generated import EMBEDDED, embedded  # noqa: PLC0415
-
     if track in EMBEDDED:
         if image is not None or side is not None:
             raise InputError(f"{track}: is made from figures, without widths; give an .npz")
@@ -285,16 +290,12 @@ def _measure(
 
 def _skeleton(track: str, points: Floats, frame: int) -> Floats:
     """Skeleton of one frame, in body lengths."""
-    from snakewalk.controller.animals.mesh.body_model import pose  # noqa: PLC0415
-
     _check_frame(track, points, frame)
     return pose(points[frame])
 
 
 def _texture(image: Path, shown: tuple[Image, Floats, Floats], pixels: bool) -> Image:
     """Strip of the skin from a picture, the skeleton in it and its radii."""
-    from snakewalk.controller.animals.mesh.skin_texture import unroll  # noqa: PLC0415
-
     picture, points, radius = shown
     if not pixels:
         raise InputError(f"{image}: the track holds no places in pictures (points_px, skeletons)")

@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.fish.accuracy import compare
+from snakewalk.controller.animals.fish.fish_synthesis import SynthesisOptions, synthesise_motion
+from snakewalk.controller.animals.fish.postures import load_postures, save_postures
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
@@ -29,6 +34,10 @@ _Rate = Annotated[float | None, typer.Option(help="frames a second, instead of w
 _Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf)")]
 
 
+@command(
+    "fish film",
+    examples=("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel"),
+)
 def film(
     folder: Annotated[Path, typer.Argument(help="folder to write frames and truth.npz into")],
     motion: Annotated[
@@ -51,7 +60,6 @@ def film(
 ) -> None:
     """Render a fish whose every angle is known, with marks, shadow, blur and noise."""
     from snakewalk.controller.animals.fish.fish_film import render  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
 
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is a file; give a folder")
@@ -71,6 +79,13 @@ def film(
     show(found, as_json)
 
 
+@command(
+    "fish match",
+    examples=(
+        "fish match top.mp4 --side side.mp4 -o postures.npz",
+        "fish match tank/top --background tank/top-background.png --picture match.png",
+    ),
+)
 def match(
     footage: Annotated[
         Path, typer.Argument(help="video or folder of images from above; or tracked midlines")
@@ -99,14 +114,11 @@ def match(
     refuse_to_overwrite([output, picture], force)
     check_picture(picture)
 
-    from snakewalk.controller.animals.fish.accuracy import compare  # noqa: PLC0415
     from snakewalk.controller.animals.fish.fish_matching import (  # noqa: PLC0415
         MIDLINES,
         match_footage,
         read_midlines,
     )
-    from snakewalk.controller.animals.fish.postures import load_postures, save_postures  # noqa: PLC0415
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
 
     _check_npz(output)
     if length is not None and not 0.0 < length < 1e3:
@@ -135,6 +147,13 @@ def match(
     show(facts | {"postures": str(output)}, as_json)
 
 
+@command(
+    "fish synthesise",
+    examples=(
+        "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
+        "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
+    ),
+)
 def synthesise(
     postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
     through: Annotated[
@@ -173,12 +192,6 @@ def synthesise(
     """Put segments of a film together anew, at random or through control points."""
     refuse_to_overwrite([output, picture], force)
     check_picture(picture)
-
-    from snakewalk.controller.animals.fish.fish_synthesis import (  # noqa: PLC0415
-        SynthesisOptions,
-        synthesise_motion,
-    )
-    from snakewalk.controller.animals.fish.postures import load_postures  # noqa: PLC0415
 
     options = SynthesisOptions(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,

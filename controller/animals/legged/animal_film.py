@@ -16,7 +16,7 @@ from snakewalk.controller.animals.mesh.body_skin import Cut, shipped_skin
 from snakewalk.controller.animals.mesh.rig import Rig
 from snakewalk.controller.animals.synthesis.synthesis_skin import film_over
 from snakewalk.controller.console.result_files import atomic_write
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 
 @dataclass(frozen=True, slots=True)

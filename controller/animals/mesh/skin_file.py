@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
 from snakewalk.controller.animals.mesh.rig import Rig
 from snakewalk.controller.images.mesh_files import SKIN_RGB
+from snakewalk.controller.track.bone_motion import BoneMotion
 
 MOST_BONES: Final = 256
 """Bones count in bytes."""

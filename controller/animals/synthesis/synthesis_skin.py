@@ -11,14 +11,14 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.animals.mesh.body_look import ANIMAL, animal, rig_look
 from snakewalk.controller.animals.mesh.body_motion import robot_skin
 from snakewalk.controller.animals.mesh.body_skin import BodySkin, body_skin
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
 from snakewalk.controller.animals.mesh.rig import spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.report.film import film_motion
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.track.bone_motion import BoneMotion
 
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import SkinLook

@@ -17,10 +17,50 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.faults import FaultPlan
+from snakewalk.config.loader import load, load_robot, load_world
+from snakewalk.controller.bench import inventory, scan
+from snakewalk.controller.bench.eeprom_backup import (
+    back_up_all,
+    backup_text,
+    load_backup,
+    plan_restore,
+)
+from snakewalk.controller.bench.live_table import LiveScreen, Snapshot
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.bench.servo_settings import (
+    SettingsRequest,
+    SettingsResult,
+    apply,
+    plan,
+    restart,
+)
+from snakewalk.controller.bench.sniff import receive, stand_between
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import ChainPort, Force, Json, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.priority import raised_priority
+from snakewalk.drivers.protocol.registers import BAUDS
+from snakewalk.sim.ax12.decode import Decoder1
+from snakewalk.sim.ax12.line import Ax12Line
+from snakewalk.sim.ax12.table import MODEL as AX12
+from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.plant import Mounting
+from snakewalk.sim.serve.bench_line import bench_line
+from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu
+from snakewalk.sim.serve.console import Console
+from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows
+from snakewalk.sim.serve.recorded_line import RecordedLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.motor import motors_of
+from snakewalk.sim.servo.protection import SupplyAndAmbient
+from snakewalk.sim.sniff.decode import Decoder
+from snakewalk.sim.sniff.trace import TraceWriter, read_trace
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,6 +85,10 @@ LATE_SHARE = 0.05
 """Of the time served: who left more of it out is told so at the end."""
 
 
+@command(
+    "bus serve",
+    examples=("bus serve --servos 1-16", "bus serve --robot yaw16 --faults faults.toml --pace 0.5"),
+)
 def serve(
     servos: Annotated[
         str | None,
@@ -82,10 +126,6 @@ def serve(
     as_json: Json = False,
 ) -> None:
     """Serve simulated servos at a serial device, in real time, with a live table."""
-    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415  --help stays quick
-    from snakewalk.drivers.priority import raised_priority  # noqa: PLC0415
-    from snakewalk.sim.sniff.trace import TraceWriter  # noqa: PLC0415
-
     try:
         from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415
     except ImportError:  # Windows
@@ -171,6 +211,7 @@ def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
         )
 
 
+@command("bus sniff", examples=("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))
 def sniff(
     source: Annotated[
         Path, typer.Argument(help="a recording (JSON lines, hex text, raw), or a serial device")
@@ -186,12 +227,6 @@ def sniff(
     as_json: Json = False,
 ) -> None:
     """Decode a live or recorded exchange packet by packet."""
-    from snakewalk.controller.bench.sniff import receive, stand_between  # noqa: PLC0415  --help stays quick
-    from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
-    from snakewalk.sim.ax12.table import MODEL as AX12  # noqa: PLC0415
-    from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
-    from snakewalk.sim.sniff.trace import read_trace  # noqa: PLC0415
-
     if not source.exists():
         raise InputError(f"{source}: no such file or device")
     decoder = Decoder1() if model.upper() == AX12 else Decoder(model)
@@ -222,10 +257,6 @@ def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served
     """What is served, its line, who looks at it, what puts its packets into words, its faults."""
     if play is None:
         return simulated()
-    from snakewalk.sim.serve.chain_spec import ChainSpec  # noqa: PLC0415  --help stays quick
-    from snakewalk.sim.serve.live_table import LiveTable  # noqa: PLC0415
-    from snakewalk.sim.serve.recorded_line import RecordedLine  # noqa: PLC0415
-    from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
 
     line = RecordedLine.of(play, baud or 1_000_000)
     spec = ChainSpec(tuple(line.ids), (f"recording {play}",) * len(line.ids))
@@ -240,16 +271,6 @@ def _simulated(
     faults: Path | None,
 ) -> "Served":
     """Simulated servos, as ``_served`` has them."""
-    from snakewalk.config.faults import FaultPlan  # noqa: PLC0415
-    from snakewalk.config.loader import load  # noqa: PLC0415
-    from snakewalk.sim.ax12.decode import Decoder1  # noqa: PLC0415
-    from snakewalk.sim.ax12.line import Ax12Line  # noqa: PLC0415
-    from snakewalk.sim.faults.fault_player import FaultPlayer  # noqa: PLC0415
-    from snakewalk.sim.serve.bench_line import bench_line  # noqa: PLC0415
-    from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu  # noqa: PLC0415
-    from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows  # noqa: PLC0415
-    from snakewalk.sim.sniff.decode import Decoder  # noqa: PLC0415
-
     spec = parse_chain(servos or "1-4")
     if robot is None:
         line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
@@ -267,13 +288,7 @@ def _simulated(
 
 
 def _robot_line(name: str, baud: int | None) -> "SimLine":
-    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415
-    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
     from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
-    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
-    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
-    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
-    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
 
     robot = load_robot(name)
     rate = baud or robot.servo.baud
@@ -321,7 +336,6 @@ def _run(
     if as_json or not sys.stderr.isatty():
         server.serve(stopped)
         return
-    from snakewalk.controller.bench.live_table import LiveScreen, Snapshot  # noqa: PLC0415
 
     with LiveScreen(make_decoder) as screen:
         due_s = 0.0
@@ -340,10 +354,6 @@ def _run(
 
 
 def _console(line: "Wire", player: "FaultPlayer | None", as_json: bool) -> "Console":
-    from snakewalk.config.faults import FaultPlan  # noqa: PLC0415  --help stays quick
-    from snakewalk.sim.faults.fault_player import FaultPlayer  # noqa: PLC0415
-    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
-    from snakewalk.sim.serve.console import Console  # noqa: PLC0415
 
     if as_json:
         raise InputError("--console: is a person's; leave --json out")
@@ -369,6 +379,13 @@ def _converse(server: "PtyServer", console: "Console", stopped: "Callable[[], bo
             print(console.execute(text), flush=True)
 
 
+@command(
+    "bus set",
+    examples=(
+        "bus set --id 1 --baud 57600 --new-id 7 --new-baud 1000000 --dry-run",
+        "bus set --id 7 --return-delay 0 --yes",
+    ),
+)
 def bus_set(
     servo_id: Annotated[int, typer.Option("--id", help="the servo, 0 to 252")],
     port: ChainPort = None,
@@ -387,16 +404,6 @@ def bus_set(
     as_json: Json = False,
 ) -> None:
     """Change settings of one servo that outlive its power; shows them and asks first."""
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.servo_settings import (  # noqa: PLC0415
-        SettingsRequest,
-        SettingsResult,
-        apply,
-        plan,
-    )
-    from snakewalk.drivers.errors import ControlTableError  # noqa: PLC0415
-    from snakewalk.drivers.protocol.registers import BAUDS  # noqa: PLC0415
-
     if baud not in BAUDS:
         raise ControlTableError(f"--baud {baud}: servos have {', '.join(map(str, BAUDS))}")
     request = SettingsRequest(
@@ -430,6 +437,9 @@ _Ids = Annotated[list[int], typer.Option("--id", help="a servo, 0 to 252; may be
 _Baud = Annotated[int, typer.Option(help="at which the servos answer")]
 
 
+@command(
+    "bus backup", examples=("bus backup -o servos.json", "bus backup --baud 57600 -o one.json")
+)
 def backup(
     out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
     port: ChainPort = None,
@@ -438,9 +448,6 @@ def backup(
     as_json: Json = False,
 ) -> None:
     """Write the EEPROM of all servos on the bus into a file; changes nothing."""
-    from snakewalk.controller.bench.eeprom_backup import back_up_all, backup_text  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
-
     refuse_to_overwrite([out], force)
     with open_lines(port, baud) as lines:
         found = back_up_all(lines, lambda step: typer.echo(step, err=True))
@@ -449,6 +456,7 @@ def backup(
     show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)
 
 
+@command("bus identify", examples=("bus identify", "bus identify --baud 1000000 -o mine.toml"))
 def bus_identify(
     port: ChainPort = None,
     baud: Annotated[
@@ -461,9 +469,6 @@ def bus_identify(
     as_json: Json = False,
 ) -> None:
     """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
-    from snakewalk.controller.bench import inventory, scan  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
-
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     refuse_to_overwrite([out], force)
@@ -511,6 +516,10 @@ def bus_identify(
         console.print(f"robot {out}: say the axes, then: snakewalk calibrate --robot {out}")
 
 
+@command(
+    "bus restore",
+    examples=("bus restore servos.json --dry-run", "bus restore servos.json --id 7 --yes"),
+)
 def restore(
     file: Annotated[Path, typer.Argument(help="of `snakewalk bus backup`", dir_okay=False)],
     servo_id: Annotated[
@@ -523,10 +532,6 @@ def restore(
     as_json: Json = False,
 ) -> None:
     """Write a backup's values where they differ; shows them and asks first."""
-    from snakewalk.controller.bench.eeprom_backup import load_backup, plan_restore  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
-    from snakewalk.controller.bench.servo_settings import apply  # noqa: PLC0415
-
     servos = {each.id: each for each in load_backup(file).servos}
     wanted = servo_id or list(servos)
     missing = [str(each) for each in wanted if each not in servos]
@@ -558,6 +563,7 @@ def restore(
         console.print("written and read back" if written else "nothing written")
 
 
+@command("bus reboot", examples=("bus reboot --id 3 --id 4",))
 def reboot(
     servo_id: _Ids,
     port: ChainPort = None,
@@ -566,9 +572,6 @@ def reboot(
     as_json: Json = False,
 ) -> None:
     """Restart servos, which clears their alarms; torque goes off: what they hold falls."""
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.servo_settings import restart  # noqa: PLC0415
-
     facts: dict[str, object] = {}
     with open_lines(port, baud) as lines:
         buses = {each: lines.open_servo(each) for each in servo_id}
@@ -583,6 +586,7 @@ def reboot(
     show(facts or {"rebooted": "none"}, as_json)
 
 
+@command("bus blink", examples=("bus blink --id 7 --times 10",))
 def blink(
     servo_id: _Ids,
     port: ChainPort = None,
@@ -591,8 +595,6 @@ def blink(
     as_json: Json = False,
 ) -> None:
     """Let the LED of servos blink, to find them; nothing moves."""
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415  --help stays quick
-
     with open_lines(port, baud) as lines:
         buses = {each: lines.open_servo(each) for each in servo_id}
         clock = lines.lines[0][0].clock

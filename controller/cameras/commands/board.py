@@ -7,7 +7,9 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
 if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
@@ -32,6 +34,10 @@ def read_squares(text: str) -> tuple[int, int]:
     return int(across), int(down)
 
 
+@command(
+    "camera board",
+    examples=("camera board -o board.pdf", "camera board -o a3.pdf --squares 9x6 --square 42"),
+)
 def board(
     out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
     pattern: Pattern = "charuco",
@@ -45,9 +51,6 @@ def board(
     from snakewalk.controller.cameras.calibration_board import (  # noqa: PLC0415
         CalibrationBoard,
         read_pattern,
-    )
-    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
-        refuse_to_overwrite,
     )
 
     made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
@@ -73,8 +76,6 @@ def write_print(out: Path, pages: "list[Image]") -> None:
     """Write pages (H, W) in their true size with a white margin of 10 mm."""
     from PIL import Image as Pictures  # noqa: PLC0415  an extra
     from PIL import ImageOps  # noqa: PLC0415
-
-    from snakewalk.controller.console.result_files import atomic_write  # noqa: PLC0415
 
     margin = round(10.0 / 25.4 * DOTS)
     sheets = [ImageOps.expand(Pictures.fromarray(page), margin, 255) for page in pages]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.commands.board import (
@@ -14,7 +15,10 @@ from snakewalk.controller.cameras.commands.board import (
     Squares,
     read_squares,
 )
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.drivers.clock import WallClock
 
 if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
@@ -25,6 +29,13 @@ _PAUSE_S = 0.7
 """Between pictures of a device: time to move the board."""
 
 
+@command(
+    "camera calibrate",
+    examples=(
+        "camera calibrate pictures -o lens.yml",
+        "camera calibrate 0 -o lens.yml --size 1280x720",
+    ),
+)
 def calibrate_camera(
     source: Annotated[str, typer.Argument(help="folder of pictures, a film, or a device's number")],
     out: Annotated[Path, typer.Option("--out", "-o", help="the lens's file (.yml, .json)")],
@@ -46,10 +57,6 @@ def calibrate_camera(
         read_pattern,
     )
     from snakewalk.controller.cameras.lens_calibration import calibrate_lens  # noqa: PLC0415
-    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
-        atomic_write,
-        refuse_to_overwrite,
-    )
 
     if out.suffix.lower() not in _ENDINGS:
         raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
@@ -110,9 +117,7 @@ def _from_device(
     """Take pictures one after another and say of each whether the board was found in it."""
     import numpy as np  # noqa: PLC0415  --help stays quick
 
-    from snakewalk.config.camera import CameraConfig  # noqa: PLC0415
     from snakewalk.controller.cameras.device_camera import open_device  # noqa: PLC0415  an extra
-    from snakewalk.drivers.clock import WallClock  # noqa: PLC0415
 
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):

@@ -8,9 +8,15 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import refuse_to_overwrite
 
 
+@command(
+    "camera markers",
+    examples=("camera markers -o markers.pdf", "camera markers -o a3.pdf --side 250 --count 4"),
+)
 def markers(
     out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
     count: Annotated[int, typer.Option(min=1, max=50, help="markers, a page each")] = 6,
@@ -26,9 +32,6 @@ def markers(
     """
     require_extra("markers need", "cv2", "PIL")
     from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet  # noqa: PLC0415
-    from snakewalk.controller.console.result_files import (  # noqa: PLC0415  --help stays quick
-        refuse_to_overwrite,
-    )
 
     check_print(out)
     if out.suffix.lower() == ".png" and count > 1:

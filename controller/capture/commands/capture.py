@@ -7,9 +7,20 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import Json, show
 
 
+@command(
+    "capture",
+    group=RECORDINGS,
+    examples=(
+        "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
+        "capture frames/ --cropped --overlay overlay.mp4 --force --json",
+        "capture film.mp4 --review review.html",
+        "capture track.npz --corrections track-corrections.json -o corrected.npz",
+    ),
+)
 def capture(
     recording: Annotated[
         Path,

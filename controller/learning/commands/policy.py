@@ -12,7 +12,9 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import shipped
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -32,9 +34,15 @@ from snakewalk.controller.console.options import (
     World,
     console,
     key_values,
-    show_run,
 )
+from snakewalk.controller.console.progress import ProgressBar, TimeBar, in_real_time, show_progress
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite, run_folder
+from snakewalk.controller.learning import policy_trials as study
+from snakewalk.controller.motion.policy import load_policy
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_policy
+from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
     from snakewalk.controller.learning.policy_trials import PolicyTrial, PolicyTrialResult
@@ -45,11 +53,9 @@ Name = Annotated[
 ]
 
 
+@command("policy list", examples=("policy list --json",))
 def list_policies(as_json: Json = False) -> None:
     """List the shipped policies, and how each was learnt."""
-    from snakewalk.config.loader import shipped  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.motion.policy import load_policy  # noqa: PLC0415
-
     policies = [load_policy(name) for name in shipped("policies")]
     if as_json:
         rows = [
@@ -76,6 +82,14 @@ def list_policies(as_json: Json = False) -> None:
     console.print(table)
 
 
+@command(
+    "policy run",
+    examples=(
+        "policy run wave-cma --seconds 10",
+        "policy run mine.toml --set world.friction.across=0.3 --json",
+        "policy run wave-ppo --port /dev/ttyUSB0",
+    ),
+)
 def run_policy(
     name: Name,
     robot: Robot = None,
@@ -96,11 +110,6 @@ def run_policy(
     as_json: Json = False,
 ) -> None:
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_policy  # noqa: PLC0415
-
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)
     run_name = prepared.run.name
@@ -132,6 +141,10 @@ def run_policy(
     show_run(finished, folder, result, as_json, film=film)
 
 
+@command(
+    "policy learn",
+    examples=("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+)
 def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
     robot: GivenRobot = "yaw16",
@@ -151,7 +164,6 @@ def learn_policy(
     refuse_to_overwrite([out], force)
     require_extra("learning a policy needs", "cma", "gymnasium", "mujoco")
 
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.learning.wave_search import search_wave  # noqa: PLC0415
 
     with ProgressBar(f"{robot} on {world}", generations) as bar:
@@ -171,6 +183,13 @@ def learn_policy(
     console.print(f"{out}: {policy.origin.steps} steps; snakewalk policy run {out}")
 
 
+@command(
+    "policy trials",
+    examples=(
+        "policy trials wave-cma wave-ppo lateral-undulation --first-seed 1000",
+        "policy trials mine.toml wave-cma --world flat --world flat-friction-3 --json",
+    ),
+)
 def policy_trials(
     motions: Annotated[
         list[str],
@@ -192,9 +211,6 @@ def policy_trials(
 ) -> None:
     """Compare policies with gaits: the same seeds move start, friction and supply of all."""
     require_extra("trials need", "mujoco")
-
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.learning import policy_trials as study  # noqa: PLC0415
 
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
     rows = list(dict.fromkeys(rows))  # what is given twice is run once

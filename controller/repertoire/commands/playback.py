@@ -6,6 +6,8 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.playback import ScheduleConfig
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -20,11 +22,23 @@ from snakewalk.controller.console.options import (
     ViewAt,
     World,
     key_values,
-    show_run,
 )
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
+from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import watched
 
 
+@command(
+    "repertoire play",
+    examples=(
+        "repertoire play --speed 0.6 --turn 0.3",
+        "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
+    ),
+)
 def play_actions(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     speed: Annotated[
@@ -64,13 +78,6 @@ def play_actions(
     refuse_to_overwrite([picture], force)
     check_picture(picture)
     import numpy as np  # noqa: PLC0415  --help stays quick
-
-    from snakewalk.config.playback import ScheduleConfig  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415
-    from snakewalk.controller.run.factory import prepare_schedule  # noqa: PLC0415
 
     given = {"speed_m_s": speed, "turn_rad_s": turn, "duration_s": seconds}
     changes = {key: value for key, value in given.items() if value is not None}

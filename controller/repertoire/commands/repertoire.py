@@ -8,7 +8,9 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -22,23 +24,31 @@ from snakewalk.controller.console.options import (
     ViewAt,
     console,
     show,
-    write_artifacts,
 )
+from snakewalk.controller.console.progress import ProgressBar, TimeBar, in_real_time
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
     run_folder,
 )
+from snakewalk.controller.repertoire.repertoire import load_repertoire
+from snakewalk.controller.repertoire.repertoire_planning import default_file, flat, load_plan
+from snakewalk.controller.repertoire.repertoire_run import run_name, run_route
+from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
-    from snakewalk.controller.cli.watchers import Watchers
     from snakewalk.controller.repertoire.repertoire import Repertoire
     from snakewalk.controller.repertoire.repertoire_run import RepertoireRun
+    from snakewalk.controller.run.watchers import Watchers
 
 Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
 
 
+@command(
+    "repertoire record", examples=("repertoire record", "repertoire record -o yaw16.npz --json")
+)
 def record(
     robot: GivenRobot = "yaw16",
     world: Annotated[
@@ -56,9 +66,6 @@ def record(
     check_picture(picture)
     refuse_to_overwrite([out, picture], force)
 
-    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire_planning import default_file, flat  # noqa: PLC0415
     from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record  # noqa: PLC0415
 
     body, ground = load_robot(robot), load_world(world)
@@ -85,6 +92,7 @@ def record(
     _show_actions(file, repertoire, as_json)
 
 
+@command("repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",))
 def show_file(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     picture: Picture = None,
@@ -95,8 +103,6 @@ def show_file(
     refuse_to_overwrite([picture], force)
     check_picture(picture)
 
-    from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
-
     repertoire = load_repertoire(file)
     if picture is not None:
         from snakewalk.controller.repertoire import repertoire_plots as plots  # noqa: PLC0415
@@ -105,6 +111,10 @@ def show_file(
     _show_actions(file, repertoire, as_json)
 
 
+@command(
+    "repertoire run",
+    examples=("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
+)
 def run_plan(
     plan: Annotated[Path, typer.Argument(help="made by: snakewalk plan --with repertoire -o")],
     port: RunPort = None,
@@ -122,9 +132,6 @@ def run_plan(
 ) -> None:
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     refuse_to_overwrite([picture], force)
-
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire_planning import load_plan  # noqa: PLC0415  heavy
 
     job = load_plan(plan, replan=not open_loop)
     with watched(view, view_at, ros) as watchers:
@@ -144,9 +151,6 @@ def carry_out(
     watchers: "Watchers | None" = None,
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; what it did, and whether it reached every waypoint."""
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire_run import run_name, run_route  # noqa: PLC0415
-
     check_picture(picture)
     with (
         run_folder(run_name(job), out) as folder,

@@ -5,11 +5,16 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, Look, show, write_artifacts
+from snakewalk.controller.console.options import Force, Json, Look, show
 from snakewalk.controller.console.result_files import refuse_mixture
+from snakewalk.controller.run.film_look import check_look
+from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.runlog.reader import read_log
 
 
+@command("report", group=JOB, examples=("report runs/flat-square-walk-seed0/log.mcap",))
 def report(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     out: Annotated[
@@ -22,9 +27,6 @@ def report(
     as_json: Json = False,
 ) -> None:
     """Make report.html, summary.json and film.mp4 again from a log."""
-    from snakewalk.controller.animals.mesh.body_look import check_look  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415  heavy; --help stays quick
-
     check_look(look)
     record = read_log(log)
     if record.note:

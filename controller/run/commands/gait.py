@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
+from snakewalk.config.loader import load_gait, shipped
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, console, key_values, show
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.figures.gait import draw_gait
+from snakewalk.controller.gaits.gait import ranges
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.motion.gait_cycle import GaitCycle
+from snakewalk.controller.run.factory import prepare_gait
 
 if TYPE_CHECKING:
     from snakewalk.controller.gaits.gait import Gait
@@ -25,11 +32,9 @@ Param = Annotated[
 ]
 
 
+@command("gait list", examples=("gait list --json",))
 def list_gaits(as_json: Json = False) -> None:
     """List the gaits, what joints they need, and the shipped sets of their parameters."""
-    from snakewalk.config.loader import load_gait, shipped  # noqa: PLC0415
-    from snakewalk.controller.gaits.registry import GAITS  # noqa: PLC0415  heavy; --help stays quick
-
     sets = [load_gait(name) for name in shipped("gaits")]
     if as_json:
         rows = [
@@ -54,6 +59,7 @@ def list_gaits(as_json: Json = False) -> None:
         console.print(table)
 
 
+@command("gait show", examples=("gait show sidewinding", "gait show rolling --picture rolling.png"))
 def show_gait(
     name: Name,
     robot: Robot = None,
@@ -67,11 +73,6 @@ def show_gait(
     """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
     check_picture(picture)
     refuse_to_overwrite([picture], force)
-
-    from snakewalk.controller.figures.gait import draw_gait  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.gaits.gait import ranges  # noqa: PLC0415
-    from snakewalk.controller.motion.gait_cycle import GaitCycle  # noqa: PLC0415
-    from snakewalk.controller.run.factory import prepare_gait  # noqa: PLC0415
 
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
     gait, body = prepared.gait, prepared.robot

@@ -9,8 +9,15 @@ import typer
 
 from snakewalk.config.archive import why_no_file
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
-from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+from snakewalk.controller.gaits.backbone import fit_backbone
 
 if TYPE_CHECKING:
     from snakewalk.controller.gaits.backbone import BackboneFit
@@ -18,6 +25,10 @@ if TYPE_CHECKING:
 COLUMNS = ("x_m", "y_m", "z_m")
 
 
+@command(
+    "gait fit",
+    examples=("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
+)
 def fit_gait(
     curve: Annotated[
         Path, typer.Argument(help="table with the columns x_m, y_m, z_m: a curve, head first")
@@ -34,10 +45,6 @@ def fit_gait(
 ) -> None:
     """Lay the robot on a curve in space: joint angles, and how far the joints are from it."""
     import numpy as np  # noqa: PLC0415  heavy; --help stays quick
-
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415
-    from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite  # noqa: PLC0415
-    from snakewalk.controller.gaits.backbone import fit_backbone  # noqa: PLC0415
 
     check_picture(picture)
     if output is not None and output.suffix.lower() != ".npz":

@@ -1,7 +1,6 @@
 """``snakewalk run``: the main job, on servos or in the simulator."""
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     VIEW_AT,
@@ -18,6 +18,7 @@ from snakewalk.controller.console.options import (
     Json,
     Look,
     Motion,
+    Observe,
     Robot,
     Ros,
     RunFolder,
@@ -32,11 +33,16 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
     show,
-    write_artifacts,
 )
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.run.finish import write_artifacts
 
 
+@command(
+    "run",
+    group=JOB,
+    examples=("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0"),
+)
 def run(
     run: RunName = DEFAULT_RUN,
     port: RunPort = None,
@@ -48,7 +54,7 @@ def run(
     pose: Annotated[
         str | None,
         typer.Option(
-            help="what measures the head: simulator, camera, imu or joints",
+            help="pose source of the head: simulator, camera, imu, joints, or that of a plug-in",
             autocompletion=completion.words("simulator", "camera", "imu", "joints"),
         ),
     ] = None,
@@ -76,21 +82,24 @@ def run(
     view: View = False,
     view_at: ViewAt = VIEW_AT,
     ros: Ros = False,
+    observe: Observe = None,
     film: Film = True,
     look: Look = "servos",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.animals.mesh.body_look import check_look  # noqa: PLC0415
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.console.progress import PathBar, in_real_time  # noqa: PLC0415
+    from snakewalk.controller.console.progress import in_real_time  # noqa: PLC0415
     from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
     from snakewalk.controller.run.factory import (  # noqa: PLC0415
+        changed,
         prepare_job,
         with_compliance,
         with_map,
     )
+    from snakewalk.controller.run.film_look import check_look  # noqa: PLC0415
+    from snakewalk.controller.run.progress_bar import progress_bar  # noqa: PLC0415
+    from snakewalk.controller.run.watchers import watched  # noqa: PLC0415
 
     check_look(look)
     if live and not view:
@@ -99,18 +108,18 @@ def run(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
         track=track, pose=pose,
     )  # fmt: skip
-    prepared = replace(prepared, run=with_map(with_compliance(prepared.run, compliance), map_))
-    changed = [Path(each).stem for each in (robot, world, track) if each is not None]
-    parts = [prepared.run.name, *changed, prepared.run.motion, f"seed{prepared.run.seed}"]
+    prepared = changed(prepared, run=with_map(with_compliance(prepared.run, compliance), map_))
+    replaced = [Path(each).stem for each in (robot, world, track) if each is not None]
+    parts = [prepared.run.name, *replaced, prepared.run.motion, f"seed{prepared.run.seed}"]
     if prepared.run.pose is not None:
         parts.append(f"pose-{prepared.run.pose}")
     if prepared.run.mapping is not None:
-        parts.append("map-stereo")
+        parts.append(f"map-{prepared.run.mapping.source}")
     name = "-".join(parts)
     with (
         run_folder(name, out) as folder,
-        watched(view, view_at, ros) as watchers,
-        PathBar(prepared.path.length_m) as bar,
+        watched(view, view_at, ros, observe) as watchers,
+        progress_bar(prepared) as bar,
     ):
         page = watchers.page if watchers is not None and live else None
         if page is not None:

@@ -1,19 +1,19 @@
-"""What measures the head in a run: the simulator, an overhead camera, an IMU, or the joints."""
+"""The pose source of a run: a plug-in that provides the pose of the head link."""
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
-from snakewalk.config.camera import CameraConfig
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import FlatGround, WorldConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.console.plugins import require
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.pose.dead_reckoning import DeadReckoning
 from snakewalk.controller.run.backend import Backend
@@ -21,54 +21,63 @@ from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runtime.drive import OnEvent, PoseSource
 from snakewalk.drivers.types import BodyPose, JointState
 
-if TYPE_CHECKING:
-    from snakewalk.controller.cameras.camera_pose import CameraPose
-    from snakewalk.controller.cameras.device_camera import DeviceCamera
-    from snakewalk.controller.cameras.rendered_camera import OnPicture, RenderedCamera
+OnPicture = Callable[[Image, float], None]
+"""Accepts a picture (H, W, 3), blue first, and its time in seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseContext:
+    """What a pose source may use of a run."""
+
+    prepared: PreparedRun
+    backend: Backend
+    reckoning: DeadReckoning
+    """Dead reckoning from the joints, which a source may use as its prediction."""
+    argument: str
+    """Text after the colon of ``--pose NAME:ARGUMENT``."""
+    on_event: OnEvent
+    on_picture: OnPicture
+    """Accepts each picture of a camera with its time."""
+
+
+class PosePlugin(Protocol):
+    """A pose source, as a plug-in of the kind ``pose`` provides it."""
+
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return why the source cannot work in a run, one line per fault."""
+        ...
+
+    def open(self, context: PoseContext) -> AbstractContextManager["PoseProvider"]:
+        """Open the source for the time of a run."""
+        ...
+
+
+def pose_plugin(pose: str) -> tuple[PosePlugin, str]:
+    """Return the pose source that ``pose`` or ``--pose`` names, and its argument.
+
+    Raises:
+        InputError: there is no such source.
+
+    """
+    name, _, argument = pose.partition(":")
+    return require("pose", name, "pose").load()(), argument
 
 
 def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal: bool) -> None:
-    """Refuse a pose source that cannot work here.
+    """Reject a pose source that cannot work here.
 
     Raises:
-        InputError: one line per fault, or the extra that an overhead camera needs is not there.
+        InputError: one line per fault, or an extra that the source needs is missing.
 
     """
-    faults = []
-    if run.pose == "simulator" and metal:
-        faults.append("pose: servos on a port have no simulator; take camera, imu or joints")
-    if run.pose == "imu" and robot.imu is None:
-        faults.append(f"pose: robot {robot.name} has no IMU: describe it in its file, table [imu]")
-    if run.pose == "camera":
-        require_extra("pose: the overhead camera needs", "cv2", "skimage")
-        if not isinstance(world.ground, FlatGround) or world.obstacle is not None:
-            faults.append(
-                f"pose: the overhead camera needs a bare level floor; world {world.name} has none"
-            )
-        if run.motion == "gait" and robot.pitch_joints:
-            faults.append(
-                f"pose: the overhead camera takes the body to lie flat; a gait of {robot.name} "
-                "lifts or rolls it"
-            )
-        if run.camera.height_m <= 4.0 * robot.body_radius_m:
-            faults.append("camera: height_m: the lens must be well above the robot")
-        if metal:
-            faults += _missing(run.camera)
+    if run.pose is None:
+        return
+    source, _ = pose_plugin(run.pose)
+    faults = source.faults(run, robot, world, on_port=metal)
     if faults:
         raise InputError(faults)
-
-
-def _missing(camera: CameraConfig) -> list[str]:
-    return [
-        f"camera: {key}: needed with servos on a port: {why}"
-        for key, why in (
-            ("device", "number, device or address of the camera"),
-            ("background", "an image of the empty floor"),
-            ("centre_m", "the floor's place under the lens"),
-        )
-        if getattr(camera, key) is None
-        and not (key == "centre_m" and camera.markers_m is not None and camera.lens is not None)
-    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,16 +114,15 @@ class PoseProvider:
     """Measures the pose of the head for a run; knows afterwards how well."""
 
     measure: PoseSource
-    camera: "CameraPose | None" = None
+    source_facts: Callable[[], dict[str, float | int]] = dict
+    """Numbers of the source itself, for example the frames of a camera."""
     error: PoseError | None = None
     """Set at the end of a run whose pose was estimated while the simulator knew the true one."""
 
     def facts(self) -> dict[str, float | int]:
         """Frames of a camera, and errors where the true pose is known."""
         facts: dict[str, float | int] = {} if self.error is None else self.error.facts()
-        if self.camera is not None:
-            facts |= {"frames": self.camera.frames, "frames_used": self.camera.used}
-        return facts
+        return facts | self.source_facts()
 
 
 @dataclass
@@ -151,7 +159,7 @@ def pose_provider(
     prepared: PreparedRun,
     backend: Backend,
     on_event: OnEvent,
-    on_picture: "OnPicture" = lambda picture, time_s: None,
+    on_picture: OnPicture = lambda picture, time_s: None,
 ) -> Iterator[PoseProvider]:
     """Make the provider that the run asks for; at its end ``on_event`` takes how good it was.
 
@@ -174,16 +182,14 @@ def pose_provider(
         prepared.start_heading_rad,
         imu=run.pose == "imu" or (run.pose is None and robot.imu is not None),
     )
-    provider = PoseProvider(reckoning)
     comparison: PoseComparison | None = None
     with ExitStack() as stack:
-        if run.pose == "camera":
-            from snakewalk.controller.cameras.camera_pose import CameraPose  # noqa: PLC0415  OpenCV is an extra
-
-            device = stack.enter_context(closing(_camera(prepared, backend, on_picture)))
-            provider.measure = provider.camera = CameraPose(
-                robot, device, reckoning, lambda text: on_event("camera", text)
-            )
+        if run.pose is None:
+            provider = PoseProvider(reckoning)
+        else:
+            source, argument = pose_plugin(run.pose)
+            context = PoseContext(prepared, backend, reckoning, argument, on_event, on_picture)
+            provider = stack.enter_context(source.open(context))
         if true is not None:
             provider.measure = comparison = PoseComparison(prepared, provider.measure, true)
         yield provider
@@ -194,17 +200,50 @@ def pose_provider(
         on_event("pose", ", ".join(f"{key} {value}" for key, value in facts.items()))
 
 
-def _camera(
-    prepared: PreparedRun, backend: Backend, on_picture: "OnPicture"
-) -> "RenderedCamera | DeviceCamera":
-    run, robot, clock = prepared.run, prepared.robot, backend.clock
-    if backend.qpos is None:
-        from snakewalk.controller.cameras.device_camera import DeviceCamera  # noqa: PLC0415  OpenCV is an extra
+class _Reckoned:
+    """A pose source that integrates the pose from the joints."""
 
-        return DeviceCamera(run, robot, clock, on_picture)
-    from snakewalk.controller.cameras.rendered_camera import RenderedCamera  # noqa: PLC0415  OpenCV is an extra
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return why the source cannot work in a run, one line per fault."""
+        return []
 
-    return RenderedCamera(run, robot, prepared.world, backend.qpos, clock, on_picture)
+    @contextmanager
+    def open(self, context: PoseContext) -> Iterator[PoseProvider]:
+        """Open the source for the time of a run."""
+        yield PoseProvider(context.reckoning)
+
+
+@plugin("pose", "joints")
+class JointsPose(_Reckoned):
+    """Dead reckoning from the joint angles alone."""
+
+
+@plugin("pose", "imu")
+class ImuPose(_Reckoned):
+    """Dead reckoning from the joint angles and the heading of the robot's IMU."""
+
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return a fault where the robot has no IMU."""
+        if robot.imu is not None:
+            return []
+        return [f"pose: robot {robot.name} has no IMU: describe it in its file, table [imu]"]
+
+
+@plugin("pose", "simulator")
+class SimulatorPose(_Reckoned):
+    """The true pose of the simulated body."""
+
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return a fault where servos are on a port."""
+        if not on_port:
+            return []
+        return ["pose: servos on a port have no simulator; take camera, imu or joints"]
 
 
 def _rms(values: Floats) -> float:

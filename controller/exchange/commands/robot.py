@@ -1,53 +1,24 @@
-"""``snakewalk list`` and ``robot``: what is shipped; a robot in figures, and as files."""
+"""``snakewalk robot``: a robot in figures, and as files of other programs."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 from rich.table import Table
 
-from snakewalk.config.errors import InputError
-from snakewalk.controller.console import completion
-from snakewalk.controller.console.options import Force, Json, console, show
+from snakewalk.config.errors import Assumptions, InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load_robot
+from snakewalk.config.template import robot_toml
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Assume, Force, Json, RobotName, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
-
-RobotName = Annotated[
-    str, typer.Argument(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
-]
+from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 
 
-def list_(as_json: Json = False) -> None:
-    """List what is shipped: runs, robots, worlds, recordings, policies, sets of gait parameters."""
-    from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped  # noqa: PLC0415  --help stays quick
-
-    rows = {
-        "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
-        "robots": [
-            [n, f"{b.joint_count} {', '.join(dict.fromkeys(b.servo_models))}, {b.length_m:.2f} m"]
-            for n in shipped("robots")
-            for b in [load_robot(n)]
-        ],
-        "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
-        "recordings": [[n, "snakewalk track, play, run --track"] for n in shipped("recordings")],
-        "policies": [[n, "snakewalk policy list, run"] for n in shipped("policies")],
-        "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
-    }
-    if as_json:
-        print(json.dumps({kind: [name for name, _ in rs] for kind, rs in rows.items()}))
-        return
-    for kind, lines in rows.items():
-        table = Table(title=kind, title_justify="left", box=None, show_header=False)
-        for line in lines:
-            table.add_row(f"  {line[0]}", line[1])
-        console.print(table)
-    console.print("all gaits: snakewalk gait list")
-
-
+@command("robot show", examples=("robot show alternating16", "robot show my.toml"))
 def show_robot(name: RobotName, as_json: Json = False) -> None:
     """Show a robot: its links, and servo, sign, zero and limit of each joint."""
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415  --help stays quick
-
     robot = load_robot(name)
     columns = (robot.servo_ids, robot.servo_models, robot.signs, robot.zeros_rad, robot.limit_rad)
     joints: list[dict[str, object]] = [
@@ -96,30 +67,42 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
             console.print(table)
 
 
+@command(
+    "robot import",
+    examples=(
+        "robot import snake.urdf -o snake.toml",
+        "robot import swimmer.xml -o swimmer.toml --scale 0.1 --servo XL330-M288",
+    ),
+)
 def import_robot(
-    file: Annotated[Path, typer.Argument(help="MuJoCo model (.xml) or URDF of a chain")],
+    file: Annotated[Path, typer.Argument(help="URDF, xacro or MuJoCo model (.xml)")],
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
     servo: Annotated[
         str, typer.Option(help="model of all servos, which such files do not know")
     ] = ("XM430-W350"),
     scale: Annotated[float, typer.Option(help="lengths times this, masses times its cube")] = 1.0,
     reverse: Annotated[bool, typer.Option(help="the model's first body is the tail")] = False,
+    assume: Assume = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a robot's file of another program's model; what cannot be said there is told."""
-    from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.template import robot_toml  # noqa: PLC0415
-
+    """Make a robot's file of another program's model; report what was dropped or changed."""
     require_extra("MuJoCo models and URDF need", "mujoco")
-    from snakewalk.controller.exchange import robot_import  # noqa: PLC0415
+    from snakewalk.controller.exchange.robot_import import robot_import  # noqa: PLC0415
 
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:
         raise InputError(f"--scale {scale:g}: 0.001 to 1000")
     refuse_to_overwrite([out], force)
-    made = robot_import.import_robot(file, out.stem, servo, scale=scale, reverse=reverse)
+    made = robot_import.import_robot(
+        file,
+        out.stem,
+        servo,
+        scale=scale,
+        reverse=reverse,
+        assumed=Assumptions(assume or ()),
+    )
     joints = ", ".join(made.joint_names)
     comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
     comment += [f"- {note}" for note in made.notes]
@@ -138,6 +121,7 @@ def import_robot(
         console.print(f"- {note}", markup=False)
 
 
+@command("robot export", examples=("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",))
 def export_robot(
     name: RobotName,
     urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,
@@ -156,10 +140,6 @@ def export_robot(
     as_json: Json = False,
 ) -> None:
     """Write a robot for other programs: the same masses and kinematics."""
-    from snakewalk.config.extras import require_extra  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415
-    from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text  # noqa: PLC0415
-
     if urdf is None and mjcf is None:
         raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
     if ros2_control is not None and urdf is None:

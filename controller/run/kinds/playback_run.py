@@ -11,9 +11,9 @@ from snakewalk.config.playback import PlaybackConfig
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
-from snakewalk.controller.run.recorded_joints import recorded_joints
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.track.recorded_joints import recorded_joints
 
 _LINEAR = 0.9  # of the limit: angles up to it are played as they are
 _MOST = 0.995  # of the limit: the spline between frames goes a little beyond them
