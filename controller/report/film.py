@@ -50,7 +50,7 @@ def film_run(
 
     """
     require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+    from snakewalk.sim.rendering.film import Marks, Style, render_film  # noqa: PLC0415  an extra
 
     header = record.header
     time_s, qpos = body_qpos(record)
@@ -65,16 +65,20 @@ def film_run(
         time_s,
         qpos,
         path,
-        fps=FINE_FPS if fine else FPS,
-        speed_up=speed_up(float(time_s[-1] - time_s[0])),
-        size=FINE_SIZE if fine else SIZE,
-        waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
-        waypoint_radius_m=plan.waypoint_radius_m,
-        reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
-        paths=record.paths,
-        title=header.run.name,
-        look=look,
-        fine=fine,
+        style=Style(
+            fps=FINE_FPS if fine else FPS,
+            speed_up=speed_up(float(time_s[-1] - time_s[0])),
+            size=FINE_SIZE if fine else SIZE,
+            title=header.run.name,
+            look=look,
+            fine=fine,
+        ),
+        marks=Marks(
+            waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
+            waypoint_radius_m=plan.waypoint_radius_m,
+            reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
+            paths=record.paths,
+        ),
         on_frame=on_progress,
     )
 
@@ -115,7 +119,7 @@ def film_motion(
 
     """
     require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+    from snakewalk.sim.rendering.film import Marks, Style, render_film  # noqa: PLC0415  an extra
 
     frames, bones = motion.front_m.shape[:2]
     turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
@@ -127,15 +131,8 @@ def film_motion(
         motion.time_s,
         poses.reshape(frames, -1),
         path,
-        fps=FPS,
-        speed_up=speed_up(float(motion.time_s[-1])),
-        size=SIZE,
-        waypoints_m=waypoints_m,
-        waypoint_radius_m=waypoint_radius_m,
-        reached_s=reached_s,
-        paths=paths,
-        title=title,
-        look=look,
+        style=Style(FPS, speed_up(float(motion.time_s[-1])), SIZE, title, look),
+        marks=Marks(waypoints_m, waypoint_radius_m, reached_s, paths),
         on_frame=on_progress,
     )
 
