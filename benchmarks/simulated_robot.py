@@ -65,16 +65,7 @@ class NoLog(RunLog):
     def cycle(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
-    def pose(self, *given: Any, **named: Any) -> None:
-        """Nothing."""
-
-    def walk(self, *given: Any, **named: Any) -> None:
-        """Nothing."""
-
-    def friction(self, *given: Any, **named: Any) -> None:
-        """Nothing."""
-
-    def path_replanned(self, *given: Any, **named: Any) -> None:
+    def add(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
     def event(self, *given: Any, **named: Any) -> None:

@@ -30,6 +30,10 @@ RunName = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+Assume = Annotated[
+    list[str] | None,
+    typer.Option(help="KEY=VALUE for what the file does not state; may be repeated"),
+]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
 Motion = Annotated[

@@ -23,7 +23,20 @@ from rclpy.signals import SignalHandlerOptions
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.exchange.ros_messages import ERROR, OK, WARNING, RosMessages
+from snakewalk.controller.exchange.ros_messages import (
+    DIAGNOSTICS,
+    ERROR,
+    HEAD_POSE,
+    IMU,
+    JOINT_GOALS,
+    JOINT_STATES,
+    OK,
+    PATH,
+    TYPES,
+    WARNING,
+    RosMessages,
+    Row,
+)
 from snakewalk.controller.motion.command import (
     JOINTS_MAX,
     POINTS_MAX,
@@ -40,12 +53,21 @@ from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.factory import gait_by_name, is_gait
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.runlog.row_line import BUTTON, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.topics import (
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    PoseTable,
+    SlowTable,
+)
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.safety.stop_button import PressedButton
 
 NAME: Final = "snakewalk"
+_CYCLE: Final = CycleTable.topic.name
+_SLOW: Final = SlowTable.topic.name
 _WAIT_S: Final = 0.05
 _DIAGNOSTICS_S: Final = 1.0
 _OFFSET_SPAN_S: Final = 2.0
@@ -60,14 +82,14 @@ newer ones of the same joints follow."""
 _QUEUE: Final = QoSProfile(depth=10)
 _LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TOPICS: Final = {
-    "/joint_states": ("robot_joint_states", "sensor_msgs/msg/JointState", _QUEUE),
-    "/joint_goals": ("robot_joint_goals", "sensor_msgs/msg/JointState", _QUEUE),
-    "/head_pose": ("head_pose", "geometry_msgs/msg/PoseStamped", _QUEUE),
-    "/imu": ("imu", "sensor_msgs/msg/Imu", _QUEUE),
-    "/path": ("path", "nav_msgs/msg/Path", _LATCHED),
-    "/diagnostics": ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", _QUEUE),
+    JOINT_STATES: ("robot_joint_states", _QUEUE),
+    JOINT_GOALS: ("robot_joint_goals", _QUEUE),
+    HEAD_POSE: ("head_pose", _QUEUE),
+    IMU: ("imu", _QUEUE),
+    PATH: ("path", _LATCHED),
+    DIAGNOSTICS: (DIAGNOSTICS, _QUEUE),
 }
-"""Topic of a bag to name, type and quality of service of a node's; diagnostics are everybody's."""
+"""Topic of a bag to name and quality of service of a node's; all nodes share diagnostics."""
 
 
 def serve(line: socket.socket, options: RosOptions) -> None:
@@ -188,7 +210,7 @@ class RobotNode:
         """Take the rows that have come, publish them, and hand the run what was commanded."""
         for topic, row in self._end.rows(wait_s):
             self._take(topic, row)
-            if topic == "/pose":
+            if topic == PoseTable.topic.name:
                 self._publish_cycle()
                 self._send()
         self._publish_diagnostics()
@@ -204,48 +226,49 @@ class RobotNode:
         self._clock.sleep_until_s(self._clock.now_s() + _LAST_S)
 
     def _take(self, topic: str, row: Mapping[str, Any]) -> None:
-        if topic == "/button":
+        if topic == BUTTON:
             self._button = PressedButton(Path(row["path"]))
-        elif topic == "/config":
+        elif topic == ConfigTable.topic.name:
             self._begin(record_of({topic: [row]}, complete=False, note=""))
-        elif topic == "/path":
+        elif topic == PATH:
             self._publish(self._messages.paths(self._record({topic: [row]})), skip=1)
-        elif topic == "/event":
+        elif topic == EventTable.topic.name:
             self._log_event(row)
         else:
             self._newest[topic] = row
 
     def _begin(self, record: RunRecord) -> None:
         self._header = record.header
-        for topic in ("/joint_states", "/joint_goals", "/head_pose", "/diagnostics"):
+        for topic in (JOINT_STATES, JOINT_GOALS, HEAD_POSE, DIAGNOSTICS):
             self._publisher(topic)  # others find them before the first cycle
         self._end.ask()
         if record.header.run.waypoints_m:
             self._publish(self._messages.paths(record))
 
     def _publish_cycle(self) -> None:
-        rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == "/slow"}
-        if self._header is None or "/cycle" not in rows:
+        rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == _SLOW}
+        if self._header is None or _CYCLE not in rows:
             return
         self._cycles += 1
-        self._offset.add(self._ros_now_s(), rows["/cycle"]["time_s"])
+        self._offset.add(self._ros_now_s(), rows[_CYCLE]["time_s"])
         record = self._record({topic: [row] for topic, row in rows.items()})
         self._publish(self._messages.joints(record))
         self._publish(self._messages.head_poses(record))
         self._publish(self._messages.imu(record))
-        self._said["cycle"] = OK, f"late by {1e3 * rows['/cycle']['lateness_s']:.1f} ms"
+        self._said["cycle"] = OK, f"late by {1e3 * rows[_CYCLE]['lateness_s']:.1f} ms"
 
     def _record(self, rows: Mapping[str, list[Mapping[str, Any]]]) -> RunRecord:
         return record_of(rows, complete=False, note="", header=self._header)
 
-    def _publish(self, rows: Iterator[tuple[float, str, Any]], skip: int = 0) -> None:
-        for number, (_, topic, message) in enumerate(rows):
+    def _publish(self, rows: Iterator[Row], skip: int = 0) -> None:
+        for number, row in enumerate(rows):
             if number >= skip:
-                self._publisher(topic).publish(message)
+                self._publisher(row.topic).publish(row.message)
 
     def _publisher(self, topic: str) -> Any:
         if topic not in self._publishers:
-            name, kind, quality = _TOPICS[topic]
+            name, quality = _TOPICS[topic]
+            kind = TYPES[topic]
             self._publishers[topic] = self._node.create_publisher(_type(kind), name, quality)
         return self._publishers[topic]
 
@@ -260,9 +283,9 @@ class RobotNode:
             self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, {})
             for name, (level, text) in self._said.items()
         ]
-        if "/slow" in self._newest:
-            status += self._messages.servos(self._record({"/slow": [self._newest["/slow"]]}), 0)
-        self._publisher("/diagnostics").publish(self._messages.diagnostics(run_s, status))
+        if _SLOW in self._newest:
+            status += self._messages.servos(self._record({_SLOW: [self._newest[_SLOW]]}), 0)
+        self._publisher(DIAGNOSTICS).publish(self._messages.diagnostics(run_s, status).message)
 
     def _log_event(self, row: Mapping[str, Any]) -> None:
         kind, text = row["kind"], row["text"]

@@ -10,7 +10,7 @@ from typing import Any, Final, Self
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.child_process import start
-from snakewalk.controller.runlog.row_line import RunEnd
+from snakewalk.controller.runlog.row_line import BUTTON, RunEnd
 
 _START_S: Final = 60.0
 """How long it may take to start: a busy machine imports slowly (ours)."""
@@ -88,4 +88,4 @@ class WatcherProcess:
 
     def on_button(self, path: Path) -> None:
         """Take the run's stop button, which the watcher presses."""
-        self._end.add("/button", json.dumps({"path": str(path)}).encode())
+        self._end.add(BUTTON, json.dumps({"path": str(path)}).encode())

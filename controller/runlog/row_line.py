@@ -15,10 +15,18 @@ from contextlib import suppress
 from typing import Any, Final
 
 from snakewalk.controller.motion.command import LINE_BYTES
+from snakewalk.controller.runlog.topics import TABLES, PoseTable
 
-KEPT: Final = frozenset({"/config", "/path", "/waypoints", "/event", "/button", "/gait", "/course"})
+BUTTON: Final = "/button"
+GAIT: Final = "/gait"
+COURSE: Final = "/course"
+PICTURE: Final = "/picture"
+"""Topics of the line that are not in the log."""
+KEPT: Final = frozenset(
+    {BUTTON, GAIT, COURSE, *(t.topic.name for t in TABLES if t.topic.watched == "all")}
+)
 """Topics of which every row is sent, in order; of others the newest."""
-SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow", "/imu", "/picture"}
+SENT: Final = KEPT | {PICTURE, *(t.topic.name for t in TABLES if t.topic.watched == "newest")}
 _KEPT_MAX: Final = 1000
 _COMMANDS_MAX: Final = 100
 """Commands that wait for the run; the oldest are dropped beyond it."""
@@ -64,7 +72,7 @@ class RunEnd:
             self._kept.append(_message(topic, row))
         else:
             self._newest[topic] = row
-        if topic in KEPT or topic == "/pose":
+        if topic in KEPT or topic == PoseTable.topic.name:
             self.pump()
 
     def pump(self) -> None:
@@ -123,7 +131,7 @@ class RunEnd:
         if self._kept:
             self._out = memoryview(self._kept.popleft())
         elif self._ready and self._newest:
-            rows = sorted(self._newest.items(), key=lambda row: row[0] == "/pose")
+            rows = sorted(self._newest.items(), key=lambda row: row[0] == PoseTable.topic.name)
             self._out = memoryview(b"".join(_message(topic, row) for topic, row in rows))
             self._newest = {}
             self._ready = False

@@ -15,8 +15,16 @@ import viser
 
 from snakewalk.controller.console.messages import plain
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.topics import (
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    PoseTable,
+    SlowTable,
+    WaypointTable,
+)
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.view.dashboard import SPAN_S, Dashboard
 from snakewalk.controller.view.gait_panel import GaitPanel
@@ -94,7 +102,7 @@ class _LivePage:
                 self._end.command(command)
         for topic, row in self._end.rows(_PERIOD_S):
             self._take(topic, row)
-            if topic == "/pose":
+            if topic == PoseTable.topic.name:
                 self._told_s = self._clock.now_s()
                 self._draw()
         if self._button is not None and now_s - max(self._told_s, 0.0) > _SILENT_S:
@@ -127,12 +135,12 @@ class _LivePage:
         return found
 
     def _take(self, topic: str, row: dict[str, Any]) -> None:
-        if topic == "/button":
+        if topic == BUTTON:
             self._button = PressedButton(Path(row["path"]))
             self._stop.arm()
             return
-        if topic == "/config":
-            self._header = record_of({"/config": [row]}, complete=False, note="").header
+        if topic == ConfigTable.topic.name:
+            self._header = record_of({topic: [row]}, complete=False, note="").header
             with self._server.atomic():
                 self._scene = BodyScene(self._server, self._header)
                 self._scene.first_camera(self._server)
@@ -142,23 +150,23 @@ class _LivePage:
             tabs = self._dashboard.tabs
             self._gamepad_panel = GamepadPanel(self._server, tabs, self._gamepad)
             return
-        if topic == "/picture":
+        if topic == PICTURE:
             if self._dashboard is not None:
                 self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
             return
-        if topic == "/gait":
+        if topic == GAIT:
             self._gait = row
             self._show_gait()
             return
-        if topic == "/course":
+        if topic == COURSE:
             self._takes_waypoints = True
             self._take_waypoints()
             return
-        if topic == "/waypoints":
+        if topic == WaypointTable.topic.name:
             self._header = self._record({topic: [row]}).header
             return
         self._rows[topic].append(row)
-        if topic == "/event":
+        if topic == EventTable.topic.name:
             if row["kind"] in ("trip", "interrupt") or (row["kind"] == "stop" and not self._over):
                 self._over = True
                 self._stop.ended(row["text"])
@@ -185,7 +193,8 @@ class _LivePage:
         scene, dashboard, now_s = self._scene, self._dashboard, self._told_s
         if scene is None or dashboard is None:
             return
-        newest = {topic: list(self._rows[topic])[-1:] for topic in ("/cycle", "/pose", "/slow")}
+        names = (table.topic.name for table in (CycleTable, PoseTable, SlowTable))
+        newest = {name: list(self._rows[name])[-1:] for name in names}
         now = self._record(newest)
         with self._server.atomic():
             follow = dashboard.follow.value
@@ -199,7 +208,7 @@ class _LivePage:
             if now_s - self._curves_s >= _CURVES_S:
                 self._curves_s = now_s
                 past = self._record({topic: list(each) for topic, each in self._rows.items()})
-                dashboard.show_curves(past, len(past.cycle.time_s) - 1, len(past.pose.time_s) - 1)
+                dashboard.show_curves(past, len(past.cycle.time_s) - 1)
                 scene.show_paths(past.paths, float(past.cycle.time_s[-1]))
                 scene.show_trail(past.pose.centre_m)
 

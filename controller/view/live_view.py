@@ -14,6 +14,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.watcher import WatcherProcess
+from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
+from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.view.dead_man import DeadMan
 
 _PICTURE_S: Final = 0.5
@@ -50,17 +52,17 @@ class LiveView(WatcherProcess):
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Take the gait that an operator runs: the page then has its sliders."""
         row = {"name": name, "parameters": parameters}
-        self._end.add("/gait", json.dumps(row).encode())
+        self._end.add(GAIT, json.dumps(row).encode())
 
     def on_course(self) -> None:
         """Take it that the run's waypoints may be set: the page then takes clicks."""
-        self._end.add("/course", b"{}")
+        self._end.add(COURSE, b"{}")
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""
-        if topic == "/pose" and self._picture is not None:
+        if topic == PoseTable.topic.name and self._picture is not None:
             picture, self._picture = self._picture, None
-            self._end.add("/picture", picture)
+            self._end.add(PICTURE, picture)
         self._end.add(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:

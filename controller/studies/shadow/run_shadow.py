@@ -15,6 +15,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.controller.runlog.topics import ShadowTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.studies.shadow.diagnosis import (
     LEAST_S,
@@ -146,7 +147,12 @@ class RunShadow:
         self._last_s = deadline_s
         shadow = self._shadow.step(deadline_s - self._first_s, sent_rad)
         self._rows.append((deadline_s, sent_rad, state.current_a, state.position_rad))
-        self._log.shadow(deadline_s, shadow.position_rad, shadow.current_a)
+        self._log.add(
+            ShadowTable,
+            deadline_s,
+            position_rad=shadow.position_rad,
+            current_a=shadow.current_a,
+        )
         for text in self._alarm.update(state, shadow):
             self._log.event(deadline_s, "shadow", text, "warning")
             self._on_event("shadow", text)

@@ -35,7 +35,7 @@ from rasterio.transform import from_origin
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.corrections import Corrections
-from tests.controller.exchange.test_robot_import import SWIMMER
+from tests.controller.exchange.robot_import.test_robot_import import SWIMMER
 from tests.docs.test_commands_in_pages import PAGES, ROOT, printed
 from tests.helpers.command import snakewalk
 from tests.helpers.in_process import work_in_this_process

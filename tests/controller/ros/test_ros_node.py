@@ -45,6 +45,7 @@ from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_commanded
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.runlog.topics import PathTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
@@ -297,7 +298,7 @@ def test_the_path_in_force_waits_for_whoever_comes_late(
         heard = client.listen(PathMessage, "/path", latched)
         client.until(lambda: heard)
         assert [pose.pose.position.x for pose in heard[0].poses] == [0.0, 2.0]
-        log.path_replanned(0.2, [[0.0, 1.0, 0.5], [2.0, 2.0, 0.4], [3.0, 2.0, 0.4]])
+        log.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4], [3.0, 2.0, 0.4]])
         graph.robot.step(1.0)
         client.until(lambda: len(heard) == 2)
     assert [pose.pose.position.y for pose in heard[1].poses] == [1.0, 2.0, 2.0]
