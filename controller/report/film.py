@@ -49,7 +49,9 @@ def film_run(
             the log holds no two poses.
 
     """
-    render_film = _renderer()
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.film import Marks, Style, render_film  # noqa: PLC0415  an extra
+
     header = record.header
     time_s, qpos = body_qpos(record)
     if len(time_s) < 2:
@@ -63,16 +65,20 @@ def film_run(
         time_s,
         qpos,
         path,
-        fps=FINE_FPS if fine else FPS,
-        speed_up=speed_up(float(time_s[-1] - time_s[0])),
-        size=FINE_SIZE if fine else SIZE,
-        waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
-        waypoint_radius_m=plan.waypoint_radius_m,
-        reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
-        paths=record.paths,
-        title=header.run.name,
-        look=look,
-        fine=fine,
+        style=Style(
+            fps=FINE_FPS if fine else FPS,
+            speed_up=speed_up(float(time_s[-1] - time_s[0])),
+            size=FINE_SIZE if fine else SIZE,
+            title=header.run.name,
+            look=look,
+            fine=fine,
+        ),
+        marks=Marks(
+            waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
+            waypoint_radius_m=plan.waypoint_radius_m,
+            reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
+            paths=record.paths,
+        ),
         on_frame=on_progress,
     )
 
@@ -112,7 +118,9 @@ def film_motion(
         InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
 
     """
-    render_film = _renderer()
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.film import Marks, Style, render_film  # noqa: PLC0415  an extra
+
     frames, bones = motion.front_m.shape[:2]
     turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
     poses = np.concatenate([motion.front_m, turns.reshape(frames, bones, 4)], axis=2)
@@ -123,24 +131,10 @@ def film_motion(
         motion.time_s,
         poses.reshape(frames, -1),
         path,
-        fps=FPS,
-        speed_up=speed_up(float(motion.time_s[-1])),
-        size=SIZE,
-        waypoints_m=waypoints_m,
-        waypoint_radius_m=waypoint_radius_m,
-        reached_s=reached_s,
-        paths=paths,
-        title=title,
-        look=look,
+        style=Style(FPS, speed_up(float(motion.time_s[-1])), SIZE, title, look),
+        marks=Marks(waypoints_m, waypoint_radius_m, reached_s, paths),
         on_frame=on_progress,
     )
-
-
-def _renderer() -> Callable[..., int]:
-    require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
-
-    return render_film
 
 
 def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
