@@ -55,11 +55,6 @@ def prepare_mjcf(root: LineElement, path: Path, assumed: Assumptions) -> ModelSo
         for name in [actuator.get("joint") or actuator.get("jointinparent")]
         if name
     )
-    for actuators in root.findall("actuator"):
-        for actuator in actuators:
-            span = numbers(actuator.get("forcerange"), 2)
-            if span is not None and actuator.get("joint"):
-                source.effort_n_m[str(actuator.get("joint"))] = min(-span[0], span[1])
     _drop_unread(source)
     defaults = _Defaults.of(root)
     _resolve_meshes(source, path, defaults, assumed)

@@ -251,20 +251,20 @@ def _plan_limits(
     keys: dict[str, object] = {}
     efforts = [value for name, value in source.effort_n_m.items() if name in joints]
     speeds = [value for name, value in source.speed_rad_s.items() if name in joints]
+    held_n_m = math.inf
+    facts = described_model(servo_model, None)
+    if facts is not None and facts.motor is not None:
+        held_n_m = round(_HELD_SHARE * facts.motor.stall_torque_n_m, 3)
+        keys["torque_limit_n_m"] = held_n_m
     low, high = _TORQUE_N_M
     if efforts and low <= min(efforts) <= high:
-        torque_n_m, words = min(efforts), ""
-        facts = described_model(servo_model, None)
-        if facts is not None and facts.motor is not None:
-            most_n_m = round(_HELD_SHARE * facts.motor.stall_torque_n_m, 3)
-            if most_n_m < torque_n_m:
-                torque_n_m, words = most_n_m, f"; a {servo_model} holds {most_n_m:g}"
-        keys["torque_limit_n_m"] = torque_n_m
+        keys["torque_limit_n_m"] = min(*efforts, held_n_m)
+        words = f"; a {servo_model} holds {held_n_m:g}" if held_n_m < min(efforts) else ""
         notes.append(f"torque of a plan: the model states {min(efforts):g} N m{words}")
     elif efforts:
         notes.append(
-            f"torque of a plan: the model states {min(efforts):g} N m, which is no servo's: left "
-            "out"
+            f"torque of a plan: the model states {min(efforts):g} N m, which is no servo's; a "
+            f"{servo_model} holds {held_n_m:g}"
         )
     low, high = _SPEED_RAD_S
     if speeds and low <= min(speeds) <= high:
