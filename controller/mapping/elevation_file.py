@@ -287,8 +287,8 @@ def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> No
         raise InputError(
             f"{file}: is no ground seen from above: {100.0 * share:.0f} % of its points are in "
             f"cells where they lie one above the other by more than "
-            f"{100.0 * _STACKED_RELIEF:.0f} % of the relief; add --up AXIS if another axis points up, or --point lowest, median or "
-            "highest for what counts in a cell"
+            f"{100.0 * _STACKED_RELIEF:.0f} % of the relief; add --up AXIS if another axis points "
+            "up, or --point lowest, median or highest for what counts in a cell"
         )
 
 

@@ -20,8 +20,7 @@ from snakewalk.controller.mapping.raster_file import RasterUnits
 from snakewalk.controller.mapping.world_file import MapWorld, map_beside
 
 if TYPE_CHECKING:
-    from snakewalk.controller.mapping.elevation_file import FileMap, MapOptions
-    from snakewalk.controller.mapping.world_file import MapWorld
+    from snakewalk.controller.mapping.elevation_file import FileMap
     from snakewalk.controller.terrain.elevation_map import CellHeight
 
 WorldOut = Annotated[Path, typer.Option("--out", "-o", help="the world's file (.toml)")]
@@ -111,11 +110,6 @@ def elevation(
     as_json: Json = False,
 ) -> None:
     """Make a world for `plan` and `run` from a file of real ground; its holes stay known."""
-    from snakewalk.controller.mapping.elevation_file import (  # noqa: PLC0415
-        MapOptions,
-    )
-    from snakewalk.controller.mapping.world_file import MapWorld  # noqa: PLC0415  --help stays quick
-
     faults = not_positive(
         {
             "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
