@@ -320,7 +320,8 @@ def _cells(
         if not -89.0 <= middle_y <= 89.0:
             raise InputError(f"{file}: its middle has no latitude between -89 and 89: --unit m")
         return _Cells(*degree_cell_m(*cell, middle_y), "m", [])
-    per_unit_m, notes = unit_m(unit), []
+    per_unit_m = unit_m(unit)
+    notes: list[str] = []
     scale_x, scale_y = per_unit_m, per_unit_m
     if opened.crs is not None and not opened.crs.is_geographic:
         edge_y = [turn.f + turn.e * row for row in (rows.start, rows.stop)]

@@ -67,7 +67,8 @@ def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Rast
         OSError: the file cannot be opened.
 
     """
-    ending, notes = file.suffix.lower(), []
+    ending = file.suffix.lower()
+    notes: list[str] = []
     if ending == ".csv":
         values = read_numbers(file, notes)
     else:

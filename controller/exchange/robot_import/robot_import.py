@@ -291,7 +291,7 @@ def _joints(
         notes.append(
             f"without a range in the model, {_MOST_RAD:g} rad both ways: {', '.join(endless)}"
         )
-    tables = []
+    tables: list[dict[str, object]] = []
     for hinge, yaw in zip(tree.hinges, directions.yaws, strict=True):
         zero = float(model.qpos0[model.jnt_qposadr[hinge.joint]])
         low, high = (float(v) - zero for v in model.jnt_range[hinge.joint])
