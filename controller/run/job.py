@@ -60,9 +60,7 @@ class Job:
         with run_folder(name, self.out) as folder:
             finished = self._execute(prepared, folder)
         outcome = finished.outcome
-        artifacts = write_artifacts(
-            finished.record, folder, finished.summary, film=film, look=look
-        )
+        artifacts = write_artifacts(finished.record, folder, finished.summary, film=film, look=look)
         show(
             {
                 "run": name,
