@@ -11,12 +11,13 @@ from collections.abc import Callable, Iterable
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.gait import Needs, Range, ranges
+from snakewalk.controller.gaits.gait import Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.motion.wrapper import MotionWrapper
 
 KEYS = {
     "up": "the parameter before",
@@ -38,7 +39,7 @@ _KEYS_MAX = 100
 """Keys and values that are carried out in a step (ours); text that is pasted is longer."""
 
 
-class Operator:
+class Operator(MotionWrapper):
     """Runs a gait, and changes it by keys."""
 
     def __init__(
@@ -61,6 +62,7 @@ class Operator:
                 shape, whatever else was pressed.
 
         """
+        super().__init__(motion)
         self.motion = motion
         self._robot, self._keys, self._on_event = robot, keys, on_event
         self._chosen = 0
@@ -71,23 +73,9 @@ class Operator:
         self._rate = 1.0
 
     @property
-    def needs(self) -> Needs:
-        """Those of the gait that runs."""
-        return self.motion.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the operator, or the gait's duration, has stopped it."""
-        return self.motion.done
-
-    @property
     def selected(self) -> str:
         """Parameter that left and right change."""
         return list(self._ranges())[self._chosen]
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self.motion.goal_rad()
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""

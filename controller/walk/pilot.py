@@ -20,7 +20,13 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
-from snakewalk.controller.mechanics.rollout import PATH_STEP_M, Rolled, TabulatedPath
+from snakewalk.controller.mechanics.rollout import (
+    Rolled,
+    TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
+    PATH_STEP_M,
+)
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.terrain.path import SplinePath

@@ -13,6 +13,14 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.mechanics.rollout import (
+    Drift,
+    PlanarPose,
+    Rolled,
+    Rollout,
+    RolloutTree,
+    TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
     ALONG,
     END_OFF,
     HEAD_OFF,
@@ -20,12 +28,6 @@ from snakewalk.controller.mechanics.rollout import (
     OFF_PATH,
     PASSED,
     TIME,
-    Drift,
-    PlanarPose,
-    Rolled,
-    Rollout,
-    RolloutTree,
-    TabulatedPath,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.drivers.compiling import compiled, readonly_array

@@ -9,17 +9,19 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import LinkConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.retarget import Retarget
-from snakewalk.controller.mechanics import rigid_motion
+from snakewalk.controller.mechanics import rigid_motion, rollout_kernel
 from snakewalk.controller.mechanics import rollout as rollout_module
 from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
 from snakewalk.controller.mechanics.rollout import (
-    PATH_STEP_M,
     STEP_SEGMENTS,
     Drift,
     PlanarPose,
     Rolled,
     Rollout,
     TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
+    PATH_STEP_M,
     _sine_cosine,
 )
 from tests.helpers.uneven import spelt_out
@@ -92,7 +94,7 @@ def test_sines_and_cosines_have_the_same_bits_many_at_a_time_as_alone() -> None:
 def test_the_loops_as_they_are_written_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     pieces = np.stack([sine(102, 12), sine(102, 12) + 0.02 * np.arange(12)])
     compiled = roll(rollout(plane(0.2, 0.1)), pieces)
-    for module in (rollout_module, rigid_motion):
+    for module in (rollout_module, rollout_kernel, rigid_motion):
         for name, each in vars(module).items():
             if hasattr(each, "py_func"):
                 monkeypatch.setattr(module, name, each.py_func)

@@ -9,15 +9,17 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.run import WalkConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rollout import (
-    END_OFF,
-    OFF_PATH,
-    PATH_STEP_M,
-    TIME,
     Drift,
     PlanarPose,
     Rolled,
     Rollout,
     TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
+    END_OFF,
+    OFF_PATH,
+    PATH_STEP_M,
+    TIME,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker, _roughness
