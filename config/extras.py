@@ -10,6 +10,7 @@ EXTRAS: Final = {
     "matplotlib": ("matplotlib", "view"),
     "mpl_toolkits": ("matplotlib", "view"),
     "plotly": ("Plotly", "view"),
+    "jinja2": ("Jinja", "view"),
     "av": ("PyAV", "view"),
     "cv2": ("OpenCV", "vision"),
     "skimage": ("scikit-image", "vision"),
