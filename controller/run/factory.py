@@ -144,6 +144,8 @@ def prepare_job(
     beside = Path(name).parent if name.endswith(".toml") else None
     options = {key: value for key, value in changes.items() if value is not None}
     options.setdefault("track", track_beside(run.track, beside))
+    if beside is not None and (beside / run.robot).is_file():
+        options.setdefault("robot", str(beside / run.robot))
     run = checked(RunConfig, run.model_dump() | options, "command line")
     run = with_keys_of("run", run, keys)
     if run.motion == "kp" and not on_paper:

@@ -13,6 +13,7 @@ from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.alarm_reader import AlarmReader
 from snakewalk.drivers.chain.fingerprint import Fingerprint
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
 from snakewalk.drivers.chain.goal_check import GoalCheck
 from snakewalk.drivers.chain.identified_read import IdentifiedRead, check_stillness
 from snakewalk.drivers.chain.imu_reader import ImuReader
@@ -63,6 +64,7 @@ class ServoChain:
         *,
         watchdog_s: float = 0.2,
         rate_hz: float | None = None,
+        fingerprint_file: FingerprintFile | None = None,
     ) -> None:
         """Prepare; nothing is sent before ``enable``.
 
@@ -71,6 +73,7 @@ class ServoChain:
             robot: ids, limits, gains.
             watchdog_s: after so long without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
+            fingerprint_file: compared with the servos at each ``enable``; None: not compared.
 
         Raises:
             ControlTableError: a model lacks a register or a unit that the cycle needs, or has it
@@ -97,7 +100,7 @@ class ServoChain:
         self._configured: dict[int, Mapping[str, int]] = {}
         self._fingerprints: dict[int, Fingerprint] = {}
         self._liveness: LivenessCheck | None = None
-        self._rate_hz = rate_hz
+        self._rate_hz, self._file = rate_hz, fingerprint_file
         self._goals = GoalEncoder(self._units)
         self._readings = Readings(tables, self._units)
         self._prepare_reads(fast=True)
@@ -137,7 +140,9 @@ class ServoChain:
         """Check and set up all servos, goal = present, torque on, watchdog armed.
 
         Raises:
-            ChainError: the servos are not the robot's, have an alarm, or stand beyond a limit.
+            ChainError: the servos are not the robot's, have an alarm, stand beyond a limit, or
+                are not as in the fingerprint file.
+            ConfigError: the fingerprint file is broken.
             BudgetError: the wire cannot carry the rate with the reads that the firmwares have.
             BusError: a servo does not do what an instruction asks; torque is off again then.
             PortError: the port is gone.
@@ -158,6 +163,11 @@ class ServoChain:
                 "watches its output instead, as a share of the stall current"
             )
         self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
+        if self._file is not None:
+            found = {self.robot.servo_ids[j]: each for j, each in self._fingerprints.items()}
+            unit_rad = float(self._units.rad_per_position[0])
+            for line in self._file.check(self.robot, found, unit_rad):
+                self.on_event(line)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
 
