@@ -19,6 +19,8 @@ EXTRAS: Final = {
     "ezc3d": ("ezc3d", "c3d"),
     "trimesh": ("trimesh", "vision"),
     "rasterio": ("Rasterio", "terrain"),
+    "laspy": ("laspy", "terrain"),
+    "lazrs": ("lazrs", "terrain"),
     "pygltflib": ("pygltflib", "vision"),
     "distributed": ("Dask", "sweep"),
     "dask": ("Dask", "sweep"),

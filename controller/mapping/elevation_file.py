@@ -12,7 +12,7 @@ from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.mapping.geo_raster import read_geo_raster
 from snakewalk.controller.mapping.height_range import check_heights
-from snakewalk.controller.mapping.las_file import in_metres, read_las, read_las_unit
+from snakewalk.controller.mapping.las_file import in_metres, read_las
 from snakewalk.controller.mapping.length_units import DEGREE, unit_m
 from snakewalk.controller.mapping.number_table import read_numbers
 from snakewalk.controller.mapping.point_cloud import read_pcd, read_ply
@@ -186,16 +186,10 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
 def _of_laser(file: Path, options: MapOptions) -> FileMap:
     """Map of a laser scanner's points."""
     units = options.units
-    window = None
-    if options.crop is not None and units.unit != DEGREE:
-        states = read_las_unit(file) if units.unit is None else units.unit
-        if states is not None and states != DEGREE:
-            x0, y0, x1, y1 = (each / unit_m(states) for each in options.crop)
-            window = x0, y0, x1, y1
-    held = read_las(file, options.classes, window)
+    held = read_las(file, options.classes, options.crop, units.unit)
     points_m, notes = in_metres(file, held, units.unit, units.height_unit)
-    cropped = replace(options, crop=None) if window is not None else options
-    return _of_points(file, points_m, None, cropped, [*held.notes, *notes])
+    left = replace(options, crop=None) if held.cropped else options
+    return _of_points(file, points_m, None, left, [*held.notes, *notes])
 
 
 def _upright(file: Path, points: Floats, options: MapOptions) -> Floats:
@@ -286,7 +280,7 @@ def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> No
     if share > _STACKED_SHARE:
         raise InputError(
             f"{file}: is no ground seen from above: {100.0 * share:.0f} % of its points are in "
-            f"cells where they lie one above the other by more than "
+            "cells where they lie one above the other by more than "
             f"{100.0 * _STACKED_RELIEF:.0f} % of the relief; add --up AXIS if another axis points "
             "up, or --point lowest, median or highest for what counts in a cell"
         )

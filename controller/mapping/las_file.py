@@ -1,9 +1,14 @@
 """LAS and LAZ: points of airborne and terrestrial laser scanners, read in chunks by laspy."""
 
+import json
+import logging
 import re
-from collections.abc import Collection
+import subprocess
+import sys
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -19,6 +24,7 @@ from snakewalk.controller.mapping.length_units import (
     unit_name,
     vertical_unit,
 )
+from snakewalk.controller.mapping.raster_file import Crop
 
 MOST_POINTS: Final = 10_000_000
 """Points that are kept at once (ours): 240 MB, and some copies."""
@@ -43,6 +49,23 @@ _KEY_UNITS: Final = {9001: "m", 9002: "ft", 9003: "us-ft"}
 _WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
 
 
+_MOST_MEMORY_BYTES, _MOST_CPU_S = 3_000_000_000, 600
+"""Of the process that reads a file (ours)."""
+_CHILD: Final = """
+import sys
+words, memory_bytes, cpu_s = sys.argv[1:]
+try:
+    import resource
+except ImportError:  # Windows
+    pass
+else:
+    for which, most in (("AS", memory_bytes), ("CPU", cpu_s)):
+        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
+from snakewalk.controller.mapping.las_file import child
+print(child(words))
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class LasPoints:
     """Points of a file, in its units, and what it states of them."""
@@ -56,19 +79,26 @@ class LasPoints:
     crs: Any = None
     """Projected coordinate system of Rasterio; None: not stated, or unknown."""
     notes: list[str] = field(default_factory=list)
+    cropped: bool = False
+    """Whether the crop was cut already."""
 
 
 def read_las(
     file: Path,
     classes: Collection[int] | None,
-    window: tuple[float, float, float, float] | None = None,
+    crop: Crop | None = None,
+    unit: str | None = None,
 ) -> LasPoints:
     """Read the points of the ground, or of some classes.
+
+    The decoder of LAZ ends its process on some damaged files: it has a process of its own, which
+    is limited in memory and time.
 
     Args:
         file: ends in .las or .laz.
         classes: to keep; None: ground where the file has some, else all but noise.
-        window: least x and y, greatest x and y, in the file's units from its south-west corner.
+        crop: in metres from the south-west corner; it is not cut from a file in degrees.
+        unit: of x and y by the user, for the crop.
 
     Raises:
         InputError: it is damaged, or holds too many points.
@@ -76,59 +106,83 @@ def read_las(
 
     """
     require_extra("LAS and LAZ need", "laspy", "lazrs")
-    import laspy  # noqa: PLC0415  an extra
-
     with file.open("rb"):
         pass
+    chosen = None if classes is None else sorted(classes)
+    with TemporaryDirectory() as folder:
+        out = Path(folder) / "points.npy"
+        said = run_child(json.dumps([str(file), chosen, crop, unit, str(out)]))
+        if "fault" in said:
+            raise InputError(f"{file}: {said['fault']}")
+        points = np.load(out)
+    system = said["system"]
+    return LasPoints(
+        points, said["unit"], said["height_unit"], None if system is None else _system(system),
+        said["notes"], said["cropped"],
+    )  # fmt: skip
+
+
+def run_child(words: str) -> dict[str, Any]:
+    """Read a file in a process of its own; what it states, or its fault."""
+    command = [sys.executable, "-c", _CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    try:
+        said = json.loads(ended.stdout)
+    except ValueError:
+        return {
+            "fault": "is damaged: its decoder gave up, or needed over "
+            f"{_MOST_MEMORY_BYTES / 1e9:g} GB or {_MOST_CPU_S} s"
+        }
+    assert isinstance(said, dict)
+    return said
+
+
+def child(words: str) -> str:
+    """Work of the process of its own: write the points, return what the file states as JSON."""
+    file, classes, crop, unit, out = json.loads(words)
+    import laspy  # noqa: PLC0415  an extra
+
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # its words are in the fault
     try:
         with laspy.open(file) as reader:
-            return _read(file, reader, classes, window)
-    except (InputError, OSError):
-        raise
+            stated, height_unit, system = _units(reader.header)
+            plane = unit or stated
+            window = None
+            if crop is not None and plane not in (None, DEGREE):
+                window = [each / unit_m(plane) for each in crop]
+            points, notes = _read(reader, classes, window)
+    except InputError as error:
+        return json.dumps({"fault": str(error)})
     except Exception as error:  # laspy and lazrs raise whatever their parsers meet
-        raise InputError(f"{file}: cannot be read as LAS or LAZ: {error}") from None
-
-
-def read_las_unit(file: Path) -> str | None:
-    """Unit of x and y that a file states.
-
-    Raises:
-        InputError: it is damaged.
-        OSError: the file cannot be opened.
-
-    """
-    require_extra("LAS and LAZ need", "laspy", "lazrs")
-    import laspy  # noqa: PLC0415  an extra
-
-    with file.open("rb"):
-        pass
-    try:
-        with laspy.open(file) as reader:
-            return _units(reader.header)[0]
-    except Exception as error:  # as in ``read_las``
-        raise InputError(f"{file}: cannot be read as LAS or LAZ: {error}") from None
+        return json.dumps({"fault": f"cannot be read as LAS or LAZ: {error}"})
+    np.save(out, points)
+    return json.dumps(
+        {
+            "unit": stated, "height_unit": height_unit, "system": system, "notes": notes,
+            "cropped": window is not None,
+        }
+    )  # fmt: skip
 
 
 def _read(
-    file: Path,
-    reader: Any,
-    classes: Collection[int] | None,
-    window: tuple[float, float, float, float] | None,
-) -> LasPoints:
+    reader: Any, classes: Collection[int] | None, window: Sequence[float] | None
+) -> tuple[Floats, list[str]]:
+    """Points, and how many of them were used and left out."""
     header = reader.header
     count = int(header.point_count)
     if count > _MOST_READ:
-        raise InputError(f"{file}: states {count} points; the most is {_MOST_READ}")
+        raise InputError(f"states {count} points; the most is {_MOST_READ}")
     corner = np.asarray(header.mins[:2], dtype=float)
     low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if window is None else (
-        corner + window[:2], corner + window[2:]
+        corner + np.array(window[:2]), corner + np.array(window[2:])
     )  # fmt: skip
     seen: dict[int, int] = {}
-    withheld, kept, total = 0, [], 0
+    withheld, kept, total, held = 0, [], 0, 0
     ground: list[Floats] = []
     for chunk in reader.chunk_iterator(_CHUNK):
         points = np.stack([np.asarray(getattr(chunk, axis), float) for axis in "xyz"], axis=-1)
         kinds = np.asarray(chunk.classification)
+        held += len(points)
         held_back = np.asarray(chunk.withheld, dtype=bool)
         withheld += int(held_back.sum())
         inside = ~held_back & ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
@@ -144,24 +198,15 @@ def _read(
             kept = []
         total = sum(map(len, kept)) + sum(map(len, ground))
         if total > MOST_POINTS:
-            raise InputError(
-                f"{file}: over {MOST_POINTS} points are left of {count}: --crop a part"
-            )
+            raise InputError(f"over {MOST_POINTS} points are left of {count}: --crop a part")
     chosen = ground or kept
     points = np.concatenate(chosen) if chosen else np.empty((0, 3))
-    _check_count(file, reader, sum(seen.values()), withheld, count, window)
-    unit, height_unit, system = _units(header)
+    if held < count:
+        raise InputError(f"states {count} points, and holds {held}")
     notes = _class_notes(seen, classes, bool(ground), len(points))
     if withheld:
         notes.append(f"{withheld} withheld points are left out")
-    return LasPoints(points, unit, height_unit, system, notes)
-
-
-def _check_count(
-    file: Path, reader: Any, seen: int, withheld: int, count: int, window: object
-) -> None:
-    if window is None and seen + withheld < count:
-        raise InputError(f"{file}: states {count} points, and holds {seen + withheld}")
+    return points, notes
 
 
 def _class_notes(
@@ -184,7 +229,7 @@ def _class_notes(
     return notes
 
 
-def _units(header: Any) -> tuple[str | None, str | None, Any]:
+def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
     """Units of x, y and of z, and the projected system, as the file states them."""
     wkt, keys = "", {}
     for record in [*header.vlrs, *(header.evlrs or [])]:
@@ -200,16 +245,18 @@ def _units(header: Any) -> tuple[str | None, str | None, Any]:
             return DEGREE, vertical_unit(wkt), None
         units = _WKT_UNIT.findall(plain)
         unit = unit_name(float(units[-1][1])) if units else None
-        return unit, vertical_unit(wkt), _system(wkt)
+        return unit, vertical_unit(wkt), wkt
     vertical = _KEY_UNITS.get(keys.get(_VERTICAL_UNITS, 0))
     number = keys.get(_PROJECTED_TYPE, 0)
     if keys.get(_MODEL_TYPE) == 2 or (_GEOGRAPHIC_TYPE in keys and not number):
         return DEGREE, vertical, None
-    system = _system(number) if number and number != _USER_DEFINED else None
     unit = _KEY_UNITS.get(keys.get(_LINEAR_UNITS, 0))
+    if not number or number == _USER_DEFINED:
+        return unit, vertical, None
+    system = _system(number)
     if unit is None and system is not None:
         unit = unit_name(float(system.linear_units_factor[1]))
-    return unit, vertical, system
+    return unit, vertical, number
 
 
 def _system(text_or_number: str | int) -> Any:

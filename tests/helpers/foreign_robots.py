@@ -305,17 +305,17 @@ class Model(NamedTuple):
 
 CLASSES = {
     "REU": Model(".urdf", modules_of_three_links, ""),
-    "RSNAKE": Model(".urdf", rounded_quarter_turns, "", (), 0.8, "XH540-W270"),
+    "RSNAKE": Model(".urdf", rounded_quarter_turns, "", (), 0.8, "XM540-W270"),
     "SEA": Model(".urdf", modules_with_collars, ""),
     "seven joints": Model(".urdf", standing_on_world, ""),
     "three joints": Model(
         ".urdf", lambda: standing_on_world(3, bare_tail=True), "", ("link4.mass_kg=1",)
     ),
     "wheeled Gazebo snake": Model(".urdf", wheeled_urdf, "y" * 8),
-    "arm of threes": Model(".urdf", arm_of_threes, "ypp" * 4, servo="XH540-W270"),
+    "arm of threes": Model(".urdf", arm_of_threes, "ypp" * 4, servo="XM540-W270"),
     "o14": Model(".xml", modules_without_meshes, ""),
     "o20": Model(".xml", lambda: modules_without_meshes(20), ""),
-    "o40": Model(".xml", lambda: modules_without_meshes(40), ""),
+    "o40": Model(".xml", lambda: modules_without_meshes(40), "", servo="XM540-W270"),
     "cars": Model(".xml", wheeled_mjcf, "y" * 8, scale=0.4),
     "cars of meshes": Model(
         ".xml", lambda: wheeled_mjcf(mesh=True), "y" * 8, ("module.mass_kg=0.15",)
