@@ -60,6 +60,7 @@ from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.pilot import UsesFriction
 from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
+from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError
 from snakewalk.drivers.priority import raised_priority
@@ -272,7 +273,7 @@ class _Execution:
                     beside.end(clock.now_s())
         return outcome, pose, mapped, source
 
-    def _recovery(self, backend: Backend, warn: Callable[[str, str], None]) -> Recovery:
+    def _recovery(self, backend: Backend, warn: Callable[[str, str], None]) -> Recovery[Recheck]:
         safety = self.prepared.run.safety
         return Recovery(
             backend.chain,

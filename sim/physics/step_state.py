@@ -139,5 +139,5 @@ class Contacts(NamedTuple):
 
     reals: Floats
     integers: NDArray[np.int32]
-    count: int  # type: ignore[assignment]  hides the method of tuple
+    count: int  # type: ignore[assignment]
     at: ContactFields

@@ -120,7 +120,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
-    warnings = prepared.warnings
+    warnings = list(prepared.warnings)
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
         found |= facts
@@ -142,7 +142,7 @@ def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "climb_m": round(relief.climb_m, 3),
         "safe_nodes": f"{relief.safe_node_share:.0%}",
     }
-    return facts, path_warnings(prepared.planner, relief, prepared.run.waypoints_m)
+    return facts, list(path_warnings(prepared.planner, relief, prepared.run.waypoints_m))
 
 
 def _deg(angle_rad: float) -> float:
