@@ -26,6 +26,8 @@ EXTRAS: Final = {
     "cma": ("cma", "learn"),
     "viser": ("viser", "page"),
     "rosbags": ("rosbags", "export"),
+    "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "export"),
+    "google": ("protobuf", "export"),
     "pyarrow": ("pyarrow", "export"),
     "rclpy": ("rclpy", "ros"),
 }
