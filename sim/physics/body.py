@@ -13,6 +13,7 @@ without friction.
 
 import math
 import re
+from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -172,7 +173,7 @@ def mjcf(
         f"{_links_behind(robot, balls=ground is not None)}{_limbs(robot, 0)}"
     )
     plane_geoms, pairs = _planes(head, soft) if by_planes else ("", "")
-    return f"""<mujoco model="{robot.name}">
+    return f"""<mujoco model={quoteattr(robot.name)}>
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{step_s!r}" gravity="0 0 {-GRAVITY_M_S2!r}" integrator="Euler" solver="Newton"
     {options}/>
