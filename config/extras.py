@@ -26,13 +26,13 @@ EXTRAS: Final = {
     "cma": ("cma", "learn"),
     "viser": ("viser", "page"),
     "rosbags": ("rosbags", "export"),
-    "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "export"),
-    "google": ("protobuf", "export"),
     "pyarrow": ("pyarrow", "export"),
     "rclpy": ("rclpy", "ros"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
-BASE: Final = frozenset({"numba", "scipy", "networkx", "typer", "rich", "mcap"})
+BASE: Final = frozenset(
+    {"numba", "scipy", "networkx", "typer", "rich", "mcap", "foxglove_schemas_protobuf"}
+)
 """Modules of the base that a light install of the test fixture does without (docs/start/ci.md)."""
 
 

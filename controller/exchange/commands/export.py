@@ -109,5 +109,3 @@ def _check_names(
         require_extra("Parquet needs", "pyarrow")
     if ros2 is not None:
         require_extra("a ROS 2 bag needs", "rosbags")
-    if foxglove is not None:
-        require_extra("a Foxglove file needs", "foxglove_schemas_protobuf")
