@@ -32,7 +32,9 @@ EXTRAS: Final = {
     "rclpy": ("rclpy", "ros"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
-BASE: Final = frozenset({"numba", "scipy", "networkx", "typer", "rich", "mcap"})
+BASE: Final = frozenset(
+    {"numba", "scipy", "networkx", "typer", "rich", "mcap", "foxglove_schemas_protobuf"}
+)
 """Modules of the base that a light install of the test fixture does without (docs/start/ci.md)."""
 
 

@@ -84,7 +84,8 @@ class _Drawn:
 
 
 def _draw(record: RunRecord, made: str = "") -> _Drawn:
-    require_extra("the report needs", "matplotlib", "plotly", "jinja2")
+    require_extra("the report needs", "matplotlib", "plotly")
+    require_extra("the report needs", "jinja2")
     from snakewalk.controller.report.curves import curves_html  # noqa: PLC0415  an extra
     from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415  an extra
 

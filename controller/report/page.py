@@ -81,6 +81,7 @@ def page(
         }
         numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
         events = [replace(event, text=without_folders(event.text)) for event in events]
+    every = numbers.to_dict() if folders else shared(numbers.to_dict())
     return str(
         _template().render(
             n=numbers,
@@ -95,10 +96,7 @@ def page(
             more_events=max(0, len(events) - _EVENTS_SHOWN),
             details=[
                 (title, json.dumps(values, indent=2, ensure_ascii=False))
-                for title, values in (
-                    ("All numbers", numbers.to_dict() if folders else shared(numbers.to_dict())),
-                    ("Configuration", config),
-                )
+                for title, values in (("All numbers", every), ("Configuration", config))
             ],
             links=[(quote(name), name) for name in links],
             made=made,
