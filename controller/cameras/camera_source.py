@@ -13,6 +13,7 @@ from snakewalk.controller.cameras.camera_pose import CameraPose
 from snakewalk.controller.cameras.device_camera import DeviceCamera
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.pose_provider import PoseContext, PoseProvider
+from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
 
 if TYPE_CHECKING:
     from snakewalk.controller.cameras.rendered_camera import RenderedCamera
@@ -42,6 +43,10 @@ class OverheadCameraPose:
         if on_port:
             faults += _missing(run.camera)
         return faults
+
+    def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
+        """Return that the camera measures the pose."""
+        return PoseEvidence(Kind.MEASURED, "camera")
 
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:

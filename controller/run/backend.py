@@ -3,9 +3,11 @@
 Everything above the byte port is the same object for both.
 """
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from snakewalk.config.arrays import Floats
@@ -262,3 +264,15 @@ def _bus_on_ports(
             parts.append((bus, each.ids))
         opened.pop_all()
     return SegmentedBus(parts)
+
+
+def is_pseudo_terminal(ports: Sequence[str] | None) -> bool | None:
+    """Return whether all ports are pseudo-terminals, as those of served simulations are.
+
+    Returns:
+        None where there is no port.
+
+    """
+    if not ports:
+        return None
+    return all(Path(os.path.realpath(port)).parts[:3] == ("/", "dev", "pts") for port in ports)

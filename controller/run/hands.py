@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import cast
 
 from rich.columns import Columns
-from rich.console import Console
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.console.gamepad import Gamepad
 from snakewalk.controller.console.keyboard import Keyboard
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.operator import KEYS, Operator
 from snakewalk.controller.run.observer_watch import ADVICE
@@ -101,5 +101,5 @@ def open_hands(
     if gamepad is not None:
         devices.append(stack.enter_context(Gamepad(gamepad)))
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
-    Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
+    PlainConsole(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return Hands(devices, page)

@@ -78,6 +78,13 @@ def run(
     observe: Observe = None,
     film: Film = True,
     look: Look = "servos",
+    accept_dead_reckoning: Annotated[
+        bool,
+        typer.Option(
+            "--accept-dead-reckoning",
+            help="exit code 0 instead of 3 where the arrival was dead-reckoned, not measured",
+        ),
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -89,5 +96,5 @@ def run(
         map_source=map_, keys=set_, compliance=compliance, port=port, out=out, force=force,
         live=live, view=view, view_at=view_at, ros=ros, observe=observe, shadow=shadow,
     )  # fmt: skip
-    if not job.carry_out(film=film, look=look, as_json=as_json):
-        raise SystemExit(1)
+    finished = job.carry_out(film=film, look=look, as_json=as_json)
+    raise SystemExit(job.exit_code(finished, accept_dead_reckoning))
