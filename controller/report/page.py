@@ -63,7 +63,9 @@ def page(
     """
     if not folders:
         known = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
-        texts = {key: without_folders(one) for key, one in known.items() if isinstance(one, str)}
+        texts: dict[str, Any] = {
+            key: without_folders(one) for key, one in known.items() if isinstance(one, str)
+        }
         numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
         events = [replace(event, text=without_folders(event.text)) for event in events]
     title = f"{numbers.run} on {numbers.backend}"
