@@ -6,16 +6,19 @@ libraries warn of is ``debug``. Without :func:`messages` nothing is shown, as fo
 """
 
 import logging
+import platform
 import shlex
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.plain_text import plain
+from snakewalk.drivers.fallbacks import fallbacks_in_use
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -75,14 +78,13 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
     shown = warnings.showwarning
     warnings.showwarning = _library_warning
     try:
-        import platform  # noqa: PLC0415  a program starts without these
-        from importlib.metadata import version  # noqa: PLC0415
-
         words = shlex.join(["snakewalk", *sys.argv[1:]])
         LOGGER.debug(
             "%s; version %s, Python %s, %s",
             *(words, version("snakewalk"), platform.python_version(), platform.platform()),
         )
+        for text in fallbacks_in_use():  # reported when modules were imported, before this
+            LOGGER.warning(text)
         yield
         LOGGER.debug("done")
     except BaseException as error:

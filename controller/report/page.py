@@ -96,7 +96,7 @@ def page(
 def _mood(n: RunSummary) -> str:
     if n.trip is not None:
         return "bad"
-    return "good" if n.waypoints_reached == n.waypoints else "fair"
+    return "good" if n.is_measured and n.waypoints_reached == n.waypoints else "fair"
 
 
 def _headline(n: RunSummary) -> str:
@@ -104,6 +104,8 @@ def _headline(n: RunSummary) -> str:
     where = "on the simulator" if n.backend == "sim" else f"on {n.backend}"
     late = n.missed_deadlines
     missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed."
+    if not n.is_measured:
+        return _believed_headline(n, where, missed)
     if n.waypoints == 0:
         return (
             f"{n.robot} moved by {n.motion} {where}: its centre of mass went "
@@ -116,6 +118,19 @@ def _headline(n: RunSummary) -> str:
     )
 
 
+def _believed_headline(n: RunSummary, where: str, missed: str) -> str:
+    """Return the sentence of a run whose pose was dead-reckoned."""
+    travelled = f"{_fmt(n.dead_reckoned_travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s"
+    unknown = "Nothing measured the pose: distances and arrivals are dead-reckoned."
+    if n.waypoints == 0:
+        moved = f"{n.robot} moved by {n.motion} {where} and believes it went"
+        return f"{moved} {travelled}, {missed} {unknown}"
+    return (
+        f"{n.robot} believes it reached {n.dead_reckoned_waypoints_reached} of "
+        f"{_count(n.waypoints, 'waypoint')} {where}: {travelled}, {missed} {unknown}"
+    )
+
+
 def _centimetres(length_m: float | None) -> str:
     return "–" if length_m is None else f"{100.0 * length_m:.1f} cm"
 
@@ -125,9 +140,16 @@ def _facts(n: RunSummary) -> str:
     facts = (
         ("robot", n.robot), ("ground", n.world), ("motion", n.motion),
         ("bus", backend), ("seed", n.seed), ("configuration", n.config_hash),
-        ("snakewalk", n.software),
+        ("pose", _evidence(n)), ("snakewalk", n.software),
     )  # fmt: skip
     return " ".join(f"<span><b>{k}</b> {escape(str(v))}</span>" for k, v in facts)
+
+
+def _evidence(n: RunSummary) -> str:
+    if n.pose_source == "simulator":
+        return "simulated"
+    simulated = ", simulated" if n.pose_is_simulated or n.port_is_pseudo_terminal else ""
+    return f"{n.pose_evidence} ({n.pose_source}{simulated})"
 
 
 def _tiles(n: RunSummary) -> list[str]:
@@ -137,7 +159,7 @@ def _tiles(n: RunSummary) -> list[str]:
     missed = f"{n.missed_deadlines} of {n.cycles}"
     took = f"in {_fmt(n.duration_s, 1)} s"
     tiles = [
-        _tile("Waypoints", f"{n.waypoints_reached} of {n.waypoints}",
+        _tile("Waypoints", f"{_fmt(n.waypoints_reached, 0)} of {n.waypoints}",
               f"in {_fmt(n.duration_s, 1)} s"),
         _tile("Path error", f"{_fmt(n.path_error_mean_m, 3)} m",
               f"at most {_fmt(n.path_error_max_m, 3)} m"),

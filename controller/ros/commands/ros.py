@@ -28,7 +28,7 @@ from snakewalk.controller.exchange.body_frames import joint_names
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.ros.ros_link import open_ros
 from snakewalk.controller.ros.ros_options import RosOptions
-from snakewalk.controller.run.commands.gait import Param, parameters
+from snakewalk.controller.run.commands.gait_options import Param, parameters
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import gait_by_name, prepare_commanded
 from snakewalk.controller.run.finish import show_run

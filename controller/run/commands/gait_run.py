@@ -38,10 +38,10 @@ from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import KEYS, Operator
-from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.finish import by_evidence, costs_of_transport, show_run
 from snakewalk.controller.run.observer_watch import ADVICE
 from snakewalk.controller.run.watchers import watched
 
@@ -161,16 +161,18 @@ def run_gait(
         result |= {
             "frequency_hz": round(displacement.frequency_hz, 3),
             "cycles": displacement.cycles,
+        }
+        moved = {
             "forward_body_lengths_cycle": _digits(displacement.forward_bl),
             "left_body_lengths_cycle": _digits(displacement.left_bl),
             "up_body_lengths_cycle": _digits(displacement.up_bl),
             "turn_rad_cycle": _digits(displacement.turn_rad),
             "speed_m_s": _digits(displacement.speed_m_s),
         }
+        result |= by_evidence(finished, moved)
     result |= {
         "electrical_energy_j": finished.summary.electrical_energy_j,
-        "electrical_cost_of_transport": finished.summary.electrical_cost_of_transport,
-        "mechanical_cost_of_transport": finished.summary.mechanical_cost_of_transport,
+        **costs_of_transport(finished.summary),
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
     }
