@@ -187,7 +187,7 @@ def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
             off_rad.append((self._plant.position_rad - position_rad)[8:])
             super().follow(at_s, position_rad, velocity_rad_s)
 
-    monkeypatch.setattr("snakewalk.sim.physics.split_plant.SplitPlant", Watched)
+    monkeypatch.setattr("snakewalk.controller.run.backend.SplitPlant", Watched)
     monkeypatch.setattr("snakewalk.controller.run.backend.RealTimeClock", lambda: bench.clock)
     bench.lines[1].taps.append(tap)
     walk = prepare_walk("flat-square", robot="yaw16", keys={"run.time_limit_s": 6.0})
