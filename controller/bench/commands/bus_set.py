@@ -7,6 +7,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.controller.bench.commands.bus_options import confirmed
+from snakewalk.controller.bench.fingerprints import fingerprint_file, note_changes
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import (
     SettingChange,
@@ -41,6 +42,9 @@ def bus_set(
     voltage_min: Annotated[float | None, typer.Option(help="V")] = None,
     voltage_max: Annotated[float | None, typer.Option(help="V")] = None,
     return_delay: Annotated[float | None, typer.Option(help="us")] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="file of the robot whose fingerprint file is updated")
+    ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
     as_json: Json = False,
@@ -59,6 +63,7 @@ def bus_set(
         voltage_max_v=voltage_max,
         return_delay_us=return_delay,
     )
+    file = None if robot is None else fingerprint_file(robot, "--robot")
     with open_lines(port, baud) as lines:
         bus = lines.open_servo(servo_id)
         changes = plan(bus, servo_id, request)
@@ -67,6 +72,9 @@ def bus_set(
         written = bool(changes) and not dry_run and (yes or confirmed(as_json))
         if written:
             apply(bus, servo_id, changes)
+            if file is not None and not note_changes(file, servo_id, changes):
+                warn = f"{file.path}: has no servo {servo_id}; the next start adds it"
+                typer.echo(warn, err=True)
     if as_json:
         print(json.dumps(SettingsResult(servo_id, changes, written).to_dict()))
     elif changes:

@@ -13,6 +13,7 @@ from snakewalk.config.template import robot_toml
 from snakewalk.controller.bench import chain_calibration
 from snakewalk.controller.bench.chain_calibration import SeenBend
 from snakewalk.controller.bench.eeprom_backup import back_up, backup_text
+from snakewalk.controller.bench.fingerprints import read_fingerprints, write_fingerprints
 from snakewalk.controller.bench.homing_offset import homing_written, plan_homing, without_zeros
 from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
@@ -119,6 +120,9 @@ def calibrate(
                 "homing_offsets": {str(each.servo_id): each.after for each in offsets},
                 "homing_written": written,
             }
+        bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
+        there = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
+        facts["fingerprints"] = str(there)
     _show(described, found.notes, facts, as_json)
 
 

@@ -1,12 +1,22 @@
 """``snakewalk doctor``: is this bus fit for a run, and what is to be done if not."""
 
+import json
+import sys
 from typing import Annotated
 
 import typer
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run
+from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.bench.adapter import permission
 from snakewalk.controller.bench.doctor import examine, examine_segments
+from snakewalk.controller.bench.fingerprints import (
+    differences,
+    fingerprint_file,
+    fingerprint_finding,
+    read_all,
+)
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
@@ -15,6 +25,8 @@ from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot
 from snakewalk.controller.run.backend import FILE_PORTS, on_ports, real_ports
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
+from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.port_map import is_port_map, port_map_text
 
 
@@ -37,6 +49,15 @@ def doctor(
         bool,
         typer.Option("--wiggle", help="move all joints by 0.15 rad for 2 s: does the supply sag?"),
     ] = False,
+    accept: Annotated[
+        bool,
+        typer.Option(
+            "--accept", help="show how the servos differ from the robot's fingerprint file, and ask"
+        ),
+    ] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="with --accept: write without asking")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Examine adapter, bus and servos; every fault with its remedy.
@@ -44,7 +65,13 @@ def doctor(
     Changes nothing, unless the joints are to wiggle: then the chain is set up as in a run.
     """
     job = load_run(run)
-    described = load_robot(robot if robot is not None else job.robot)
+    robot_file = robot if robot is not None else job.robot
+    described = load_robot(robot_file)
+    if yes and not accept:
+        raise InputError("--yes: goes with --accept; doctor writes nothing else")
+    if accept:
+        _accept(robot_file, described, port, yes=yes, as_json=as_json)
+        return
     if port is not None and (port == FILE_PORTS or is_port_map(port)):
         described = on_ports(described, port)
         device = port_map_text((each.port, each.ids) for each in described.ports)
@@ -80,4 +107,44 @@ def doctor(
                     on_it=ids,
                     on_progress=lambda step: status.update(f"{device}: {step}"),
                 )
+            path = own_file(robot_file)
+            if path is not None:
+                found = read_all(lines, described)
+                finding = fingerprint_finding(FingerprintFile(path), described, found)
+                findings += [] if finding is None else [finding]
     show_findings(findings, {"port": device, "robot": described.name}, as_json)
+
+
+def _accept(
+    robot_file: str, robot: RobotConfig, port: str | None, *, yes: bool, as_json: bool
+) -> None:
+    """Show old and new values of each joint's servo, ask, and write the fingerprint file."""
+    file = fingerprint_file(robot_file, "--accept")
+    if port is not None and (port == FILE_PORTS or is_port_map(port)):
+        robot = on_ports(robot, port)
+        port = port_map_text((each.port, each.ids) for each in robot.ports)
+    known = file.read() or {}
+    with open_lines(port, robot.servo.baud) as lines:
+        found = read_all(lines, robot)
+    silent = [robot.joint_name(j) for j, i in enumerate(robot.servo_ids) if i not in found]
+    if silent:
+        raise BusError(f"{', '.join(silent)}: no reply; nothing is written")
+    changed = differences(robot, known, found)
+    for line in () if as_json else changed:
+        typer.echo(line)
+    is_written = bool(changed) and (yes or _confirmed(file, as_json))
+    if is_written:
+        file.write(found)
+    if as_json:
+        facts = {"file": str(file.path), "changes": changed, "written": is_written}
+        print(json.dumps(facts))
+    elif not changed:
+        typer.echo(f"the servos are as in {file.path}")
+    else:
+        typer.echo(f"{file.path}: {'written' if is_written else 'nothing written'}")
+
+
+def _confirmed(file: FingerprintFile, as_json: bool) -> bool:
+    if as_json or not sys.stdin.isatty():
+        raise InputError("--accept: asks before it writes, and nobody is there; add --yes")
+    return typer.confirm(f"write this into {file.path}?", default=False, err=True)

@@ -2,10 +2,13 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from snakewalk.controller.cli.main import main
+from snakewalk.drivers.chain.fingerprint import FINGERPRINT
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.line_port import OpenedLine, line_port
@@ -123,3 +126,62 @@ def test_a_servo_that_is_not_there_is_one_line_and_code_1(
     code, _, err = call(monkeypatch, capsys, "bus", "set", "--port", device, "--id", "99")
     assert code == 1
     assert err.startswith("snakewalk: servo 99: ping: ")
+
+
+@pytest.fixture
+def robot_file(tmp_path: Path, line: OpenedLine) -> Path:
+    """File of a robot of its own, and the fingerprint file of its servos as they are now."""
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\njoint_axes = "yyyyyyyyyyyyyyyy"\n', encoding="utf-8")
+    bank = line.bank
+    known = {i: {n: int(bank[n][i - 1]) for n in FINGERPRINT} for i in range(1, 17)}
+    FingerprintFile(path).write(known)
+    return path
+
+
+def test_the_doctor_shows_a_changed_zero_and_accepts_it_when_asked(
+    device: str,
+    line: OpenedLine,
+    robot_file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file = FingerprintFile(robot_file)
+    words = ("doctor", "--port", device, "--robot", str(robot_file))
+    line.bank["Homing Offset"][2] = 100
+    code, out, _ = call(monkeypatch, capsys, *words, "--json")
+    found = {f["check"]: f for f in json.loads(out)["findings"]}["fingerprint"]
+    assert (code, found["grade"]) == (1, "fail")
+    assert "joint 3 (ID 3): Homing Offset is 100, was 0" in found["found"]
+    code, out, err = call(monkeypatch, capsys, *words, "--accept")
+    assert code == 2  # nobody is there to be asked
+    assert "joint 3 (ID 3): Homing Offset: 0 -> 100" in out
+    assert "add --yes" in err
+    code, out, _ = call(monkeypatch, capsys, *words, "--accept", "--yes")
+    assert code == 0
+    assert (file.read() or {})[3]["Homing Offset"] == 100
+    code, out, _ = call(monkeypatch, capsys, *words, "--accept", "--yes")
+    assert "the servos are as in" in out
+
+
+def test_the_doctor_accepts_nothing_for_a_shipped_robot(
+    device: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("doctor", "--port", device, "--robot", "yaw16", "--accept", "--yes")
+    code, _, err = call(monkeypatch, capsys, *words)
+    assert code == 2
+    assert "yaw16 has no fingerprint file" in err
+
+
+def test_bus_set_updates_the_fingerprint_file(
+    device: str,
+    robot_file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ("bus", "set", "--port", device, "--id", "16", "--yes", "--robot", str(robot_file))
+    code, _, _ = call(monkeypatch, capsys, *words, "--new-id", "40", "--current-limit", "1.0")
+    assert code == 0
+    found = FingerprintFile(robot_file).read() or {}
+    assert 16 not in found
+    assert found[40]["Current Limit"] == round(1.0 / 2.69e-3)

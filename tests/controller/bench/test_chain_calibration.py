@@ -35,6 +35,7 @@ from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import BusError, ChainError
 from snakewalk.sim.line.sim_line import SimLine
@@ -275,6 +276,7 @@ def trio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trio:
         yield line
 
     monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
+    monkeypatch.setattr("snakewalk.controller.bench.commands.calibrate.open_port", opened)
     return Trio(robot, line, tmp_path)
 
 
@@ -289,6 +291,9 @@ def test_a_person_answers_at_the_terminal(trio: Trio) -> None:
     # nobody laid these shafts straight: they rest where the wiggles left them
     assert found.zeros_rad == pytest.approx(trio.robot.zeros_rad, abs=0.03)
     assert found.limit_rad == trio.robot.limit_rad
+    known = FingerprintFile(trio.out).read()
+    assert known is not None
+    assert sorted(known) == sorted(trio.robot.servo_ids)
     assert isinstance(trio().exception, InputError)  # it is there already
     assert isinstance(trio("--force", answers="3\n").exception, InputError)  # fewer answers
     assert not trio.line.bank["Torque Enable"].any()

@@ -1,0 +1,124 @@
+"""Fingerprints on the bench: read from servos, compared with the robot's file, accepted."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.bench.port_lines import PortLines
+from snakewalk.controller.bench.servo_settings import SettingChange
+from snakewalk.controller.console.finding import Finding
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, changes, own_file
+from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.protocol.control_table import load_control_table
+
+
+def fingerprint_file(robot: str, option: str) -> FingerprintFile:
+    """Fingerprint file of a robot.
+
+    Args:
+        robot: its file.
+        option: named in the message.
+
+    Raises:
+        InputError: the robot is shipped, or has no file.
+
+    """
+    path = own_file(robot)
+    if path is None:
+        raise InputError(
+            f"{option}: {robot} has no fingerprint file; name a robot's file of your own: "
+            "--robot my-robot.toml"
+        )
+    return FingerprintFile(path)
+
+
+def read_fingerprints(bus: DynamixelBus, servo_ids: Iterable[int]) -> dict[int, Fingerprint]:
+    """Fingerprints of the servos that reply, by ID.
+
+    Raises:
+        PortError: the port is gone.
+
+    """
+    found: dict[int, Fingerprint] = {}
+    for servo_id in servo_ids:
+        table = bus.table_of(servo_id)
+        try:
+            registers = bus.read_each(servo_id, [name for name in FINGERPRINT if name in table])
+        except BusError:
+            continue
+        found[servo_id] = fingerprint_of(registers)
+    return found
+
+
+def read_all(lines: PortLines, robot: RobotConfig) -> dict[int, Fingerprint]:
+    """Fingerprints of a robot's servos on all its ports; raises as ``read_fingerprints``."""
+    found: dict[int, Fingerprint] = {}
+    for line, ids in lines.lines:
+        bus = DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s)
+        there = [i for i in robot.servo_ids if ids is None or i in ids]
+        found |= read_fingerprints(bus, there)
+    return found
+
+
+def fingerprint_finding(
+    file: FingerprintFile, robot: RobotConfig, found: Mapping[int, Fingerprint]
+) -> Finding | None:
+    """What the comparison with the file shows; None if there is no file.
+
+    Raises:
+        ConfigError: the file is broken.
+
+    """
+    known = file.read()
+    if known is None:
+        return None
+    lines = changes(robot, known, found, _rad_per_position(robot))
+    if not lines:
+        return Finding("fingerprint", "ok", f"the servos are as in {file.path}")
+    remedy = "if it is meant: snakewalk doctor --accept --robot FILE"
+    return Finding("fingerprint", "fail", "; ".join(lines), remedy)
+
+
+def differences(
+    robot: RobotConfig, known: Mapping[int, Fingerprint], found: Mapping[int, Fingerprint]
+) -> list[str]:
+    """Old and new value of every register that differs, one line each, by joint."""
+    return [
+        f"{robot.joint_name(joint)}: {name}: {known.get(servo_id, {}).get(name, 'unknown')} -> "
+        f"{value}"
+        for joint, servo_id in enumerate(robot.servo_ids)
+        for name, value in found.get(servo_id, {}).items()
+        if known.get(servo_id, {}).get(name) != value
+    ]
+
+
+def note_changes(file: FingerprintFile, servo_id: int, made: Iterable[SettingChange]) -> bool:
+    """Store changes of one servo's settings; False if the file does not have the servo.
+
+    Raises:
+        ConfigError: the file is broken.
+        OSError: it cannot be written.
+
+    """
+    known = file.read() or {}
+    values = known.pop(servo_id, None)
+    if values is None:
+        return False
+    by_register = {change.register: change.after for change in made}
+    values |= {name: each for name, each in by_register.items() if name in values}
+    file.write({**known, by_register.get("ID", servo_id): values})
+    return True
+
+
+def write_fingerprints(robot_file: Path, found: Mapping[int, Fingerprint]) -> Path:
+    """Write the fingerprint file of a robot's file; returns its path."""
+    file = FingerprintFile(robot_file)
+    file.write(found)
+    return file.path
+
+
+def _rad_per_position(robot: RobotConfig) -> float:
+    return load_control_table(robot.servo_models[0]).rad_per_position
