@@ -21,7 +21,7 @@ from snakewalk.controller.animals.legged.animal_synthesis import (
     synthesise_animal,
 )
 from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.planner import TerrainPlanner
 
 TITLE = "Synthesis of 250 frames, 100 points, in a world of 10,000 vertices"

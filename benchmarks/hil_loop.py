@@ -27,7 +27,7 @@ from benchmarks.simulated_robot import (
     travelling_wave,
 )
 from snakewalk.controller.run.factory import prepare_walk
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
 
 TITLE = "Simulated loop against bare mj_step: 16 servos, 50 Hz, 2 ms"

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor, OnPaper
@@ -65,16 +65,7 @@ class NoLog(RunLog):
     def cycle(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
-    def pose(self, *given: Any, **named: Any) -> None:
-        """Nothing."""
-
-    def walk(self, *given: Any, **named: Any) -> None:
-        """Nothing."""
-
-    def friction(self, *given: Any, **named: Any) -> None:
-        """Nothing."""
-
-    def path_replanned(self, *given: Any, **named: Any) -> None:
+    def add(self, *given: Any, **named: Any) -> None:
         """Nothing."""
 
     def event(self, *given: Any, **named: Any) -> None:

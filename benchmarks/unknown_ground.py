@@ -19,7 +19,7 @@ from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.mapping.stereo_head import StereoHead
 from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.sim.physics.plant import MujocoPlant

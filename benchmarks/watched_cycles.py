@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from urllib.parse import urlsplit
 
 import numpy as np
 import viser
@@ -27,7 +28,7 @@ from rich.console import Console
 from rich.table import Table
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.run.execute import execute
@@ -59,8 +60,15 @@ _SERVE = (
 def browse(url: str, reads: bool) -> None:
     """Open the page's socket as a browser does, and read what comes, or nothing."""
     protocol = Subprotocol(f"viser-v{viser.__version__}")
-    address = url.replace("http", "ws", 1)
-    with connect(address, subprotocols=[protocol], max_size=None) as line:
+    place = urlsplit(url)
+    cookie = f"snakewalk-{place.port}={place.query.removeprefix('token=')}"
+    with connect(
+        f"ws://{place.netloc}/",
+        origin=Origin(f"http://{place.netloc}"),
+        additional_headers={"Cookie": cookie},
+        subprotocols=[protocol],
+        max_size=None,
+    ) as line:
         if not reads:
             signal.pause()
         with suppress(ConnectionClosed):
@@ -98,7 +106,11 @@ def lateness_s(condition: str, seconds: float) -> tuple[Floats, int]:
             ill = threading.Timer(0.4 * seconds, lambda: os.kill(victim.pid or 0, what))
             ill.start()
         finished = execute(
-            prepare_gait("lateral-undulation", seconds=seconds, keys=PATIENT),
+            prepare_gait(
+                "lateral-undulation",
+                seconds=seconds,
+                keys=PATIENT | {"run.safety.lost_observer": "warn"},
+            ),
             folder / "run",
             port,
             view=page,

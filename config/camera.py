@@ -1,12 +1,13 @@
 """Schemas of cameras: one above a level floor, and a stereo pair on the robot."""
 
-from typing import Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
 
-PoseName = Literal["simulator", "camera", "imu", "joints"]
+PoseName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*(:.*)?$", max_length=500)]
+"""A pose source, with an argument after a colon where the source accepts one."""
 Place = tuple[float, float]
 
 
@@ -142,6 +143,11 @@ class MappingConfig(Strict):
         0.05, gt=0.001, le=0.5, description="expected error beyond which a point is left out"
     )
     far_m: float = Field(2.0, gt=0.1, le=20.0, description="points farther from the lens are, too")
+    source: str = Field(
+        "stereo",
+        pattern=r"^[a-z][a-z0-9_-]*$",
+        description="map source: stereo, or the name of a plug-in",
+    )
     replan_bodies: float = Field(
         0.5, gt=0.05, le=10.0, description="body lengths of travel between two plans"
     )

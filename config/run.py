@@ -1,6 +1,6 @@
 """What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,7 +12,7 @@ from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
 
-MotionName = Literal[
+MOTIONS: Final = (
     "walk",
     "walk-printed",
     "walk-blind",
@@ -22,7 +22,11 @@ MotionName = Literal[
     "playback",
     "repertoire",
     "source",
-]
+)
+"""Motions that need no plug-in."""
+_ALONG_WAYPOINTS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
+MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
+"""A motion of ``MOTIONS``, or the name of a plug-in."""
 
 
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -144,6 +148,9 @@ class SafetyConfig(Strict):
     voltage_max_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_max_v"
     )
+    voltage_time_s: float = Field(
+        0.3, ge=0.0, description="how long the supply may be too low, but not at the start"
+    )
     stale_limit_s: float = Field(
         0.1, gt=0.0, description="how old a measured position, velocity or current may be"
     )
@@ -154,6 +161,11 @@ class SafetyConfig(Strict):
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
     recovery: Literal["stop", "confirm", "resume"] = Field(
         "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
+    )
+    lost_observer: Literal["stop", "warn"] = Field(
+        "stop",
+        description="when the page, the ROS node or the gamepad, each with an E-STOP, ends or does "
+        "not respond during a run: torque off, or a warning",
     )
     recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
     overload_reboots: int = Field(
@@ -272,7 +284,7 @@ class RunConfig(Strict):
             raise ValueError("motion gait needs a table [gait] with its name")
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
             raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
-        pathless = {"gait", "playback", "source"} | ({"repertoire"} if self.repertoire else set())
-        if self.motion not in pathless and not self.waypoints_m:
+        planned = self.motion == "repertoire" and not self.repertoire
+        if (planned or self.motion in _ALONG_WAYPOINTS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

@@ -4,22 +4,22 @@ Drawing takes longer than a servo may take to reply. A thread would not help: wh
 holds the interpreter for 5 ms at a time, at each byte that the serving thread waits for.
 """
 
-import signal
 import sys
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Final
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from snakewalk.controller.console.child_process import pipe, start
+from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.drivers.priority import give_way
 from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.serve.live_table import Packet, Rows
@@ -49,13 +49,8 @@ class LiveScreen:
     """
 
     def __init__(self, make_decoder: MakeDecoder) -> None:
-        self._line, far = get_context("spawn").Pipe()
-        self._process = get_context("spawn").Process(target=_draw, args=(far, make_decoder))
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C is the server's
-        try:
-            self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self._line, far = pipe()
+        self._process = start(_draw, far, make_decoder)
         far.close()
 
     def __enter__(self) -> "LiveScreen":
@@ -91,7 +86,7 @@ def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
     """Draw what comes until the server is gone."""
     give_way()
     decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
-    screen = Console(file=sys.stderr)
+    screen = PlainConsole(file=sys.stderr)
     with Live(console=screen, auto_refresh=False) as live, suppress(EOFError, OSError):
         while True:
             line.send(None)

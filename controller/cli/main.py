@@ -9,17 +9,21 @@ from types import FrameType
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
-from snakewalk.controller.console.messages import plain
+from snakewalk.config.plain_text import plain
+from snakewalk.controller.console.safe_path import make_path_safe
 from snakewalk.drivers.errors import DriverError, PortError
 
 _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
 )
 """Signals that would end a program without a word; SIGQUIT is Ctrl-\\."""
-_LEFT_OUT = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V4"
-"""What numpy, which is imported later, must do without on an x86-64: its sines and exponentials for
-these come from another library and differ in the last bit, and so would runs. A name that a version
-of numpy or a processor does not know is no fault."""
+_LEFT_OUT = (
+    "AVX512F AVX512CD AVX512_KNL AVX512_KNM AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR "
+    "X86_V4"
+)
+"""Loops for AVX-512 that numpy, which is imported later, leaves out on x86-64: their sines and
+exponentials come from another library and differ in the last bit, and so would runs. numpy ignores
+names that its version or the processor does not have."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _INTERRUPTED = 130
@@ -33,6 +37,9 @@ def leave_out_avx512() -> None:
 
 def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    make_path_safe()
+    # numba reads .numba_config.yaml of the working folder; this keeps it from loading code there
+    os.environ.setdefault("NUMBA_CACHE_DIR", "")
     # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"

@@ -16,6 +16,8 @@ from snakewalk.config.errors import InputError
 _EVENT = struct.Struct("<IhBB")
 _BUTTON, _AXIS, _AT_START = 1, 2, 0x80
 _HALF = 16384
+_READS_MAX = 8
+"""Reads of 64 events in a call (ours): a device that never ends must not hold a cycle up."""
 BUTTONS = {0: "n", 1: "m", 2: "p", 3: "d", 6: "space", 7: "q", 8: "space", 9: "q", 10: "t"}
 """A, B, X, Y, select and start of common pads; 10 is the right stick pressed, or the middle one."""
 DEAD_MAN = (4, 5)
@@ -67,8 +69,14 @@ class Gamepad:
         if stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
             raise InputError(f"{path}: is a file; a gamepad is such as /dev/input/js0")
+        self._path = path
         self._pad = Pad()
         self._gone = False
+
+    @property
+    def gone(self) -> str | None:
+        """Why its buttons do not work any more, or None."""
+        return f"{self._path}: the gamepad is gone, and its E-STOP with it" if self._gone else None
 
     @property
     def held(self) -> bool:
@@ -90,8 +98,11 @@ class Gamepad:
         """Names of the keys pressed since the last call."""
         data = b""
         try:
-            while more := os.read(self._file, 512):
+            for _ in range(_READS_MAX):
+                more = os.read(self._file, 512)
                 data += more
+                if not more:
+                    break
         except BlockingIOError:
             return self._pad.keys(data)
         except OSError:  # unplugged, or its radio is out of reach

@@ -20,6 +20,9 @@ _NAMES = {
     " ": "space", "k": "up", "j": "down", "l": "right", "h": "left",
 }  # fmt: skip
 
+_READS_MAX = 16
+"""Reads of 256 characters in a call (ours): pasted text must not hold a cycle up."""
+
 
 def names(text: str) -> list[str]:
     """Names of the keys whose characters a terminal sent; arrows come as three each."""
@@ -50,6 +53,8 @@ class Keyboard:
         if not os.isatty(self._file):
             raise InputError("--live reads keys from a terminal, and standard input is none")
         self._before = termios.tcgetattr(self._file)
+        self.gone: str | None = None
+        """Why keys do not arrive any more, or None."""
 
     def __enter__(self) -> Self:
         tty.setcbreak(self._file)
@@ -66,9 +71,14 @@ class Keyboard:
     def pressed(self) -> list[str]:
         """Names of the keys pressed since the last call."""
         text = b""
-        while select.select([self._file], [], [], 0.0)[0]:
-            more = os.read(self._file, 256)
+        for _ in range(_READS_MAX):
+            if self.gone is not None or not select.select([self._file], [], [], 0.0)[0]:
+                break
+            try:
+                more = os.read(self._file, 256)
+            except OSError:
+                more = b""
             text += more
             if not more:
-                break
+                self.gone = "keyboard: the terminal is closed, and its torque-off key with it"
         return names(text.decode(errors="ignore"))

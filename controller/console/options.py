@@ -1,33 +1,22 @@
 """What the commands share: options, and how a result is shown."""
 
 import json
-import platform
-import shlex
 import sys
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.result_files import LOG
-
-if TYPE_CHECKING:
-    from snakewalk.controller.metrics.summary import RunSummary
-    from snakewalk.controller.report.artifacts import Artifacts
-    from snakewalk.controller.run.execute import Finished
-    from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.console.plain_console import PlainConsole
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
-console = Console(
+console = PlainConsole(
     highlight=False,
     markup=False,
     emoji=False,  # er:100:9 is a graph
@@ -41,6 +30,10 @@ RunName = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+Assume = Annotated[
+    list[str] | None,
+    typer.Option(help="KEY=VALUE for what the file does not state; may be repeated"),
+]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
 Motion = Annotated[
@@ -100,9 +93,7 @@ Shadow = Annotated[
 View = Annotated[bool, typer.Option("--view", help="show the run in a browser while it lasts")]
 ViewAt = Annotated[
     str,
-    typer.Option(
-        "--view-at", metavar="HOST:PORT", help="of the page; beyond this machine it needs a token"
-    ),
+    typer.Option("--view-at", metavar="HOST:PORT", help="of the page"),
 ]
 Ros = Annotated[
     bool, typer.Option("--ros", help="tell a ROS 2 graph of the run, with a service that stops it")
@@ -265,45 +256,14 @@ def _text(value: object) -> str:
     return "-" if value is None else str(value)
 
 
-def _what_made_it() -> str:
-    """The command, the machine and the time, for the foot of a page."""
-    words = shlex.join(["snakewalk", *sys.argv[1:]])
-    when = datetime.now().astimezone().isoformat(" ", "seconds")
-    return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
-
-
-def write_artifacts(
-    record: "RunRecord",
-    folder: Path,
-    numbers: "RunSummary | None" = None,
-    *,
-    film: bool,
-    fine: bool = False,
-    look: str = "servos",
-) -> "Artifacts":
-    """Make the report and the film of a run; print on standard error what could not be made."""
-    from snakewalk.controller.report.artifacts import make_artifacts  # noqa: PLC0415  heavy; --help stays quick
-
-    try:
-        made = make_artifacts(
-            record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
-        )
-    except KeyboardInterrupt as stop:
-        log = folder / LOG
-        if log.exists():
-            stop.add_note(f"the run is whole: {log}; its film: snakewalk report {log}")
-        raise
-    for line in made.notes:
-        LOGGER.warning("%s", line)
-    return made
-
-
-def show_run(
-    finished: "Finished", folder: Path, facts: Mapping[str, object], as_json: bool, *, film: bool
-) -> None:
-    """Make the report and the film, and show a run's facts and files; exit 1 if safety tripped."""
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
-    files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
-    show({**facts, **files, **artifacts.to_dict()}, as_json)
-    if finished.outcome.tripped is not None:
-        raise SystemExit(1)
+RobotName = Annotated[
+    str, typer.Argument(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
+]
+Observe = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--observe",
+        metavar="NAME[:ARGUMENT]",
+        help="observer from a plug-in; `snakewalk list` shows them; may be given again",
+    ),
+]

@@ -1,59 +1,42 @@
 """The one pool of processes: on this machine, or on the workers of a Dask cluster."""
 
 import os
-import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
-from typing import Any, TypeVar
+from multiprocessing import active_children, parent_process
+from typing import TypeVar
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.child_process import SafePool
 
 A = TypeVar("A")
 B = TypeVar("B")
 
 
-class _Pool(ProcessPoolExecutor):
-    """A pool whose workers leave Ctrl-C to the parent: a terminal sends it to all of them."""
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Submit; a worker that is started here inherits that SIGINT is blocked."""
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            return super().submit(fn, *args, **kwargs)
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool whose workers are fresh interpreters.
+    """Yield a pool whose workers are fresh interpreters.
 
-    A forked worker would inherit the threads of MuJoCo and numba in whatever state they are. Where
-    the block ends by an exception, an interrupt first of all, nobody waits for what the workers are
-    at: they are killed, and their temporary files go with the pool's own folder. Workers whose
-    parent is killed end by themselves.
+    If an exception or an interrupt ends the block, the workers are killed at once, and their
+    temporary files are deleted with the pool's folder. Workers whose parent is killed end by
+    themselves.
     """
     others = {child.pid for child in active_children()}
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        pool = _Pool(
-            workers,
-            mp_context=get_context("spawn"),
-            initializer=_begin,
-            initargs=(folder,),
-        )
-        with pool:
-            try:
-                yield pool
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                for child in active_children():
-                    if child.pid not in others:
-                        child.kill()
-                raise
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+        SafePool(workers, _begin, folder) as pool,
+    ):
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in active_children():
+                if child.pid not in others:
+                    child.kill()
+            raise
 
 
 def _begin(folder: str) -> None:

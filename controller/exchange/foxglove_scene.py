@@ -4,7 +4,9 @@ An MCAP file of Foxglove's well-known messages in JSON, which needs no package. 
 have the names of ``robot export``.
 """
 
+from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from itertools import cycle
 from operator import itemgetter
 from pathlib import Path
@@ -19,23 +21,54 @@ from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
 from snakewalk.controller.exchange.foxglove_schema import SCHEMAS
-from snakewalk.controller.exchange.imu_readings import IMU_TOPIC, imu_readings, recorded_topics
+from snakewalk.controller.exchange.imu_readings import imu_readings
+from snakewalk.controller.exchange.remaining_fields import TIME, Shown, remaining_fields
+from snakewalk.controller.exchange.ros_messages import (
+    FRAMES,
+    HEAD_POSE,
+    IMU,
+    JOINT_GOALS,
+    JOINT_STATES,
+)
 from snakewalk.controller.runlog.encode import encode, floats, number
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.row_printer import json_value
+from snakewalk.controller.runlog.topics import (
+    TABLES,
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    ImuTable,
+    PathTable,
+    PoseTable,
+    WaypointTable,
+)
 from snakewalk.sim.physics.solids import solids
 
 Json = dict[str, Any]
 Row = tuple[float, str, Json]
 """Time in s, topic, message."""
-_TOPICS: Final = {
-    "/scene": "foxglove.SceneUpdate",
-    "/tf": "foxglove.FrameTransforms",
-    "/joint_states": "foxglove.JointStates",
-    "/joint_goals": "foxglove.JointStates",
-    "/head_pose": "foxglove.PoseInFrame",
-    IMU_TOPIC: "foxglove.PoseInFrame",
-    "/log": "foxglove.Log",
+SCENE: Final = "/scene"
+FOXGLOVE_LOG: Final = "/log"
+TYPES: Final = {
+    SCENE: "foxglove.SceneUpdate",
+    FRAMES: "foxglove.FrameTransforms",
+    JOINT_STATES: "foxglove.JointStates",
+    JOINT_GOALS: "foxglove.JointStates",
+    HEAD_POSE: "foxglove.PoseInFrame",
+    IMU: "foxglove.PoseInFrame",
+    FOXGLOVE_LOG: "foxglove.Log",
 }
+"""Well-known message of each topic."""
+SHOWN: Final[Shown] = {
+    CycleTable: ("sent_rad", "measured_rad", "velocity_rad_s"),
+    ImuTable: tuple(ImuTable.topic.columns),
+    PoseTable: ("head_m", "rotation", "links_m"),
+    PathTable: tuple(PathTable.topic.columns),
+    WaypointTable: tuple(WaypointTable.topic.columns),
+    EventTable: tuple(EventTable.topic.columns),
+}
+"""Fields that well-known messages contain; the others keep the log's topics and schemas."""
 _LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
 """Of ``foxglove.Log``."""
 _HEAD: Final = (0.85, 0.33, 0.10, 1.0)
@@ -58,39 +91,43 @@ _PATH_HEIGHT_M: Final = 0.005
 
 
 def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
-    """Write the file; returns how many messages each topic has."""
-    topics = recorded_topics(_TOPICS, record)
-    counts = dict.fromkeys(topics, 0)
+    """Write the file; returns the number of messages of each topic."""
+    counts: Counter[str] = Counter()
     with path.open("wb") as file:
         writer: Any = Writer(file)
         writer.start(profile="", library=f"snakewalk {record.header.software}")
-        schemas = {
-            name: writer.register_schema(name, "jsonschema", encode(schema).encode())
-            for name, schema in SCHEMAS.items()
-        }
-        channels = {
-            topic: writer.register_channel(topic, "json", schemas[name])
-            for topic, name in topics.items()
-        }
+
+        @cache
+        def channel(topic: str) -> int:
+            if topic in TYPES:
+                name = TYPES[topic]
+                schema = encode(SCHEMAS[name]).encode()
+            else:
+                of_log = next(table.topic for table in TABLES if table.topic.name == topic)
+                name, schema = of_log.schema_name, of_log.schema
+            schema_id = writer.register_schema(name, "jsonschema", schema)
+            return int(writer.register_channel(topic, "json", schema_id))
+
         for time_s, topic, message in sorted(_rows(record), key=itemgetter(0)):
             stamp_ns = round(time_s * 1e9)
             data = encode(message).encode()
-            writer.add_message(channels[topic], stamp_ns, data, publish_time=stamp_ns)
+            writer.add_message(channel(topic), stamp_ns, data, publish_time=stamp_ns)
             counts[topic] += 1
         writer.finish()
-    return counts
+    return dict(counts)
 
 
 def _rows(record: RunRecord) -> Iterator[Row]:
     things = [*_body(record), _ground(record), *_water(record), *_obstacle(record)]
-    yield 0.0, "/scene", _scene(things)
+    yield 0.0, SCENE, _scene(things)
     for time_s, points_m in record.waypoints:
-        yield time_s, "/scene", _scene([_waypoints(record, time_s, points_m)])
+        yield time_s, SCENE, _scene([_waypoints(record, time_s, points_m)])
     for time_s, points_m in record.paths:
-        yield time_s, "/scene", _scene([_path(record, time_s, points_m)])
+        yield time_s, SCENE, _scene([_path(record, time_s, points_m)])
     yield from _frames(record)
     yield from _joints(record)
     yield from _imu(record)
+    yield from _others(record)
     for event in record.events:
         message = {
             "timestamp": _time(event.time_s),
@@ -100,7 +137,18 @@ def _rows(record: RunRecord) -> Iterator[Row]:
             "file": "",
             "line": 0,
         }
-        yield event.time_s, "/log", message
+        yield event.time_s, FOXGLOVE_LOG, message
+
+
+def _others(record: RunRecord) -> Iterator[Row]:
+    """Rows of the log without the fields that other messages contain."""
+    yield 0.0, ConfigTable.topic.name, record.header.row()
+    for table, columns in remaining_fields(record, SHOWN):
+        for k, time_s in enumerate(table.time_s.tolist()):
+            values = {
+                name: json_value(each, getattr(table, name)[k]) for name, each in columns.items()
+            }
+            yield time_s, table.topic.name, {TIME: time_s, **values}
 
 
 def _frames(record: RunRecord) -> Iterator[Row]:
@@ -120,10 +168,10 @@ def _frames(record: RunRecord) -> Iterator[Row]:
                 frames.parents, frames.names, ats, rotations, strict=True
             )
         ]
-        yield time_s, "/tf", {"transforms": transforms}
+        yield time_s, FRAMES, {"transforms": transforms}
         if len(record.pose.time_s):
             pose = _pose(ats[0], rotations[0])
-            yield time_s, "/head_pose", {"timestamp": now, "frame_id": WORLD, "pose": pose}
+            yield time_s, HEAD_POSE, {"timestamp": now, "frame_id": WORLD, "pose": pose}
 
 
 def _imu(record: RunRecord) -> Iterator[Row]:
@@ -137,7 +185,7 @@ def _imu(record: RunRecord) -> Iterator[Row]:
     )
     for time_s, at, turn in rows:
         pose = _pose(at, turn)
-        yield time_s, IMU_TOPIC, {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
+        yield time_s, IMU, {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
 
 
 def _joints(record: RunRecord) -> Iterator[Row]:
@@ -150,7 +198,7 @@ def _joints(record: RunRecord) -> Iterator[Row]:
         now = _time(time_s)
         yield (
             time_s,
-            "/joint_states",
+            JOINT_STATES,
             {
                 "timestamp": now,
                 "joints": [
@@ -161,7 +209,7 @@ def _joints(record: RunRecord) -> Iterator[Row]:
         )
         yield (
             time_s,
-            "/joint_goals",
+            JOINT_GOALS,
             {
                 "timestamp": now,
                 "joints": [

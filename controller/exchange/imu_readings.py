@@ -1,6 +1,5 @@
 """What a run's IMU measured, each reading once, in the frames of ``body_frames``."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import RunRecord
 
-IMU_TOPIC: Final = "/imu"
 _SAME_S: Final = 1e-4
 """Readings that were measured closer to each other are one: ages are rounded in the log."""
 
@@ -29,12 +27,6 @@ class ImuReadings:
     """(N, 3) about the link's forward, left and up axes."""
     link_m: Floats
     """(N, 3) where the link was, as the run's pose says; zero where nothing says it."""
-
-
-def recorded_topics(topics: Mapping[str, str], record: RunRecord) -> dict[str, str]:
-    """Topics and their types without the IMU's where the robot has none."""
-    none = not len(record.imu.time_s)
-    return {name: kind for name, kind in topics.items() if not (none and name == IMU_TOPIC)}
 
 
 def imu_readings(record: RunRecord) -> ImuReadings:

@@ -1,26 +1,74 @@
-"""Rows of a log as ROS 2 messages, of whatever library makes these: a bag's, or a node's.
+"""Rows of a log as ROS 2 messages of any library: that of a bag, or that of a node.
 
 Frames and joints have the names of the URDF that ``robot export`` writes; effort is in N m.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
-from snakewalk.controller.exchange.imu_readings import IMU_TOPIC, imu_readings
+from snakewalk.controller.exchange.imu_readings import imu_readings
+from snakewalk.controller.exchange.remaining_fields import Shown, remaining_fields
+from snakewalk.controller.runlog.column import Column
+from snakewalk.controller.runlog.encode import encode
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import (
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    ImuTable,
+    PathTable,
+    PoseTable,
+    SlowTable,
+)
 
+JOINT_STATES: Final = "/joint_states"
+JOINT_GOALS: Final = "/joint_goals"
+FRAMES: Final = "/tf"
+HEAD_POSE: Final = "/head_pose"
+IMU: Final = ImuTable.topic.name
+PATH: Final = PathTable.topic.name
+DIAGNOSTICS: Final = "/diagnostics"
+ROSOUT: Final = "/rosout"
 _LEVELS: Final = {"info": 20, "warning": 30, "error": 40}
 """Of ``rcl_interfaces/msg/Log``."""
 OK: Final = 0
 WARNING: Final = 1
 ERROR: Final = 2
 """Of ``diagnostic_msgs/msg/DiagnosticStatus``."""
-Row = tuple[float, str, Any]
-"""Time in s, topic, message."""
+_PATH: Final = "nav_msgs/msg/Path"
+_TEXT: Final = "std_msgs/msg/String"
+TYPES: Final = {
+    JOINT_STATES: "sensor_msgs/msg/JointState",
+    JOINT_GOALS: "sensor_msgs/msg/JointState",
+    FRAMES: "tf2_msgs/msg/TFMessage",
+    HEAD_POSE: "geometry_msgs/msg/PoseStamped",
+    IMU: "sensor_msgs/msg/Imu",
+    PATH: _PATH,
+    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+    ROSOUT: "rcl_interfaces/msg/Log",
+}
+"""Well-known message of each topic."""
+SHOWN: Final[Shown] = {
+    CycleTable: ("sent_rad", "measured_rad", "velocity_rad_s"),
+    SlowTable: tuple(SlowTable.topic.columns),
+    ImuTable: tuple(ImuTable.topic.columns),
+    PoseTable: ("head_m", "rotation", "links_m"),
+    EventTable: tuple(EventTable.topic.columns),
+}
+"""Fields that the messages of other packages contain; the others have messages of ``std_msgs``."""
+
+
+class Row(NamedTuple):
+    """A message of a topic."""
+
+    time_s: float
+    topic: str
+    type: str
+    message: Any
 
 
 class RosMessages:
@@ -33,13 +81,13 @@ class RosMessages:
         byte: Callable[[int], Any] = int,
         ros_time_s: Callable[[float], float] = lambda time_s: time_s,
     ) -> None:
-        """Take what makes a message.
+        """Use the functions of a library.
 
         Args:
             new: makes a message of a type, such as ``sensor_msgs/msg/JointState``, and its fields.
-            floats: what the library takes for a sequence of ``float64``.
-            byte: what it takes for a ``byte``.
-            ros_time_s: stamp of a time of the run's clock.
+            floats: returns the library's sequence of ``float64``.
+            byte: returns the library's ``byte``.
+            ros_time_s: returns the stamp of a time of the run's clock.
 
         """
         self._make, self._floats, self._byte, self._ros_time_s = new, floats, byte, ros_time_s
@@ -50,11 +98,14 @@ class RosMessages:
         yield from self._frames(record)
         yield from self.head_poses(record)
         yield from self.imu(record)
-        yield from self.paths(record)
         yield from self._diagnostics(record)
+        yield from self._events(record)
+        yield from self._others(record)
+
+    def _events(self, record: RunRecord) -> Iterator[Row]:
         for event in record.events:
-            log = self._new(
-                "rcl_interfaces/msg/Log",
+            yield self._row(
+                *(event.time_s, ROSOUT, TYPES[ROSOUT]),
                 stamp=self._stamp(event.time_s),
                 level=_LEVELS[event.level],
                 name="snakewalk",
@@ -63,7 +114,6 @@ class RosMessages:
                 function="",
                 line=0,
             )
-            yield event.time_s, "/rosout", log
 
     def joints(self, record: RunRecord) -> Iterator[Row]:
         """What was measured, and what was sent, in every cycle."""
@@ -74,15 +124,20 @@ class RosMessages:
             effort_n_m = np.zeros((len(cycle.time_s), 0))
         for k, time_s in enumerate(cycle.time_s.tolist()):
             given = (cycle.measured_rad[k], cycle.velocity_rad_s[k], effort_n_m[k])
-            yield time_s, "/joint_states", self._joint_state(time_s, names, *given)
-            goals = self._joint_state(time_s, names, cycle.sent_rad[k], none, none)
-            yield time_s, "/joint_goals", goals
+            yield self._joint_state(time_s, JOINT_STATES, names, *given)
+            yield self._joint_state(time_s, JOINT_GOALS, names, cycle.sent_rad[k], none, none)
 
     def _joint_state(
-        self, time_s: float, names: list[str], position: Floats, velocity: Floats, effort: Floats
-    ) -> Any:
-        return self._new(
-            "sensor_msgs/msg/JointState",
+        self,
+        time_s: float,
+        topic: str,
+        names: list[str],
+        position: Floats,
+        velocity: Floats,
+        effort: Floats,
+    ) -> Row:
+        return self._row(
+            *(time_s, topic, TYPES[topic]),
             header=self._header(time_s, ""),
             name=names,
             position=self._floats(position),
@@ -113,7 +168,7 @@ class RosMessages:
                 )
                 for parent, name, at, turn in rows
             ]
-            yield time_s, "/tf", self._new("tf2_msgs/msg/TFMessage", transforms=transforms)
+            yield self._row(time_s, FRAMES, TYPES[FRAMES], transforms=transforms)
 
     def head_poses(self, record: RunRecord) -> Iterator[Row]:
         """Where the head was."""
@@ -122,7 +177,8 @@ class RosMessages:
         frames = body_frames(record)
         for k, time_s in enumerate(frames.time_s.tolist()):
             at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
-            yield time_s, "/head_pose", self._pose(time_s, at.tolist(), turn.tolist())
+            pose = self._pose(time_s, at.tolist(), turn.tolist())
+            yield Row(time_s, HEAD_POSE, TYPES[HEAD_POSE], pose)
 
     def imu(self, record: RunRecord) -> Iterator[Row]:
         """Attitude and rate of a robot's IMU."""
@@ -135,8 +191,8 @@ class RosMessages:
             strict=True,
         )
         for time_s, turn, rate in rows:
-            message = self._new(
-                "sensor_msgs/msg/Imu",
+            yield self._row(
+                *(time_s, IMU, TYPES[IMU]),
                 header=self._header(time_s, readings.frame),
                 orientation=self._quaternion(turn),
                 orientation_covariance=unknown,
@@ -145,21 +201,49 @@ class RosMessages:
                 linear_acceleration=self._xyz("Vector3", [0.0, 0.0, 0.0]),
                 linear_acceleration_covariance=absent,
             )
-            yield time_s, IMU_TOPIC, message
 
     def paths(self, record: RunRecord) -> Iterator[Row]:
-        """The plan's path, and those that took its place."""
-        for time_s, points in record.paths:
-            yield time_s, "/path", self._path(time_s, points)
+        """The plan's path, and those that replaced it."""
+        for time_s, points_m in record.paths:
+            yield self._points(time_s, PATH, points_m)
 
-    def _path(self, time_s: float, points_m: Floats) -> Any:
+    def _points(self, time_s: float, topic: str, points_m: Floats) -> Row:
         level = np.hstack([points_m, np.zeros((len(points_m), 3 - points_m.shape[1]))])
         poses = [self._pose(time_s, point, [0.0, 0.0, 0.0, 1.0]) for point in level.tolist()]
-        return self._new("nav_msgs/msg/Path", header=self._header(time_s, WORLD), poses=poses)
+        header = self._header(time_s, WORLD)
+        return self._row(time_s, topic, _PATH, header=header, poses=poses)
+
+    def _others(self, record: RunRecord) -> Iterator[Row]:
+        """Fields that no message above contains: each has a topic of its own."""
+        name = ConfigTable.topic.name
+        yield self._row(0.0, name, _TEXT, data=encode(record.header.row()))
+        for table, columns in remaining_fields(record, SHOWN):
+            for name, column in columns.items():
+                topic = table.topic.name
+                times_s, values = table.time_s.tolist(), getattr(table, name)
+                for time_s, value in zip(times_s, values, strict=True):
+                    yield self._value(time_s, f"{topic}/{name}", column, value)
+
+    def _value(self, time_s: float, topic: str, column: Column, value: Any) -> Row:
+        if column.kind == "points":
+            return self._points(time_s, topic.rpartition("/")[0], value)
+        if column.kind == "text":
+            return self._row(time_s, topic, _TEXT, data=value)
+        if not column.shape:
+            return self._row(time_s, topic, "std_msgs/msg/Float64", data=float(value))
+        numbers = np.asarray(value, dtype=float).ravel()
+        label, size = topic.rpartition("/")[2], len(numbers)
+        dimension = self._new(
+            "std_msgs/msg/MultiArrayDimension", label=label, size=size, stride=size
+        )
+        layout = self._new("std_msgs/msg/MultiArrayLayout", dim=[dimension], data_offset=0)
+        kind, data = "std_msgs/msg/Float64MultiArray", self._floats(numbers)
+        return self._row(time_s, topic, kind, layout=layout, data=data)
 
     def _diagnostics(self, record: RunRecord) -> Iterator[Row]:
         for k, time_s in enumerate(record.slow.time_s.tolist()):
-            yield time_s, "/diagnostics", self.diagnostics(time_s, self.servos(record, k))
+            status = self.servos(record, k)
+            yield self.diagnostics(time_s, status)
 
     def servos(self, record: RunRecord, k: int) -> list[Any]:
         """Return the status of every servo in a row of ``/slow``."""
@@ -198,14 +282,14 @@ class RosMessages:
             ],
         )
 
-    def diagnostics(self, time_s: float, status: list[Any]) -> Any:
+    def diagnostics(self, time_s: float, status: list[Any]) -> Row:
         """Return a ``DiagnosticArray``."""
-        kind = "diagnostic_msgs/msg/DiagnosticArray"
-        return self._new(kind, header=self._header(time_s, ""), status=status)
+        header = self._header(time_s, "")
+        return self._row(time_s, DIAGNOSTICS, TYPES[DIAGNOSTICS], header=header, status=status)
 
     def _pose(self, time_s: float, at: list[float], turn: list[float]) -> Any:
         return self._new(
-            "geometry_msgs/msg/PoseStamped",
+            TYPES[HEAD_POSE],
             header=self._header(time_s, WORLD),
             pose=self._new(
                 "geometry_msgs/msg/Pose",
@@ -227,6 +311,9 @@ class RosMessages:
     def _quaternion(self, values: list[float]) -> Any:
         x, y, z, w = values
         return self._new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
+
+    def _row(self, time_s: float, topic: str, kind: str, **fields: Any) -> Row:
+        return Row(time_s, topic, kind, self._make(kind, fields))
 
     def _new(self, kind: str, **fields: Any) -> Any:
         return self._make(kind, fields)

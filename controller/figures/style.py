@@ -25,13 +25,23 @@ GREEN: Final = "#009e73"
 AMBER: Final = "#e69f00"
 RED: Final = "#d55e00"
 PURPLE: Final = "#a4508b"
+COLOURS: Final = {
+    "ink": INK,
+    "grey": GREY,
+    "pale": PALE,
+    "blue": BLUE,
+    "sky": SKY,
+    "green": GREEN,
+    "amber": AMBER,
+    "red": RED,
+    "purple": PURPLE,
+}
+"""The palette by name, as ``column.Curve`` uses it."""
 GROUND: Final = LinearSegmentedColormap.from_list(
     "ground", ["#7fa08c", "#b9c7a0", "#e6dcb8", "#cdb292", "#a68a78"]
 )
 ANGLES: Final = "RdBu_r"
 WIDTH_IN: Final = 11.0
-FLAT_V: Final = 0.15
-"""Span up to which a supply holds no information (ours)."""
 _POINTS: Final = 900  # across a figure: more cannot be seen
 _RC: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",

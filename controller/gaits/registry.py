@@ -16,6 +16,7 @@ from snakewalk.controller.gaits.spine import (
     Anguilliform,
     Carangiform,
     Dolphin,
+    SpineGait,
     Subcarangiform,
     Thunniform,
 )
@@ -45,6 +46,11 @@ GAITS: dict[str, type[Gait]] = {
         ErectTrot,
     )
 }
+
+SPINE_GAITS: tuple[str, ...] = tuple(
+    name for name, gait in GAITS.items() if issubclass(gait, SpineGait)
+)
+"""Names of the gaits that move a spine without a robot."""
 
 
 def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "") -> Gait:

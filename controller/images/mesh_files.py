@@ -13,7 +13,7 @@ from PIL import Image as Pillow
 from snakewalk.config.archive import check_expansion, parse_json, why_no_file
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.mesh.mesh import Mesh
+from snakewalk.controller.images.mesh import Mesh
 
 SKIN_RGB = (0.66, 0.48, 0.20)
 """Of a body without a picture."""

@@ -21,8 +21,8 @@ from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import is_gait, prepare_gait, prepare_policy
-from snakewalk.controller.run.gait_run import GaitRun
-from snakewalk.controller.run.source_run import SourceRun
+from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.kinds.source_run import SourceRun
 from snakewalk.controller.studies.sweep_measure import varied
 
 HEADING_SPREAD_RAD: Final = 0.2

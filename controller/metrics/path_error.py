@@ -5,7 +5,8 @@ from typing import Final
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.runlog.record import PlanSummary, PoseTable, RunRecord
+from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.topics import PoseTable
 
 _WINDOW_M: Final = 0.5  # around the place reached, so that a crossing branch is not the nearest
 _ROUNDING_M: Final = 2e-6  # of the log

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.runlog.record import CycleTable
+from snakewalk.controller.runlog.topics import CycleTable
 
 _LONGEST_S: Final = 0.6
 

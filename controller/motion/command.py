@@ -10,6 +10,10 @@ TIMEOUT_S: Final = 1.0
 """How long joints go on towards goals that nobody renews (ours)."""
 POINTS_MAX: Final = 500
 """Of a trajectory, which is splined and checked within a cycle."""
+JOINTS_MAX: Final = 256
+"""Joints that a command may name (ours): a robot has at most 200."""
+LINE_BYTES: Final = 1 << 20
+"""Longest command on its way to the run: a trajectory of 500 points for 64 joints (ours)."""
 
 
 class JointGoals(NamedTuple):

@@ -26,6 +26,7 @@ from snakewalk.controller.motion.command import (
 )
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.rate_limiter import RateLimiter
+from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import HEADROOM, Pace
 from snakewalk.controller.motion.trajectory import (
     JointLimits,
@@ -37,8 +38,6 @@ _GAIN_PER_S: Final = 20.0
 _REACHED_RAD: Final = 1e-3
 _TRIED_S: Final = 0.02
 """Steps in which a join is tried before it begins."""
-_QUIET_S: Final = 1.0
-"""The same refusal is told again after so long."""
 
 
 class _Mode(Protocol):
@@ -161,7 +160,7 @@ class Commanded:
         rest = np.zeros(robot.joint_count)
         self._mode: _Mode = _Follow(JointsNow(rest, rest), self._limits)
         self._time_s = 0.0
-        self._refused, self._refused_s = "", 0.0
+        self._refusals = Refusals(lambda why: on_event("refused", why))
 
     def start_at(self, joint_rad: Floats) -> None:
         """Begin from joints at these angles (J,), held within their limits."""
@@ -189,6 +188,7 @@ class Commanded:
             self._first = None
         for command in self._commands():
             self._take(command)
+        self._refusals.step(self._time_s)
         if self._waiting is not None:
             self._join(self._waiting, view)
         self._mode.step(dt_s, view)
@@ -223,13 +223,7 @@ class Commanded:
             else:
                 raise InputError(command.why)
         except InputError as error:
-            self._refuse(error.faults[0])
-
-    def _refuse(self, why: str) -> None:
-        if why != self._refused or self._time_s - self._refused_s >= _QUIET_S:
-            self._on_event("refused", why)
-            self._refused_s = self._time_s
-        self._refused = why
+            self._refusals.add(error.faults[0], self._time_s)
 
     def _follow(self) -> _Follow:
         """Go on to the goals that the joints have, or else to a stop."""

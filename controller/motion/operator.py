@@ -15,6 +15,7 @@ from snakewalk.controller.gaits.gait import Needs, Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_motion import GaitMotion
+from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import Pace
 
 KEYS = {
@@ -31,6 +32,8 @@ KEYS = {
     "t": "torque off",
 }
 HALT_S = 0.5
+_KEYS_MAX = 100
+"""Keys and values that are carried out in a step (ours); text that is pasted is longer."""
 
 
 class Operator:
@@ -60,6 +63,8 @@ class Operator:
         self._robot, self._keys, self._on_event = robot, keys, on_event
         self._chosen = 0
         self._halted = False
+        self._refusals = Refusals(lambda why: on_event("operator", f"refused: {why}"))
+        self._time_s = 0.0
         self._held, self._was_held = held, True
         self._rate = 1.0
 
@@ -92,8 +97,13 @@ class Operator:
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Carry out the keys pressed, then go on by ``dt_s``."""
-        for key in self._keys():
+        self._time_s += dt_s
+        keys = list(self._keys())
+        for key in keys[:_KEYS_MAX]:
             self._press(key)
+        if len(keys) > _KEYS_MAX:
+            self._refuse(f"{len(keys)} keys at once; only the first {_KEYS_MAX} are carried out")
+        self._refusals.step(self._time_s)
         change = dt_s / HALT_S
         before = self._rate
         held = self._held()
@@ -139,7 +149,7 @@ class Operator:
         if name in self._ranges() and math.isfinite(value):
             self._set(name, value)
         else:
-            self._report(f"refused: {name}={text}: no number for a parameter of this gait")
+            self._refuse(f"{name}={text}: no number for a parameter of this gait")
 
     def _nudge(self, name: str, sign: float) -> None:
         step = sign * self._ranges()[name].step
@@ -155,7 +165,7 @@ class Operator:
         try:
             self.motion.change(**values)
         except InputError as error:
-            self._report(f"refused: {error.faults[0]}")
+            self._refuse(error.faults[0])
         else:
             self._report(", ".join(f"{name} = {value}" for name, value in values.items()))
 
@@ -165,14 +175,14 @@ class Operator:
         for away in range(1, len(names)):
             if self._become(names[(at + step * away) % len(names)], quietly=True):
                 return
-        self._report("refused: no other gait suits this robot")
+        self._refuse("no other gait suits this robot")
 
     def _become(self, name: str, *, quietly: bool = False) -> bool:
         try:
             self.motion.become(make_gait(name))
         except InputError as error:
             if not quietly:
-                self._report(f"refused: {error.faults[0]}")
+                self._refuse(error.faults[0])
             return False
         self._chosen = 0
         self._report(f"gait {name}")
@@ -180,6 +190,9 @@ class Operator:
 
     def _ranges(self) -> dict[str, Range]:
         return ranges(self.motion.gait.model)
+
+    def _refuse(self, why: str) -> None:
+        self._refusals.add(why, self._time_s)
 
     def _report(self, text: str) -> None:
         self._on_event("operator", text)

@@ -12,6 +12,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.motion.command import POINTS_MAX, JointTrajectory
+from snakewalk.controller.motion.refusals import NAME_MAX
 
 START_RAD: Final = 0.05
 """How far a joint may be from a first point at 0 s (ours)."""
@@ -64,11 +65,15 @@ class JointLimits:
         """
         if not names:
             raise InputError(f"{what}: names no joint")
+        if len(names) > len(self.names):
+            raise InputError(
+                f"{what}: names {len(names)} joints; {self.robot} has {len(self.names)}"
+            )
         unknown = [name for name in names if name not in self.names]
         if unknown:
             raise InputError(
-                f"{what}: {unknown[0]} is no joint of {self.robot}; they are {self.names[0]} to "
-                f"{self.names[-1]}"
+                f"{what}: {unknown[0][:NAME_MAX]} is no joint of {self.robot}; they are "
+                f"{self.names[0]} to {self.names[-1]}"
             )
         if len(set(names)) < len(names):
             raise InputError(f"{what}: names a joint twice")

@@ -17,7 +17,7 @@ from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.segment import Kind, Segment, cut
-from snakewalk.controller.run.factory import check_supply
+from snakewalk.controller.run.servo_setup import check_supply
 
 SETTLING = 3
 """Whole cycles before the one that is kept."""

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,13 +19,11 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
 from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.observer_watch import Watcher
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent, OnProgress
 from snakewalk.drivers.types import BodyPose
-
-if TYPE_CHECKING:
-    from snakewalk.controller.run.watcher import Watcher
 
 
 @dataclass(frozen=True)
@@ -209,7 +206,7 @@ def run_route(
     on_progress: OnProgress = lambda progress: None,
     *,
     force: bool = False,
-    view: "Watcher | None" = None,
+    view: Watcher | None = None,
 ) -> RouteRun:
     """Execute a plan on ``port``, or on the simulator where it is None; ``view`` looks on.
 

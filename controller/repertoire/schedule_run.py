@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +28,9 @@ from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 
 COLUMNS: Final = ("time_s", "speed_m_s", "turn_rad_s")
+_SAMPLE_S: Final = 0.1
+_LASTING_S: Final = 1.0
+"""A request that lasts less is a transition to another one (ours)."""
 
 
 def read_schedule(path: Path) -> ScheduleConfig:
@@ -121,9 +125,50 @@ class ScheduleRun(PathlessRun):
         return float(curve_at(asked.speed_m_s, time_s)), float(curve_at(asked.turn_rad_s, time_s))
 
     def check_plan(self) -> PlanSummary:
-        """Load the actions; joins keep within the joints' limits while it runs."""
-        assert self.repertoire.segments, "a repertoire has actions"
+        """Check that there is an action for each direction that the schedule requests.
+
+        Raises:
+            InputError: the actions cannot be loaded, or none goes or turns that way.
+
+        """
+        control = self.controller()
+        found = self._first_lasting(lambda *asked: bool(control.missing(*asked)))
+        if found is not None:
+            since_s, asked = found
+            raise InputError(
+                f"{self.config.file}: no action {control.missing(*asked)} ({asked[0]:g} m/s, "
+                f"{asked[1]:g} rad/s from {since_s:.1f} s); request one of these: "
+                f"{control.available()}"
+            )
         return plan_without_path(self.run)
+
+    def remark(self) -> str | None:
+        """Return a warning if an action is much slower, faster or wider than requested."""
+        control = self.controller()
+        found = self._first_lasting(control.is_far)
+        if found is None:
+            return None
+        since_s, asked = found
+        return (
+            f"{self.config.file}: the nearest action to {asked[0]:g} m/s and {asked[1]:g} rad/s "
+            f"(from {since_s:.1f} s) is {control.text(control.nearest(*asked))}; "
+            "`snakewalk repertoire show` lists all actions"
+        )
+
+    def _first_lasting(
+        self, of: Callable[[float, float], bool]
+    ) -> tuple[float, tuple[float, float]] | None:
+        """Return since when, and the request for which, ``of`` holds for a while; None if never."""
+        config = self.config
+        times_s = np.arange(0.0, config.duration_s, _SAMPLE_S)
+        asked = (curve_at(each, times_s) for each in (config.speed_m_s, config.turn_rad_s))
+        lasting = min(round(_LASTING_S / _SAMPLE_S), len(times_s))
+        count = 0
+        for k, (speed_m_s, turn_rad_s) in enumerate(zip(*asked, strict=True)):
+            count = count + 1 if of(float(speed_m_s), float(turn_rad_s)) else 0
+            if count == lasting:
+                return float(times_s[k - lasting + 1]), (float(speed_m_s), float(turn_rad_s))
+        return None
 
     def make_source(self, on_event: OnEvent) -> "ScheduleMotion":
         """Return a fresh motion."""

@@ -1,38 +1,24 @@
 """Files made from a run's record: ``summary.json``, ``film.mp4`` and ``report.html``."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.animals.mesh.body_look import SERVOS, skin_look
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY, atomic_write
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Section, film_html, page
+from snakewalk.controller.run.film_look import SERVOS, film_look
+from snakewalk.controller.run.finish import Artifacts
+from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.runlog.record import RunRecord
 
 
-@dataclass(frozen=True, slots=True)
-class Artifacts:
-    """Files of a run beside its log; None for what is not there, and why in ``notes``."""
-
-    report: Path | None
-    film: Path | None
-    notes: tuple[str, ...]
-    """One line each."""
-
-    def to_dict(self) -> dict[str, str | None]:
-        """Names of the files, for a command's answer."""
-        return {
-            "report": None if self.report is None else str(self.report),
-            "film": None if self.film is None else str(self.film),
-        }
-
-
+@plugin("results", "report")
 def make_artifacts(
     record: RunRecord,
     folder: Path,
@@ -42,6 +28,7 @@ def make_artifacts(
     fine: bool = False,
     look: str = SERVOS,
     made: str = "",
+    folders: bool = False,
 ) -> Artifacts:
     """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
 
@@ -49,8 +36,9 @@ def make_artifacts(
     page is written before the film, which takes longest, and again when the film is drawn; a film
     that is there already is the same run's, and stays until then. What this machine cannot make (no
     simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
-    pictures. Shows progress on standard error. ``look`` is the body in the film, as ``skin_look``
-    takes it; ``made`` says at the page's foot what made it.
+    pictures. Shows progress on standard error. ``look`` is the body in the film, as ``film_look``
+    accepts it; ``made`` says at the page's foot what made it. Without ``folders`` the page contains
+    the names of the user's files, but no folders.
     """
     notes: list[str] = []
     numbers = write_summary(summary(record) if numbers is None else numbers, folder)
@@ -58,11 +46,11 @@ def make_artifacts(
     drawn: _Drawn | None = None
     try:
         drawn = _draw(record, made)
-        _write_page(record, folder, path if path.exists() else None, numbers, drawn)
+        _write_page(record, folder, path if path.exists() else None, numbers, drawn, folders)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
     if film and _film(record, path, fine, look, notes) and drawn is not None:
-        _write_page(record, folder, path, numbers, drawn)
+        _write_page(record, folder, path, numbers, drawn, folders)
     report = None if drawn is None else folder / REPORT
     return Artifacts(report, path if path.exists() else None, tuple(notes))
 
@@ -98,7 +86,7 @@ class _Drawn:
 def _draw(record: RunRecord, made: str = "") -> _Drawn:
     require_extra("the report needs", "matplotlib", "plotly")
     from snakewalk.controller.report.curves import curves_html  # noqa: PLC0415  an extra
-    from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415
+    from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415  an extra
 
     return _Drawn(sections(record), curves_html(record), made)
 
@@ -109,6 +97,7 @@ def _write_page(
     film: Path | None,
     numbers: RunSummary,
     drawn: _Drawn,
+    folders: bool = False,
 ) -> Path:
     header = record.header
     film_on_page = ""
@@ -128,6 +117,7 @@ def _write_page(
         curves=drawn.curves,
         links=[name for name in (LOG, SUMMARY, FILM) if (out_dir / name).exists()],
         made=drawn.made,
+        folders=folders,
     )
     path = out_dir / REPORT
     with atomic_write(path) as part:
@@ -136,20 +126,12 @@ def _write_page(
     return path
 
 
-def write_summary(numbers: RunSummary, out_dir: Path) -> RunSummary:
-    """Write ``out_dir/summary.json`` and return the numbers; needs no matplotlib."""
-    text = json.dumps(numbers.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
-    with atomic_write(out_dir / SUMMARY) as part:
-        part.write_text(text + "\n", encoding="utf-8")
-    return numbers
-
-
 def _film(record: RunRecord, path: Path, fine: bool, look: str, notes: list[str]) -> bool:
     """Draw the film; return whether it was drawn."""
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:
-                skin = skin_look(look, record.header)
+                skin = film_look(look, record.header)
                 film_run(record, part, look=skin, fine=fine, on_progress=bar.update)
         except InputError as error:
             bar.hide()

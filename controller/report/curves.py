@@ -8,28 +8,26 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
+from plotly.offline import get_plotlyjs
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.figures.style import (
     AMBER,
     BLUE,
-    FLAT_V,
+    COLOURS,
     GREEN,
-    GREY,
     INK,
-    PURPLE,
     RED,
-    SKY,
 )
 from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
+from snakewalk.controller.runlog.column import Panel
+from snakewalk.controller.runlog.panels import panel_curves
 from snakewalk.controller.runlog.record import RunRecord
 
 _ROWS: Final = 4000
 """Most rows of a curve: of a longer run every second, third ... row is on the page (ours)."""
 _PANEL_PX: Final = 150
 _GAP: Final = 0.055
-_FLAT_C: Final = 1.0
-"""Span up to which temperature holds no information (ours)."""
 Curve = tuple[str, str, Floats, Floats]
 """Name, colour, times, values."""
 
@@ -59,84 +57,29 @@ def curves_html(record: RunRecord) -> str:
 
 
 def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
-    """Panels (title with unit, curves) that hold information, and in words what is constant."""
-    pose, cycle, slow = record.pose, record.cycle, record.slow
-    size_a = np.where(np.isfinite(cycle.current_a), np.abs(cycle.current_a), np.nan)
-    known = np.isfinite(size_a).any(axis=1)
-    high_a, mean_a = np.full(len(size_a), np.nan), np.full(len(size_a), np.nan)
-    high_a[known], mean_a[known] = (
-        np.nanmax(size_a[known], axis=1),
-        np.nanmean(size_a[known], axis=1),
-    )
-    panels = [
-        ("from the path, m", [("from the path", BLUE, pose.time_s, path_error_m(record))]),
-        (
-            "forward speed, m/s",
-            [
-                ("pulse", GREY, pose.time_s, pose.pulse_m_s),
-                ("predicted", AMBER, pose.time_s, pose.predicted_speed_m_s),
-                ("speed", BLUE, pose.time_s, pose.speed_m_s),
-            ],
-        ),
-        (
-            "current, A",
-            [
-                ("highest joint", RED, cycle.time_s, high_a),
-                ("mean of joints", SKY, cycle.time_s, mean_a),
-            ],
-        ),
-        (
-            "in a cycle, ms",
-            [
-                ("on the wire", BLUE, cycle.deadline_s, 1e3 * cycle.wire_busy_s),
-                ("began late", AMBER, cycle.deadline_s, 1e3 * cycle.lateness_s),
-            ],
-        ),
-    ]
+    """Panels (title with unit, curves), and a sentence about the constant values."""
+    error_m = path_error_m(record)
+    panels: list[tuple[str, list[Curve]]] = []
+    if np.isfinite(error_m).any():
+        panels.append(("from the path, m", [("from the path", BLUE, record.pose.time_s, error_m)]))
     constant = []
-    for title, values, colour, flat, unit in (
-        ("hottest servo, °C", _extreme(slow.temperature_c, np.nanmax), RED, _FLAT_C, "°C"),
-        ("lowest supply, V", _extreme(slow.voltage_v, np.nanmin), AMBER, FLAT_V, "V"),
-    ):
-        name = title.partition(",")[0]
-        if len(values) and np.isfinite(values).any():
-            if np.nanmax(values) - np.nanmin(values) > flat:
-                panels.append((title, [(name, colour, slow.time_s, values)]))
-            else:
-                constant.append(f"{name} {np.nanmedian(values):.1f} {unit}")
-    if not cycle.lateness_s.any():
-        panels[3][1].pop()
-        constant.append("no cycle began late")
-    panels = [
-        (title, [curve for curve in curves if np.isfinite(curve[3]).any()])
-        for title, curves in panels
-    ]
+    for panel in Panel:
+        curves = [] if panel.is_of_one_joint else panel_curves(record, panel)
+        constant += [each.constant_text for each in curves if each.is_constant]
+        drawn = [
+            (each.curve.name, COLOURS[each.curve.colour], each.time_s, each.values)
+            for each in curves
+            if not each.is_constant
+        ]
+        if drawn:
+            panels.append((panel, drawn))
     words = f" Constant, and not drawn: {', '.join(constant)}." if constant else ""
-    return [panel for panel in panels if panel[1]], words
-
-
-def _extreme(values: Floats, reduce: Any) -> Floats:
-    """(S,) of (S, J); NaN where no joint has a value."""
-    known = np.isfinite(values).any(axis=1)
-    found = np.full(len(values), np.nan)
-    found[known] = reduce(values[known], axis=1)
-    return found
+    return panels, words
 
 
 def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dict[str, Any]:
-    """Traces, layout, and of every joint what its two panels show, as Plotly takes them."""
-    cycle = record.cycle
-    joint: list[tuple[str, list[tuple[str, str, Floats]]]] = [
-        (
-            "joint's angle, rad",
-            [
-                ("asked", GREY, cycle.asked_rad),
-                ("sent", AMBER, cycle.sent_rad),
-                ("measured", BLUE, np.where(cycle.valid, cycle.measured_rad, np.nan)),
-            ],
-        ),
-        ("joint's current, A", [("current", PURPLE, cycle.current_a)]),
-    ]
+    """Traces, layout, and the values that the two panels of each joint show, for Plotly."""
+    joint = [(each, panel_curves(record, each)) for each in Panel if each.is_of_one_joint]
     traces = [
         _trace(name, colour, row, time_s, values)
         for row, (_, curves) in enumerate(panels, start=1)
@@ -144,13 +87,13 @@ def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dic
     ]
     first = len(traces)
     traces += [
-        _trace(name, colour, row, cycle.time_s, values[:, 0])
+        _trace(each.curve.name, COLOURS[each.curve.colour], row, each.time_s, each.values[:, 0])
         for row, (_, curves) in enumerate(joint, start=len(panels) + 1)
-        for name, colour, values in curves
+        for each in curves
     ]
     every = [
-        [_packed(values[:, k]) for _, curves in joint for *_, values in curves]
-        for k in range(cycle.asked_rad.shape[1])
+        [_packed(each.values[:, k]) for _, curves in joint for each in curves]
+        for k in range(record.cycle.asked_rad.shape[1])
     ]
     titles = [title for title, _ in (*panels, *joint)]
     return {
@@ -231,8 +174,6 @@ def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> 
 @cache
 def _library() -> str:
     """Plotly, compressed once however many pages a process makes."""
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415  an extra
-
     return _zipped(get_plotlyjs())
 
 

@@ -8,13 +8,16 @@ import base64
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.controller.motion.command import (
+    LINE_BYTES,
     Command,
     HoldStill,
     JointGoals,
@@ -24,11 +27,17 @@ from snakewalk.controller.motion.command import (
 )
 
 LATE_S: Final = 0.5
-"""A command that waited longer for the run is refused (ours): nothing stale moves a joint."""
+"""A command that waited longer for the run is rejected (ours): nothing stale moves a joint."""
+_AHEAD_S: Final = 0.1
+"""A command with a later time is rejected (ours): both processes read the same clock."""
+_NAMES: Final = {"goals": "joint goals", "trajectory": "trajectory", "gait": "gait"}
 
 
 def encode_command(command: Command) -> str:
-    """Return a command as a line, with the time now on the clock of the machine."""
+    """Return a command as a line, with the current time of the machine's clock.
+
+    A command that is longer than the run accepts becomes a ``Refused``.
+    """
     row: dict[str, Any]
     if isinstance(command, JointGoals):
         positions = [float(value) for value in command.position_rad]
@@ -43,34 +52,72 @@ def encode_command(command: Command) -> str:
         row = {"kind": "refused", "why": command.why}
     else:
         row = {"kind": "hold"}
-    return json.dumps(row | {"sent_s": time.monotonic()})
+    line = json.dumps(row | {"sent_s": time.monotonic()})
+    if len(line) <= LINE_BYTES:
+        return line
+    what = _NAMES.get(row["kind"], "command")
+    why = f"{what}: {len(line) / 1e6:.1f} MB; at most {LINE_BYTES / 1e6:.1f} MB is accepted"
+    return encode_command(Refused(why))
 
 
 def decode_command(
     line: str, now_s: Callable[[], float] = time.monotonic, late_s: float = LATE_S
 ) -> Command:
-    """Return the command of a line; it is ``Refused`` where it comes too late.
+    """Return the command of a line; it is ``Refused`` if it comes too late.
+
+    Raises:
+        InputError: the line is damaged, or a gait's parameters are out of range.
+
+    """
+    try:
+        row = parse_json(line)
+        kind, age_s = row["kind"], now_s() - float(row["sent_s"])
+        if kind in _NAMES:
+            if not age_s >= -_AHEAD_S:  # NaN, too
+                return Refused(f"{kind}: its time is {-age_s:.1f} s ahead of this machine's clock")
+            if age_s > late_s:
+                return Refused(f"{kind}: waited {age_s:.1f} s for the run")
+        return _command(kind, row)
+    except (ValueError, TypeError, KeyError, ArithmeticError, AttributeError):
+        raise InputError("a damaged command; restart the program that sends it") from None
+
+
+def _command(kind: str, row: dict[str, Any]) -> Command:
+    """Return the command of a row.
 
     Raises:
         InputError: a gait's parameters are out of range.
+        ValueError, TypeError, KeyError, ArithmeticError, AttributeError: the row is damaged.
 
     """
-    row = json.loads(line)
-    kind, age_s = row["kind"], now_s() - row["sent_s"]
-    if kind in ("goals", "trajectory", "gait") and age_s > late_s:
-        return Refused(f"{kind}: waited {age_s:.1f} s for the run")
     if kind == "goals":
-        return JointGoals(row["joints"], row["position_rad"])
+        return JointGoals(_texts(row["joints"]), [float(value) for value in row["position_rad"]])
     if kind == "trajectory":
+        time_s, position_rad = _unpacked(row["time_s"], 1), _unpacked(row["position_rad"], 2)
+        if time_s is None or position_rad is None:
+            raise ValueError("a trajectory needs times and positions")
         return JointTrajectory(
-            row["joints"],
-            *(_unpacked(row[key]) for key in JointTrajectory._fields[1:]),  # type: ignore[arg-type]
+            _texts(row["joints"]),
+            time_s,
+            position_rad,
+            _unpacked(row["velocity_rad_s"], 2),
+            _unpacked(row["acceleration_rad_s2"], 2),
         )
     if kind == "gait":
         from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415  the node has none
 
         return StartGait(make_gait(row["name"], row["parameters"]))
-    return Refused(row["why"]) if kind == "refused" else HoldStill()
+    if kind == "refused":
+        return Refused(str(row["why"]))
+    if kind == "hold":
+        return HoldStill()
+    raise ValueError("an unknown kind")
+
+
+def _texts(values: Sequence[Any]) -> list[str]:
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        raise TypeError("a list of names is expected")
+    return values
 
 
 def _packed(values: Floats | None) -> list[Any] | None:
@@ -81,9 +128,11 @@ def _packed(values: Floats | None) -> list[Any] | None:
     return [array.shape, base64.b64encode(array.tobytes()).decode()]
 
 
-def _unpacked(row: list[Any] | None) -> Floats | None:
+def _unpacked(row: list[Any] | None, dimensions: int) -> Floats | None:
     if row is None:
         return None
     shape, text = row
     array = np.frombuffer(base64.b64decode(text), dtype="<f8")
-    return array.reshape(shape) if math.prod(shape) == array.size else np.zeros((0, 0))
+    if len(shape) != dimensions or math.prod(shape) != array.size:
+        raise ValueError("the shape does not match the values")
+    return array.reshape(shape)

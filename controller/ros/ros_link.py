@@ -4,10 +4,11 @@ import os
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.command import Command, Refused
 from snakewalk.controller.ros.command_codec import decode_command
 from snakewalk.controller.ros.ros_options import RosOptions
@@ -24,7 +25,7 @@ class RosLink(WatcherProcess):
 
     def __init__(self, options: RosOptions) -> None:
         require_extra("ROS needs", "rclpy")
-        super().__init__(_serve, options, fault="ROS")
+        super().__init__(_serve, options, what="ROS node", fault="ROS")
         self.name = str(self.said["name"])
         """Of the node, with its namespace."""
         self.domain = int(self.said["domain"])
@@ -35,14 +36,17 @@ class RosLink(WatcherProcess):
 
 
 @contextmanager
-def open_ros(options: RosOptions | None) -> Iterator[RosLink | None]:
-    """Serve the ROS node of a run where it is asked for, and print its name."""
-    if options is None:
-        yield None
-        return
+def open_ros(options: RosOptions) -> Iterator[RosLink]:
+    """Serve the ROS node of a run, and print its name."""
     with RosLink(options) as link:
         print(f"ROS: {link.name} in domain {link.domain}", file=sys.stderr, flush=True)
         yield link
+
+
+@plugin("observer", "ros")
+def open_node(argument: str) -> AbstractContextManager[RosLink]:
+    """ROS 2 node that publishes a run and offers a stop service."""
+    return open_ros(RosOptions())
 
 
 def _decoded(line: str) -> Command:

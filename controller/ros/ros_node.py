@@ -6,7 +6,7 @@ import signal
 import socket
 import threading
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
@@ -23,9 +23,24 @@ from rclpy.signals import SignalHandlerOptions
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.exchange.ros_messages import ERROR, OK, WARNING, RosMessages
+from snakewalk.controller.exchange.ros_messages import (
+    DIAGNOSTICS,
+    ERROR,
+    HEAD_POSE,
+    IMU,
+    JOINT_GOALS,
+    JOINT_STATES,
+    OK,
+    PATH,
+    TYPES,
+    WARNING,
+    RosMessages,
+    Row,
+)
 from snakewalk.controller.motion.command import (
+    JOINTS_MAX,
     POINTS_MAX,
+    TIMEOUT_S,
     Command,
     HoldStill,
     JointGoals,
@@ -33,15 +48,26 @@ from snakewalk.controller.motion.command import (
     Refused,
     StartGait,
 )
+from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
 from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.run.factory import gait_by_name, is_gait
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.runlog.row_line import BUTTON, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.topics import (
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    PoseTable,
+    SlowTable,
+)
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.safety.stop_button import PressedButton
 
 NAME: Final = "snakewalk"
+_CYCLE: Final = CycleTable.topic.name
+_SLOW: Final = SlowTable.topic.name
 _WAIT_S: Final = 0.05
 _DIAGNOSTICS_S: Final = 1.0
 _OFFSET_SPAN_S: Final = 2.0
@@ -56,14 +82,14 @@ newer ones of the same joints follow."""
 _QUEUE: Final = QoSProfile(depth=10)
 _LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TOPICS: Final = {
-    "/joint_states": ("robot_joint_states", "sensor_msgs/msg/JointState", _QUEUE),
-    "/joint_goals": ("robot_joint_goals", "sensor_msgs/msg/JointState", _QUEUE),
-    "/head_pose": ("head_pose", "geometry_msgs/msg/PoseStamped", _QUEUE),
-    "/imu": ("imu", "sensor_msgs/msg/Imu", _QUEUE),
-    "/path": ("path", "nav_msgs/msg/Path", _LATCHED),
-    "/diagnostics": ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", _QUEUE),
+    JOINT_STATES: ("robot_joint_states", _QUEUE),
+    JOINT_GOALS: ("robot_joint_goals", _QUEUE),
+    HEAD_POSE: ("head_pose", _QUEUE),
+    IMU: ("imu", _QUEUE),
+    PATH: ("path", _LATCHED),
+    DIAGNOSTICS: (DIAGNOSTICS, _QUEUE),
 }
-"""Topic of a bag to name, type and quality of service of a node's; diagnostics are everybody's."""
+"""Topic of a bag to name and quality of service of a node's; all nodes share diagnostics."""
 
 
 def serve(line: socket.socket, options: RosOptions) -> None:
@@ -80,10 +106,15 @@ def serve(line: socket.socket, options: RosOptions) -> None:
     hello = {"name": node.get_fully_qualified_name(), "domain": domain}
     line.sendall(json.dumps(hello).encode() + b"\n")
     robot = RobotNode(node, WatcherEnd(line), options)
-    with _spinning(node):
-        with suppress(EOFError, OSError):
+    with _spinning(node, robot.reject):
+        with suppress(EOFError):
             while True:
-                robot.step(_WAIT_S)
+                try:
+                    robot.step(_WAIT_S)
+                except EOFError:
+                    raise
+                except Exception as fault:  # the stop service stays
+                    robot.reject(f"a row of the run: {_in_words(fault)}")
         robot.end()
     node.destroy_node()
     rclpy.shutdown()
@@ -101,20 +132,27 @@ def _make_node(options: RosOptions) -> Node:
 
 
 @contextmanager
-def _spinning(node: Node) -> Iterator[None]:
-    """Have a thread of its own carry out what others call and send."""
+def _spinning(node: Node, reject: Callable[[str], None]) -> Iterator[None]:
+    """Let a thread serve messages and calls; a message that cannot be read does not end it."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    is_over = threading.Event()
 
     def spin() -> None:
-        with suppress(ExternalShutdownException):
-            executor.spin()
+        while not is_over.is_set():
+            try:
+                executor.spin()
+            except ExternalShutdownException:
+                return
+            except Exception as fault:  # rclpy's own, of text that is not UTF-8 for one
+                reject(f"a message: {_in_words(fault)}")
 
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
         yield
     finally:
+        is_over.set()
         executor.shutdown()
         thread.join()
 
@@ -166,13 +204,13 @@ class RobotNode:
                 ("trajectory_msgs/msg/JointTrajectory", "robot_joint_trajectory", self._trajectory),
                 ("std_msgs/msg/String", "robot_gait", self._gait),
             ):
-                node.create_subscription(_type(kind), topic, take, _QUEUE)
+                node.create_subscription(_type(kind), topic, self._guarded(topic, take), _QUEUE)
 
     def step(self, wait_s: float) -> None:
         """Take the rows that have come, publish them, and hand the run what was commanded."""
         for topic, row in self._end.rows(wait_s):
             self._take(topic, row)
-            if topic == "/pose":
+            if topic == PoseTable.topic.name:
                 self._publish_cycle()
                 self._send()
         self._publish_diagnostics()
@@ -188,48 +226,49 @@ class RobotNode:
         self._clock.sleep_until_s(self._clock.now_s() + _LAST_S)
 
     def _take(self, topic: str, row: Mapping[str, Any]) -> None:
-        if topic == "/button":
+        if topic == BUTTON:
             self._button = PressedButton(Path(row["path"]))
-        elif topic == "/config":
+        elif topic == ConfigTable.topic.name:
             self._begin(record_of({topic: [row]}, complete=False, note=""))
-        elif topic == "/path":
+        elif topic == PATH:
             self._publish(self._messages.paths(self._record({topic: [row]})), skip=1)
-        elif topic == "/event":
+        elif topic == EventTable.topic.name:
             self._log_event(row)
         else:
             self._newest[topic] = row
 
     def _begin(self, record: RunRecord) -> None:
         self._header = record.header
-        for topic in ("/joint_states", "/joint_goals", "/head_pose", "/diagnostics"):
+        for topic in (JOINT_STATES, JOINT_GOALS, HEAD_POSE, DIAGNOSTICS):
             self._publisher(topic)  # others find them before the first cycle
         self._end.ask()
         if record.header.run.waypoints_m:
             self._publish(self._messages.paths(record))
 
     def _publish_cycle(self) -> None:
-        rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == "/slow"}
-        if self._header is None or "/cycle" not in rows:
+        rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == _SLOW}
+        if self._header is None or _CYCLE not in rows:
             return
         self._cycles += 1
-        self._offset.add(self._ros_now_s(), rows["/cycle"]["time_s"])
+        self._offset.add(self._ros_now_s(), rows[_CYCLE]["time_s"])
         record = self._record({topic: [row] for topic, row in rows.items()})
         self._publish(self._messages.joints(record))
         self._publish(self._messages.head_poses(record))
         self._publish(self._messages.imu(record))
-        self._said["cycle"] = OK, f"late by {1e3 * rows['/cycle']['lateness_s']:.1f} ms"
+        self._said["cycle"] = OK, f"late by {1e3 * rows[_CYCLE]['lateness_s']:.1f} ms"
 
     def _record(self, rows: Mapping[str, list[Mapping[str, Any]]]) -> RunRecord:
         return record_of(rows, complete=False, note="", header=self._header)
 
-    def _publish(self, rows: Iterator[tuple[float, str, Any]], skip: int = 0) -> None:
-        for number, (_, topic, message) in enumerate(rows):
+    def _publish(self, rows: Iterator[Row], skip: int = 0) -> None:
+        for number, row in enumerate(rows):
             if number >= skip:
-                self._publisher(topic).publish(message)
+                self._publisher(row.topic).publish(row.message)
 
     def _publisher(self, topic: str) -> Any:
         if topic not in self._publishers:
-            name, kind, quality = _TOPICS[topic]
+            name, quality = _TOPICS[topic]
+            kind = TYPES[topic]
             self._publishers[topic] = self._node.create_publisher(_type(kind), name, quality)
         return self._publishers[topic]
 
@@ -244,9 +283,9 @@ class RobotNode:
             self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, {})
             for name, (level, text) in self._said.items()
         ]
-        if "/slow" in self._newest:
-            status += self._messages.servos(self._record({"/slow": [self._newest["/slow"]]}), 0)
-        self._publisher("/diagnostics").publish(self._messages.diagnostics(run_s, status))
+        if _SLOW in self._newest:
+            status += self._messages.servos(self._record({_SLOW: [self._newest[_SLOW]]}), 0)
+        self._publisher(DIAGNOSTICS).publish(self._messages.diagnostics(run_s, status).message)
 
     def _log_event(self, row: Mapping[str, Any]) -> None:
         kind, text = row["kind"], row["text"]
@@ -297,7 +336,29 @@ class RobotNode:
         )
         return response
 
+    def reject(self, why: str) -> None:
+        """Let the run report why a message was rejected."""
+        with self._lock:
+            self._pending.append(Refused(f"ROS: {why}"))
+
+    def _guarded(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return a callback that rejects a message on which ``take`` fails."""
+
+        def taken(message: Any) -> None:
+            try:
+                take(message)
+            except Exception as fault:  # else the thread ends, and the stop service with it
+                self.reject(f"{topic}: {_in_words(fault)}")
+
+        return taken
+
     def _goals(self, message: Any) -> None:
+        if max(len(message.name), len(message.position)) > JOINTS_MAX:
+            why = (
+                f"joint goals: names {len(message.name)} joints; at most {JOINTS_MAX} are accepted"
+            )
+            self._command(Refused(why), message.header.stamp, "joint goals")
+            return
         if message.name and not message.position:
             why = "joint goals: no positions; velocities and efforts alone are not taken"
             self._command(Refused(why), None, "joint goals")
@@ -309,6 +370,13 @@ class RobotNode:
         stamp, points = message.header.stamp, message.points
         if not points:
             self._command(HoldStill(), stamp, "trajectory")
+            return
+        if len(message.joint_names) > JOINTS_MAX:
+            why = (
+                f"trajectory: names {len(message.joint_names)} joints; at most {JOINTS_MAX} are "
+                "accepted"
+            )
+            self._command(Refused(why), stamp, "trajectory")
             return
         if len(points) > POINTS_MAX:
             why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are taken"
@@ -339,13 +407,16 @@ class RobotNode:
         if not words:
             self._command(HoldStill(), None, "gait")
             return
-        from snakewalk.controller.run.factory import gait_by_name, is_gait  # noqa: PLC0415
 
         command: Command
         try:
             if not is_gait(words[0]):
-                raise InputError(f"gait: {words[0]}: no such gait; snakewalk gait list")
-            values = dict(_value(word) for word in words[1:])
+                raise InputError(f"gait: {words[0][:NAME_MAX]}: no such gait; snakewalk gait list")
+            values: dict[str, Any] = {}
+            for key, value in map(_value, words[1:]):
+                if key in values:
+                    raise InputError(f"gait: {key[:NAME_MAX]} is given twice; give it once")
+                values[key] = value
             command = StartGait(gait_by_name(words[0], values)[0])
         except InputError as error:
             command = Refused(error.faults[0])
@@ -357,11 +428,13 @@ class RobotNode:
             command = Refused(f"{what}: the run has not begun")
         elif stamp is not None and (stamp.sec or stamp.nanosec):
             age_s = self._ros_now_s() - (stamp.sec + 1e-9 * stamp.nanosec)
-            if abs(age_s) > self._options.timeout_s:
+            timeout_s = self._options.timeout_s
+            most_s = timeout_s if age_s > 0.0 else min(timeout_s, TIMEOUT_S)
+            if abs(age_s) > most_s:
                 when = "ago" if age_s > 0.0 else "ahead"
                 command = Refused(
-                    f"{what}: stamped {abs(age_s):.1f} s {when}; at most "
-                    f"{self._options.timeout_s:g} s is taken, and 0 for now"
+                    f"{what}: stamped {abs(age_s):.1f} s {when}; at most {most_s:g} s is taken, "
+                    "and 0 for now"
                 )
         with self._lock:
             last = self._pending[-1] if self._pending else None
@@ -379,11 +452,17 @@ def _rows(values: list[Any]) -> Floats | None:
 def _value(word: str) -> tuple[str, Any]:
     key, equals, text = word.partition("=")
     if not (key and equals and text):
-        raise InputError(f"gait: {word}: expected PARAM=VALUE")
+        raise InputError(f"gait: {word[:NAME_MAX]}: expected PARAM=VALUE")
     try:
         return key, parse_json(text)
     except ValueError:
         return key, text
+
+
+def _in_words(fault: Exception) -> str:
+    """One line that says what failed."""
+    text = " ".join(str(fault).split())
+    return f"it cannot be used ({text[:TEXT_MAX] or type(fault).__name__})"
 
 
 def _doubles(values: Floats) -> Any:

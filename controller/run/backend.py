@@ -3,9 +3,11 @@
 Everything above the byte port is the same object for both.
 """
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from snakewalk.config.arrays import Floats
@@ -29,6 +31,13 @@ from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.types import BodyPose, JointState
+from snakewalk.sim.line.clock import RealTimeClock
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.physics.split_plant import SplitPlant
+from snakewalk.sim.plant import Mounting
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.motor import motors_of
+from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 FILE_PORTS: Final = "robot"
 """``--port`` of a robot whose file names the ports of its segments."""
@@ -51,6 +60,8 @@ class Backend:
     """What the motors have taken in and done so far."""
     twin: Callable[[], Twin] | None = None
     """Makes a second body, on which motion is tried; None where time does not wait for it."""
+    lay_down: Callable[[InitialPose], None] | None = None
+    """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
 
 
 def simulated(
@@ -74,27 +85,24 @@ def simulated(
 
     """
     require_extra("simulated runs need", "mujoco")
-    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
-    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
-    from snakewalk.sim.physics.twin import PlantTwin  # noqa: PLC0415
-    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
-    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
-    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
+    from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
 
     if deviation is None:
         deviation = Deviation.of_run(run.deviation, robot)
-    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
+    body = plant.MujocoPlant(
+        deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
+    )
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
-    plant.reset(run.start_m, initial_pose.heading_rad, joint_rad)
+    body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     servo = robot.servo
     line = SimLine(
         ServoBank(robot.servo_ids, robot.servo_records, servo.baud),
-        plant,
+        body,
         baud=servo.baud,
         mounting=deviation.mounting(robot),
         motors=motors_of(robot),
         supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=plant_imu(robot, plant, servo.baud, run.seed),
+        imu=plant.plant_imu(robot, body, servo.baud, run.seed),
     )
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),
@@ -102,6 +110,13 @@ def simulated(
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
     )
+
+    def lay_down(pose: InitialPose) -> None:
+        line.settle()
+        shaft_rad = deviation.shaft_rad(pose.joint_rad)
+        body.lay_down(run.start_m, pose.heading_rad, shaft_rad)
+        line.firmware.hold_position()
+
     drive = line.firmware.drive
     if deviation.torque is not None:
         drive.torque_constant_n_m_a[:] *= deviation.torque
@@ -109,11 +124,12 @@ def simulated(
         "sim",
         chain,
         line.clock,
-        plant.head_pose,
-        lambda: plant.qpos,
+        body.head_pose,
+        lambda: body.qpos,
         lambda: line.busy_s,
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
-        lambda: PlantTwin(robot, world, ground),
+        lambda: twin.PlantTwin(robot, world, ground),
+        lay_down,
     )
 
 
@@ -176,14 +192,7 @@ def split(
 
     """
     require_extra("simulated servos need", "mujoco")
-    from snakewalk.sim.line.clock import RealTimeClock  # noqa: PLC0415
-    from snakewalk.sim.line.sim_line import SimLine  # noqa: PLC0415
-    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
-    from snakewalk.sim.physics.split_plant import SplitPlant  # noqa: PLC0415
-    from snakewalk.sim.plant import Mounting  # noqa: PLC0415
-    from snakewalk.sim.servo.bank import ServoBank  # noqa: PLC0415
-    from snakewalk.sim.servo.motor import motors_of  # noqa: PLC0415
-    from snakewalk.sim.servo.protection import SupplyAndAmbient  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415  an extra
 
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
@@ -255,3 +264,15 @@ def _bus_on_ports(
             parts.append((bus, each.ids))
         opened.pop_all()
     return SegmentedBus(parts)
+
+
+def is_pseudo_terminal(ports: Sequence[str] | None) -> bool | None:
+    """Return whether all ports are pseudo-terminals, as those of served simulations are.
+
+    Returns:
+        None where there is no port.
+
+    """
+    if not ports:
+        return None
+    return all(Path(os.path.realpath(port)).parts[:3] == ("/", "dev", "pts") for port in ports)

@@ -9,6 +9,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.sim.plant import Mounting
 
 if TYPE_CHECKING:
     from snakewalk.sim.plant import Mounting
@@ -63,8 +64,6 @@ class Deviation:
 
     def mounting(self, robot: RobotConfig) -> "Mounting":
         """Return how the servos sit on the shafts."""
-        from snakewalk.sim.plant import Mounting  # noqa: PLC0415  an extra
-
         told = Mounting.of(robot)
         if self.slip_rad is None:
             return told

@@ -5,23 +5,22 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import Any, Protocol, cast
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig, RunConfig
 from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.pose.pose_provider import PoseProvider, pose_faults, pose_provider
-from snakewalk.controller.report.artifacts import write_summary
 from snakewalk.controller.run.backend import (
     Backend,
+    is_pseudo_terminal,
     is_split,
     metal,
     on_ports,
@@ -30,19 +29,26 @@ from snakewalk.controller.run.backend import (
     split,
 )
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
-from snakewalk.controller.run.prepared_run import PathRun, PreparedRun, pose_with
+from snakewalk.controller.run.observer_watch import ObserverWatch, Watcher
+from snakewalk.controller.run.pose_provider import (
+    PoseProvider,
+    pose_evidence,
+    pose_faults,
+    pose_provider,
+)
+from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
+from snakewalk.controller.run.summary_file import write_summary
+from snakewalk.controller.run.watchers import SHADOW
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import Drive, OnEvent, OnProgress, Outcome
+from snakewalk.controller.runtime.drive import CycleObserver, Drive, OnEvent, OnProgress, Outcome
 from snakewalk.controller.runtime.friction_monitor import (
     FrictionMonitor,
     OnPaper,
     OnTwin,
     SlideModel,
 )
-from snakewalk.controller.studies.shadow.diagnosis import check_level
-from snakewalk.controller.studies.shadow.run_shadow import RunShadow
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.pilot import UsesFriction
@@ -54,9 +60,15 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
-if TYPE_CHECKING:
-    from snakewalk.controller.run.watcher import Watcher
+
+class RunObserver(CycleObserver, Protocol):
+    """An observer of every cycle, which also says something at the end of the run."""
+
+    def end(self, time_s: float) -> None:
+        """Report; torque is off."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +88,14 @@ class Finished:
     """The motion that ran, at its end."""
 
 
-def execute(
+def execute(  # noqa: PLR0915
     prepared: PreparedRun,
     folder: Path,
     port: str | None = None,
     *,
     force: bool = False,
     stoppable: bool = True,
-    view: "Watcher | None" = None,
+    view: Watcher | None = None,
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
@@ -125,6 +137,12 @@ def execute(
     else:
         make = simulated if port is None else split
         backend = make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
+    evidence = pose_evidence(prepared, backend)
+    if not evidence.is_measured:
+        LOGGER.warning(
+            "pose: %s: distances and arrivals are not measured; give a pose source with --pose",
+            evidence.text,
+        )
     log_path = folder / LOG
     clear_run(folder)
     LOGGER.debug(
@@ -146,6 +164,8 @@ def execute(
             initial_pose=initial_pose,
             torque_constant_n_m_a=torque_constant_n_m_a,
             winding=winding,
+            pose_evidence=evidence,
+            port_is_pseudo_terminal=is_pseudo_terminal(ports),
         )
         safety, clock = prepared.run.safety, backend.clock
         recovery = Recovery(
@@ -166,6 +186,7 @@ def execute(
             log.event(clock.now_s(), kind, text)
             on_event(kind, text)
 
+        observers = ObserverWatch(view, safety.lost_observer, warn)
         shown = {} if view is None else {"on_picture": view.on_picture}
         with (
             pose_provider(prepared, backend, log_event, **shown) as pose,
@@ -180,10 +201,11 @@ def execute(
                 SafetyLimits.from_config(robot, safety),
                 clock,
                 recovery,
-                lambda: stop_requested() or (None if button is None else button.pressed()),
+                observers.with_stop(stop_requested, button),
                 lambda text: warn("safety", text),
             )
-            beside = _shadow(prepared, initial_pose, log, on_event) if shadow else None
+            start = initial_pose if port is None else None
+            beside = _shadow(prepared, start, log, on_event) if shadow else None
             drive = Drive(
                 link=link,
                 clock=clock,
@@ -197,7 +219,7 @@ def execute(
                 energy=backend.energy,
                 observer=beside,
                 friction=friction,
-                on_progress=on_progress,
+                on_progress=observers.with_report(on_progress),
                 on_event=on_event,
             )
             with _end_told(link, log, clock):
@@ -302,21 +324,21 @@ def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
     check_compliance(prepared.run, prepared.robot)
     if shadow:
         require_extra("a shadow needs", "mujoco")
-        check_level(prepared.world)
+        _shadow_plugin().check(prepared.world)
 
 
 def _shadow(
-    prepared: PreparedRun, initial_pose: InitialPose | None, log: RunLog, on_event: OnEvent
-) -> RunShadow:
-    """Return the shadow of a run; on servos it begins at the angles that are measured first."""
-
-    def pose(measured_rad: Floats) -> InitialPose:
-        if initial_pose is not None:
-            return initial_pose
-        return pose_with(prepared.robot, prepared.start_heading_rad, measured_rad)
-
+    prepared: PreparedRun, start: InitialPose | None, log: RunLog, on_event: OnEvent
+) -> RunObserver:
     run, robot, world = prepared.run, prepared.robot, prepared.world
-    return RunShadow(run, robot, world, prepared.ground, pose, log, on_event)
+    observer: RunObserver = _shadow_plugin()(
+        run, robot, world, prepared.ground, start, log, on_event
+    )
+    return observer
+
+
+def _shadow_plugin() -> Any:
+    return require("observer", SHADOW, "--shadow").load()
 
 
 def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
@@ -345,8 +367,6 @@ def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
 
 def _current_gain_a_rad(robot: RobotConfig) -> float:
     """Current of the stiffest joint per radian of lead; 0 where no motor is known."""
-    from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad  # noqa: PLC0415  figures only
-
     gains_a_rad = [0.0]
     for motor, gain in zip(known_motors(robot), robot.position_p_gains, strict=True):
         if motor is not None:
@@ -360,8 +380,6 @@ def _motor(robot: RobotConfig) -> tuple[float, Winding | None]:
 
     NaN and None where the simulator has no such model, or the servos are of several.
     """
-    from snakewalk.sim.servo.motor import known_motors  # noqa: PLC0415  only for these figures
-
     motors = set(known_motors(robot))
     motor = motors.pop()
     if motor is None or motors:

@@ -1,53 +1,60 @@
-"""What a walk knows of its ground: the world's own, or the map of a stereo head, as it grows."""
+"""The map source of a run: the world's own ground, or a plug-in that maps it on the way."""
 
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.console.result_files import MAP
+from snakewalk.controller.console.plugins import require
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.walk_run import WalkRun
 from snakewalk.controller.runtime.drive import OnEvent, PoseSource
 from snakewalk.controller.terrain.growing_map import GrowingMap
-from snakewalk.drivers.types import BodyPose, JointState
+
+
+@dataclass(frozen=True, slots=True)
+class MapContext:
+    """What a map source may use of a run."""
+
+    prepared: PreparedRun
+    backend: Backend
+    measure: PoseSource
+    """Measures the pose."""
+    folder: Path
+    """Folder of the run."""
+    on_event: OnEvent
+
+
+class MapPlugin(Protocol):
+    """A map source, as a plug-in of the kind ``map`` provides it."""
+
+    def faults(self, prepared: PreparedRun, *, on_port: bool) -> list[str]:
+        """Return why the source cannot map in a run, one line per fault."""
+        ...
+
+    def open(self, context: MapContext) -> AbstractContextManager["MapProvider"]:
+        """Open the source for the time of a run."""
+        ...
 
 
 def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
-    """Refuse a run that maps its ground where it cannot.
+    """Reject a run that maps its ground where it cannot.
 
     Raises:
-        InputError: one line per fault, or an extra that mapping needs is not there.
+        InputError: one line per fault, or an extra that mapping needs is missing.
 
     """
-    run, robot = prepared.run, prepared.robot
-    if run.mapping is None:
+    mapping = prepared.run.mapping
+    if mapping is None:
         return
-    require_extra("mapping on the way needs", "cv2", "mujoco")
-    faults = []
-    if robot.stereo_head is None:
-        faults.append(
-            f"mapping: robot {robot.name} has no stereo head: describe it in its file, table "
-            "[stereo_head], or take alternating16-stereo"
-        )
-    if metal:
-        faults.append("mapping: pictures are the simulator's; on servos give the world's map")
-    if run.motion not in ("walk", "serpenoid"):
-        faults.append(f"mapping: motion {run.motion} plans once; take walk or serpenoid")
-    if prepared.ground is None:
-        faults.append(f"mapping: world {prepared.world.name} is level; there is nothing to map")
-    if not run.pose_is_true:
-        faults.append(
-            f"mapping: pose {run.pose} knows no heights; the pictures' places come from the "
-            "simulator, as from a motion capture"
-        )
+    source: MapPlugin = require("map", mapping.source, "mapping.source").load()()
+    faults = source.faults(prepared, on_port=metal)
     if faults:
         raise InputError(faults)
 
@@ -97,38 +104,11 @@ class MapProvider:
 def map_provider(
     prepared: PreparedRun, backend: Backend, measure: PoseSource, folder: Path, on_event: OnEvent
 ) -> Iterator[MapProvider]:
-    """Map the ground on the way, where the run asks for it; the map is left in the run's folder.
-
-    Raises:
-        OffscreenError: nothing here draws without a screen.
-
-    """
-    provider = MapProvider(measure)
-    if not isinstance(prepared, WalkRun) or prepared.ground_map is None:
-        yield provider
+    """Map the ground during the run, where the run asks for it."""
+    mapping = prepared.run.mapping
+    if mapping is None:
+        yield MapProvider(measure)
         return
-    from snakewalk.controller.mapping.stereo_head import StereoHead  # noqa: PLC0415  OpenCV, MuJoCo
-
-    ground, clock, ground_map = prepared.ground, backend.clock, prepared.ground_map
-    assert ground is not None
-    assert backend.qpos is not None
-    assert backend.pose is not None
-    provider.ground_map, provider.true_ground = ground_map, ground
-    ground_map.clear()
-    made = StereoHead(
-        prepared.run, prepared.robot, prepared.world, ground, backend.qpos, ground_map
-    )
-    with closing(made) as head:
-        head.observe(clock.now_s(), backend.pose(), backend.qpos()[7:])
-        head.fuse(np.inf)  # the run begins when the first picture is matched
-
-        def measured(state: JointState) -> BodyPose:
-            pose = measure(state)
-            head.observe(clock.now_s(), pose, state.position_rad)
-            provider.follow(pose.head_in_world_m)
-            return pose
-
-        provider.measure = measured
+    source: MapPlugin = require("map", mapping.source, "mapping.source").load()()
+    with source.open(MapContext(prepared, backend, measure, folder, on_event)) as provider:
         yield provider
-    ground_map.write(folder / MAP)
-    on_event("map", ", ".join(f"{key} {value}" for key, value in provider.facts().items()))

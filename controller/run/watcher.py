@@ -1,37 +1,20 @@
-"""Who looks on at a run: a process of its own, which is fed with the rows of the log."""
+"""An observer of a run: a process of its own, which is fed with the rows of the log."""
 
 import json
-import signal
 import socket
 from collections.abc import Callable
-from multiprocessing import get_context
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Protocol, Self
+from typing import Any, Final, Self
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.runlog.row_line import RunEnd
+from snakewalk.controller.console.child_process import start
+from snakewalk.controller.runlog.row_line import BUTTON, RunEnd
 
 _START_S: Final = 60.0
 """How long it may take to start: a busy machine imports slowly (ours)."""
 _END_S: Final = 2.0
-
-
-class Watcher(Protocol):
-    """Takes what a run tells; returns at once."""
-
-    def on_row(self, topic: str, row: bytes) -> None:
-        """Take a row of the log."""
-        ...
-
-    def on_button(self, path: Path) -> None:
-        """Take the run's stop button, which the watcher may press."""
-        ...
-
-    def on_picture(self, image: Image, time_s: float) -> None:
-        """Take a picture (H, W, 3), blue first, of the run's camera, from any thread."""
-        ...
 
 
 class WatcherProcess:
@@ -42,24 +25,19 @@ class WatcherProcess:
 
     """
 
-    def __init__(self, serve: Callable[..., None], *options: Any, fault: str) -> None:
+    def __init__(self, serve: Callable[..., None], *options: Any, what: str, fault: str) -> None:
         """Start ``serve(line, *options)`` in a fresh interpreter.
 
         Args:
             serve: a function of a module; sends one line of JSON when it is ready, with ``fault``
                 if it cannot be, and ends when the line does.
             options: what can be pickled.
+            what: name of the watcher in messages.
             fault: beginning of the sentence that says what could not be started.
 
         """
         ours, far = socket.socketpair()
-        context = get_context("spawn")
-        self._process = context.Process(target=serve, args=(far, *options), daemon=True)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C is the run's
-        try:
-            self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        self._process = start(serve, far, *options, daemon=True)
         far.close()
         ours.settimeout(_START_S)
         try:
@@ -73,6 +51,7 @@ class WatcherProcess:
         self.said: dict[str, Any] = said
         """What it said of itself."""
         self._end = RunEnd(ours)
+        self._what = what
 
     def __enter__(self) -> Self:
         return self
@@ -88,6 +67,18 @@ class WatcherProcess:
         if self._process.is_alive():
             self._process.kill()
 
+    def lost(self, now_s: float) -> str | None:
+        """Return why its E-STOP does not work any more, or None."""
+        if self._end.is_closed:
+            return f"{self._what}: its process has ended, and its E-STOP with it"
+        if self._end.is_silent(now_s):
+            return f"{self._what}: it does not respond, so its E-STOP may not work"
+        return None
+
+    def rejected(self) -> list[str]:
+        """Return why commands were rejected since the last call."""
+        return [f"{self._what}: {why}" for why in self._end.rejected()]
+
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""
         self._end.add(topic, row)
@@ -97,4 +88,4 @@ class WatcherProcess:
 
     def on_button(self, path: Path) -> None:
         """Take the run's stop button, which the watcher presses."""
-        self._end.add("/button", json.dumps({"path": str(path)}).encode())
+        self._end.add(BUTTON, json.dumps({"path": str(path)}).encode())

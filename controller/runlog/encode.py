@@ -1,8 +1,8 @@
-"""Numbers to JSON: rounded below what any sensor resolves, NaN as null, nothing that is not JSON.
+"""Numbers to JSON: rounded below any sensor's resolution, NaN as null, valid JSON only.
 
-What was asked and sent keeps every digit, so that a replay can be compared and fed exactly. The
-rows of every cycle are printed with a fixed number of digits, ``%.6f`` by a compiled loop and
-``%.17g`` by a template: the same numbers, quicker than the shortest text that gives a number back.
+Goals keep every digit, so that a replay can use and compare them exactly. The rows of every cycle
+are printed with a fixed number of digits, ``%.6f`` by a compiled loop and ``%.17g`` by a template:
+the same numbers, quicker than the shortest text that gives a number back.
 """
 
 import json
@@ -23,6 +23,8 @@ _GROUND_POINTS: Final = 160  # along the longer edge
 _NUMBER_BYTES: Final = 24
 """More than a number of a million, its sign, its brackets and its comma."""
 _EXACT: Final = ".17g"  # gives every float64 back
+DIGITS: Final = {"exact": _EXACT, "rounded": f".{_DECIMALS}f"}
+"""Formats of single numbers."""
 encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 
 
@@ -44,6 +46,11 @@ def exact(values: ArrayLike) -> list[Any]:
         boxed[~np.isfinite(array)] = None
         return list(boxed.tolist())
     return list(array.tolist())
+
+
+def array(values: Any) -> NDArray[np.float64]:
+    """Return nested lists of a log as an array; null becomes NaN."""
+    return np.array(values, dtype=float)
 
 
 def text(value: float) -> str:

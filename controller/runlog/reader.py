@@ -18,8 +18,8 @@ from zstandard import ZstdError, decompress, frame_content_size
 from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.runlog.schema import FORMAT
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.topics import FORMAT, ConfigTable
 from snakewalk.controller.runlog.writer import part_path
 
 _MAGIC: Final = bytes([137, 77, 67, 65, 80, 48, 13, 10])
@@ -59,11 +59,13 @@ def read_log(path: Path) -> RunRecord:
     if not data.startswith(_MAGIC[: len(data)]) or not data:
         raise LogError(f"{path}: is not an MCAP log")
     rows, last_s, complete = _rows(path, data)
-    if not rows["/config"]:
+    configs = rows[ConfigTable.topic.name]
+    if not configs:
         raise LogError(f"{path}: breaks off before it says what ran: nothing can be recovered")
-    config = rows["/config"][0]
-    if config.get("format") != FORMAT:
-        raise LogError(f"{path}: has format {config.get('format')}, this version reads {FORMAT}")
+    if configs[0].get("format") != FORMAT:
+        raise LogError(
+            f"{path}: has format {configs[0].get('format')}, this version reads {FORMAT}"
+        )
     note = "" if complete else f"the log is cut or damaged; its last row is of {last_s:.2f} s"
     try:
         return record_of(rows, complete=complete, note=note)

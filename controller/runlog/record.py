@@ -1,20 +1,33 @@
-"""A run as its log tells it: one table a topic, rows in order of time, NaN where nothing is known.
-
-T, S, H, P, W, F count the rows of a topic; J joints, L links.
-"""
+"""A run as its log describes it: one table for each topic, rows in order of time."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import asdict, dataclass, fields
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.runlog.column import Json, Table
+from snakewalk.controller.runlog.encode import array, exact, floats, number, thinned
+from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
+from snakewalk.controller.runlog.topics import (
+    FORMAT,
+    CycleTable,
+    EventTable,
+    FrictionTable,
+    ImuTable,
+    PathTable,
+    PoseTable,
+    QposTable,
+    ShadowTable,
+    SlowTable,
+    WalkTable,
+    WaypointTable,
+)
 
 
 class MotorEnergy(NamedTuple):
@@ -79,160 +92,89 @@ class Header:
     winding: Winding | None
     """Of the robot's servos; None where the log does not say it."""
     initial_pose: InitialPose | None
-    """None on metal."""
+    """None on servos."""
+    pose_evidence: PoseEvidence
+    """How the poses of the log are known."""
+    port_is_pseudo_terminal: bool | None = None
+    """Whether the servos answered on a pseudo-terminal, as a served simulation does; None where
+    the log does not say it."""
 
+    def row(self) -> Json:
+        """Row of ``ConfigTable``; the ground is thinned."""
+        plan, pose, ground = self.plan, self.initial_pose, self.ground
+        return {
+            "format": FORMAT,
+            "software": self.software,
+            "backend": self.backend,
+            "config_hash": self.config_hash,
+            "seed": self.seed,
+            "run": self.run.model_dump(mode="json"),
+            "robot": self.robot.model_dump(mode="json"),
+            "world": self.world.model_dump(mode="json"),
+            "torque_constant_n_m_a": number(self.torque_constant_n_m_a),
+            "winding": None if self.winding is None else asdict(self.winding),
+            "laid": None
+            if pose is None
+            else {"heading_rad": float(pose.heading_rad), "joint_rad": exact(pose.joint_rad)},
+            "plan": {
+                "path_m": floats(plan.path_m),
+                "waypoints_m": floats(plan.waypoints_m),
+                "waypoint_radius_m": number(plan.waypoint_radius_m),
+                "predicted_speed_m_s": number(plan.predicted_speed_m_s),
+                "states": dict(plan.states or {}),
+            },
+            "ground": None if ground is None else thinned(ground),
+            "evidence": {
+                "pose": self.pose_evidence.row(),
+                "port_is_pseudo_terminal": self.port_is_pseudo_terminal,
+            },
+        }
 
-@dataclass(frozen=True, slots=True)
-class CycleTable:
-    """Control cycles."""
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Self:
+        """Header of a row of ``ConfigTable``.
 
-    time_s: Floats
-    """(T,)"""
-    asked_rad: Floats
-    """(T, J) what the motion wanted, after compliance."""
-    sent_rad: Floats
-    """(T, J) what safety let through."""
-    yield_rad: Floats
-    """(T, J) by which compliance moved what was asked; NaN where nothing yields."""
-    measured_rad: Floats
-    """(T, J)"""
-    velocity_rad_s: Floats
-    """(T, J)"""
-    current_a: Floats
-    """(T, J)"""
-    age_s: Floats
-    """(T, J)"""
-    valid: NDArray[np.bool_]
-    """(T, J)"""
-    error: Ints
-    """(T, J) error byte."""
-    deadline_s: Floats
-    """(T,)"""
-    lateness_s: Floats
-    """(T,)"""
-    wire_busy_s: Floats
-    """(T,)"""
-    electrical_j: Floats
-    """(T,) ``MotorEnergy`` since the start; NaN on metal, where no servo adds it up."""
-    mechanical_j: Floats
-    """(T,)"""
-    verdict: tuple[str, ...]
-    """T of pass, clamp, veto."""
-    reason: tuple[str, ...]
-    joints: tuple[tuple[int, ...], ...]
-    """Joints that a verdict concerns."""
+        Raises:
+            KeyError: the row lacks a field.
+            pydantic.ValidationError: the configuration is not of this version.
 
-
-@dataclass(frozen=True, slots=True)
-class SlowTable:
-    """Slow round: a row for each change."""
-
-    time_s: Floats
-    """(S,)"""
-    temperature_c: Floats
-    """(S, J)"""
-    voltage_v: Floats
-    """(S, J)"""
-    hardware_error: Ints
-    """(S, J)"""
-
-
-@dataclass(frozen=True, slots=True)
-class ShadowTable:
-    """What a simulated chain answered to the same goals; no rows where none ran beside."""
-
-    time_s: Floats
-    """(H,) those of the cycles"""
-    position_rad: Floats
-    """(H, J)"""
-    current_a: Floats
-    """(H, J)"""
-
-
-@dataclass(frozen=True, slots=True)
-class ImuTable:
-    """What the robot's IMU said; no rows where it has none."""
-
-    time_s: Floats
-    """(I,) those of the cycles"""
-    rotation: Floats
-    """(I, 3, 3) of the link that it sits in; its heading begins anywhere, and drifts."""
-    rate_rad_s: Floats
-    """(I, 3) about the link's forward, left and up axes."""
-    age_s: Floats
-    """(I,)"""
-
-
-@dataclass(frozen=True, slots=True)
-class PoseTable:
-    """Where the body was."""
-
-    time_s: Floats
-    """(P,)"""
-    head_m: Floats
-    """(P, 3)"""
-    rotation: Floats
-    """(P, 3, 3) head link in the world."""
-    links_m: Floats
-    """(P, L, 3); NaN where unknown."""
-    centre_m: Floats
-    """(P, 3) centre of mass."""
-    speed_m_s: Floats
-    """(P,) forward speed of the links."""
-    predicted_speed_m_s: Floats
-    """(P,)"""
-    pulse_m_s: Floats
-    """(P,) u, at which the shape travels along the body."""
-    path_s_m: Floats
-    """(P,) arc length reached on the path."""
-    target: Ints
-    """(P,) index of the next waypoint."""
-
-
-@dataclass(frozen=True, slots=True)
-class WalkTable:
-    """Decisions of the walk."""
-
-    time_s: Floats
-    """(W,)"""
-    state: Ints
-    """(W,)"""
-    visited: Ints
-    """(W,) distinct states so far."""
-    heading_error_rad: Floats
-    """(W,)"""
-    ramp_rad: Floats
-    """(W,)"""
-    candidates: Ints
-    """(W,)"""
-    eta_q: Floats
-    """(W,)"""
-
-
-@dataclass(frozen=True, slots=True)
-class FrictionTable:
-    """Friction under the body, as the run found it."""
-
-    time_s: Floats
-    """(F,)"""
-    along: Floats
-    """(F,)"""
-    across: Floats
-    """(F,)"""
-    along_95: Floats
-    """(F, 2) interval of 95 %."""
-    across_95: Floats
-    """(F, 2)"""
-
-
-@dataclass(frozen=True, slots=True)
-class QposTable:
-    """Generalised positions of the simulation."""
-
-    time_s: Floats
-    """(Q,)"""
-    qpos: Floats
-    """(Q, nq)"""
+        """
+        plan, ground = row["plan"], row["ground"]
+        winding, pose = row.get("winding"), row.get("laid")
+        run, robot = RunConfig.model_validate(row["run"]), RobotConfig.model_validate(row["robot"])
+        evidence = row.get("evidence")
+        return cls(
+            software=row["software"],
+            backend=row["backend"],
+            config_hash=row["config_hash"],
+            seed=row["seed"],
+            run=run,
+            robot=robot,
+            world=WorldConfig.model_validate(row["world"]),
+            plan=PlanSummary(
+                path_m=array(plan["path_m"]),
+                waypoints_m=array(plan["waypoints_m"]).reshape(-1, 2),
+                waypoint_radius_m=plan["waypoint_radius_m"],
+                predicted_speed_m_s=float(array(plan["predicted_speed_m_s"])),
+                states=plan["states"],
+            ),
+            ground=None
+            if ground is None
+            else HeightField(
+                array(ground["z_m"]), ground["spacing_m"], ground["x0_m"], ground["y0_m"]
+            ),
+            torque_constant_n_m_a=float(array(row["torque_constant_n_m_a"])),
+            winding=None if winding is None else Winding(**winding),
+            initial_pose=None
+            if pose is None
+            else InitialPose(pose["heading_rad"], array(pose["joint_rad"])),
+            pose_evidence=PoseEvidence.of(evidence["pose"])
+            if evidence is not None
+            else evidence_of_old_log(run, row["backend"], robot.imu is not None),
+            port_is_pseudo_terminal=None
+            if evidence is None
+            else evidence["port_is_pseudo_terminal"],
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,6 +209,19 @@ class RunRecord:
     """Whether the file was closed properly."""
     note: str
     """What is missing, if it was not; empty otherwise."""
+
+    def tables(self) -> tuple[Table, ...]:
+        """Tables of all topics but ``ConfigTable``; those of the plan begin at 0 s."""
+        events, values = self.events, [getattr(self, field.name) for field in fields(self)]
+        return (
+            *(each for each in values if isinstance(each, Table)),
+            PathTable(np.array([s for s, _ in self.paths]), [m for _, m in self.paths]),
+            WaypointTable(np.array([s for s, _ in self.waypoints]), [m for _, m in self.waypoints]),
+            EventTable(
+                np.array([event.time_s for event in events]),
+                *(tuple(getattr(e, name) for e in events) for name in ("level", "kind", "text")),
+            ),
+        )
 
     def waypoints_at(self, time_s: float) -> Floats:
         """Waypoints (w, 2) in force at a time."""

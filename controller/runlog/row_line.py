@@ -1,25 +1,44 @@
-"""The line between a run and a watcher, its page for one: rows of the log one way, requests back.
+"""The line between a run and an observer, e.g. its page: rows of the log out, commands back.
 
 The run never waits: what does not fit the socket stays here, of each kind of measurement only the
-newest row, and it is sent when the watcher asks for it. A watcher that is slow, stopped or dead is
-simply not sent anything. A request is a line of text: an empty one asks for the newest rows, any
-other is a command of whoever holds the page, such as ``frequency_hz=0.4``, or of a ROS graph.
+newest row, and it is sent when the observer asks for it. An observer that is slow, stopped or dead
+is not sent anything. A request is a line of text: an empty one asks for the newest rows, any other
+is a command of an operator at the page, such as ``frequency_hz=0.4``, or of a ROS graph.
 """
 
 import json
+import select
 import socket
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, Final
 
-KEPT: Final = frozenset({"/config", "/path", "/waypoints", "/event", "/button", "/gait", "/course"})
+from snakewalk.controller.motion.command import LINE_BYTES
+from snakewalk.controller.runlog.topics import TABLES, PoseTable
+
+BUTTON: Final = "/button"
+GAIT: Final = "/gait"
+COURSE: Final = "/course"
+PICTURE: Final = "/picture"
+"""Topics of the line that are not in the log."""
+KEPT: Final = frozenset(
+    {BUTTON, GAIT, COURSE, *(t.topic.name for t in TABLES if t.topic.watched == "all")}
+)
 """Topics of which every row is sent, in order; of others the newest."""
-SENT: Final = KEPT | {"/cycle", "/shadow", "/pose", "/slow", "/imu", "/picture"}
+SENT: Final = KEPT | {PICTURE, *(t.topic.name for t in TABLES if t.topic.watched == "newest")}
 _KEPT_MAX: Final = 1000
 _COMMANDS_MAX: Final = 100
-"""Commands that wait for the run; of more the oldest are dropped."""
-_LINE_BYTES: Final = 1 << 20
+"""Commands that wait for the run; the oldest are dropped beyond it."""
+_WAITING_BYTES: Final = 4 * LINE_BYTES
+"""Commands that wait for the socket in the observer (ours); the oldest are dropped beyond it."""
+SILENT_S: Final = 3.0
+"""An observer that has not asked for rows for this time does not respond (ours): it asks 20 times a
+second, and a page on a busy machine may be late by a second."""
+_START_S: Final = 60.0
+"""The same before it has shown a cycle (ours): building a scene takes seconds."""
+_STEP_MAX_S: Final = 0.1
+"""Of the time between two checks this much counts (ours)."""
 _RECEIVE_BYTES: Final = 1 << 18
 _HEAD: Final = 4
 _END: Final = b"\n"
@@ -35,43 +54,67 @@ class RunEnd:
         self._newest: dict[str, bytes] = {}
         self._out = memoryview(b"")
         self._ready = False
-        self._in = b""
-        self._commands: deque[str] = deque(maxlen=_COMMANDS_MAX)
+        self._in = bytearray()
+        self._in_bytes = 0
+        self._commands: deque[str] = deque()
+        self._rejected: deque[str] = deque(maxlen=_COMMANDS_MAX)
+        self._requests = 0
+        self._owes_request = True
+        self._silent_s = self._checked_s = 0.0
+        self.is_closed = False
+        """Whether the observer has closed its end, or has died."""
 
     def add(self, topic: str, row: bytes) -> None:
-        """Take a row; a cycle is complete with its pose."""
+        """Accept a row; a cycle is complete with its pose."""
         if topic not in SENT:
             return
         if topic in KEPT:
             self._kept.append(_message(topic, row))
         else:
             self._newest[topic] = row
-        if topic in KEPT or topic == "/pose":
+        if topic in KEPT or topic == PoseTable.topic.name:
             self.pump()
 
     def pump(self) -> None:
-        """Send what the watcher can take now; never waits."""
+        """Send what the observer can receive now; never waits."""
         try:
             self._receive()
             while self._next():
                 self._out = self._out[self._line.send(self._out) :]
         except BlockingIOError:
             return
-        except OSError:  # the watcher is gone: the run goes on
+        except OSError:  # the observer is gone: the run continues
+            self.is_closed = True
             self._kept.clear()
             self._newest.clear()
             self._out = memoryview(b"")
 
     def commands(self) -> list[str]:
-        """Commands that have come since the last call; never waits."""
+        """Return the commands that have arrived since the last call; never waits."""
         with suppress(OSError):
             self._receive()
-        taken = list(self._commands)
+        commands = list(self._commands)
         self._commands.clear()
-        return taken
+        return commands
+
+    def rejected(self) -> list[str]:
+        """Return why lines were rejected since the last call."""
+        reasons = list(self._rejected)
+        self._rejected.clear()
+        return reasons
+
+    def is_silent(self, now_s: float) -> bool:
+        """Whether the observer has not asked for rows for too long, although it was sent some.
+
+        Call it in every cycle; time in which the run itself stands still does not count.
+        """
+        if self._owes_request:
+            self._silent_s += min(max(now_s - self._checked_s, 0.0), _STEP_MAX_S)
+        self._checked_s = now_s
+        return self._silent_s > (SILENT_S if self._requests > 1 else _START_S)
 
     def close(self, patience_s: float) -> None:
-        """Send the last rows, for no longer than ``patience_s`` to a slow watcher; then close."""
+        """Send the last rows, for at most ``patience_s`` to a slow observer; then close."""
         self._ready = True
         self._line.settimeout(patience_s)
         while self._next():
@@ -88,37 +131,79 @@ class RunEnd:
         if self._kept:
             self._out = memoryview(self._kept.popleft())
         elif self._ready and self._newest:
-            rows = sorted(self._newest.items(), key=lambda row: row[0] == "/pose")
+            rows = sorted(self._newest.items(), key=lambda row: row[0] == PoseTable.topic.name)
             self._out = memoryview(b"".join(_message(topic, row) for topic, row in rows))
             self._newest = {}
             self._ready = False
+            self._owes_request = True
         return len(self._out) > 0
 
     def _receive(self) -> None:
-        with suppress(BlockingIOError):
-            *lines, self._in = (self._in + self._line.recv(_RECEIVE_BYTES)).split(_END)
-            self._in = self._in[-_LINE_BYTES:]
-            for line in lines:
-                if line:
-                    self._commands.append(line.decode(errors="replace"))
-                else:
-                    self._ready = True
+        try:
+            data = self._line.recv(_RECEIVE_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.is_closed = True
+            raise
+        if not data:
+            self.is_closed = True
+            return
+        first, *others = data.split(_END)
+        self._collect(first)
+        for part in others:
+            self._end_line()
+            self._collect(part)
+
+    def _collect(self, part: bytes) -> None:
+        """Store a part of a line, and nothing of a line that is too long."""
+        self._in_bytes += len(part)
+        if self._in_bytes <= LINE_BYTES:
+            self._in += part
+        else:
+            self._in.clear()
+
+    def _end_line(self) -> None:
+        """Accept or reject the line that is complete."""
+        size, line = self._in_bytes, bytes(self._in)
+        self._in_bytes = 0
+        self._in.clear()
+        if size > LINE_BYTES:
+            self._rejected.append(
+                f"a command of {size / 1e6:.1f} MB; at most {LINE_BYTES / 1e6:.1f} MB is accepted"
+            )
+        elif not line:
+            self._ready = True
+            self._requests += 1
+            self._owes_request = False
+            self._silent_s = 0.0
+        else:
+            self._commands.append(line.decode(errors="replace"))
+            if len(self._commands) > _COMMANDS_MAX:
+                self._commands.popleft()
+                self._rejected.append(
+                    f"more than {_COMMANDS_MAX} commands at once; the oldest are dropped"
+                )
 
 
 class WatcherEnd:
-    """The watcher's end of the line."""
+    """The observer's end of the line; it does not wait until the run receives."""
 
     def __init__(self, line: socket.socket) -> None:
         self._line = line
+        line.setblocking(False)
         self._in = bytearray()
+        self._out = memoryview(b"")
+        self._waiting: deque[bytes] = deque()
+        self._waiting_bytes = 0
 
     def ask(self) -> None:
         """Ask for the newest rows."""
-        self._line.sendall(_END)
+        self._send(_END)
 
     def command(self, text: str) -> None:
         """Send a command, of one line."""
-        self._line.sendall(text.replace("\n", " ").encode() + _END)
+        self._send(text.replace("\n", " ").encode(errors="replace") + _END)
 
     def rows(self, wait_s: float) -> Iterator[tuple[str, dict[str, Any]]]:
         """Topics and rows that have come, waiting at most ``wait_s`` for the first.
@@ -127,10 +212,16 @@ class WatcherEnd:
             EOFError: the run has closed the line.
 
         """
-        self._line.settimeout(wait_s)
+        self._flush()
+        to_send = [self._line] if self._has_more else []
+        readable, writable, _ = select.select([self._line], to_send, [], wait_s)
+        if writable:
+            self._flush()
+        if not readable:
+            return
         try:
-            data = self._line.recv(1 << 18)
-        except (TimeoutError, BlockingIOError):
+            data = self._line.recv(_RECEIVE_BYTES)
+        except BlockingIOError:
             return
         except OSError:
             data = b""
@@ -144,6 +235,29 @@ class WatcherEnd:
             topic, _, row = bytes(self._in[_HEAD:end]).partition(b"\0")
             del self._in[:end]
             yield topic.decode(), json.loads(row)
+
+    @property
+    def _has_more(self) -> bool:
+        return bool(len(self._out) or self._waiting)
+
+    def _send(self, line: bytes) -> None:
+        self._waiting.append(line)
+        self._waiting_bytes += len(line)
+        while self._waiting_bytes > _WAITING_BYTES:
+            oldest = next(k for k, each in enumerate(self._waiting) if each != _END)
+            self._waiting_bytes -= len(self._waiting[oldest])
+            del self._waiting[oldest]
+        self._flush()
+
+    def _flush(self) -> None:
+        """Send what fits now; a line is never sent in part only."""
+        with suppress(OSError):  # full, or the run is gone: ``rows`` reports it
+            while self._has_more:
+                if not len(self._out):
+                    line = self._waiting.popleft()
+                    self._waiting_bytes -= len(line)
+                    self._out = memoryview(line)
+                self._out = self._out[self._line.send(self._out) :]
 
 
 def _message(topic: str, row: bytes) -> bytes:

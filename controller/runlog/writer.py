@@ -1,7 +1,6 @@
 """Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -11,39 +10,30 @@ import numpy as np
 from mcap.writer import Writer
 from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
+from snakewalk.config.plain_text import plain
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import FrictionConfig, WorldConfig
-from snakewalk.controller.runlog.encode import (
-    encode,
-    exact,
-    exact_text,
-    flags_text,
-    floats,
-    number,
-    rounded_text,
-    rounded_texts,
-    text,
-    thinned,
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.runlog.column import Table
+from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
+from snakewalk.controller.runlog.record import Header, InitialPose, PlanSummary, Winding
+from snakewalk.controller.runlog.row_printer import RowPrinter
+from snakewalk.controller.runlog.topics import (
+    TABLES,
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    ImuTable,
+    SlowTable,
 )
-from snakewalk.controller.runlog.record import (
-    InitialPose,
-    MotorEnergy,
-    PlanSummary,
-    Winding,
-)
-from snakewalk.controller.runlog.schema import FORMAT, TOPICS, schema_json, schema_name
-from snakewalk.drivers.types import ImuState, JointState
+from snakewalk.drivers.types import JointState
 
 Level = Literal["info", "warning", "error"]
-VerdictKind = Literal["pass", "clamp", "veto"]
 _FLUSH_S: Final = 0.5
 _CHUNK_BYTES: Final = 1 << 20
-UNKNOWN_ENERGY: Final = MotorEnergy()
 
 
 class RunLog:
@@ -63,14 +53,16 @@ class RunLog:
             self._file, chunk_size=_CHUNK_BYTES, enable_data_crcs=True
         )
         self._writer.start(profile="", library=f"snakewalk {version('snakewalk')}")
-        self._channels: dict[str, int] = {}
-        for topic in TOPICS:
-            schema = self._writer.register_schema(
-                schema_name(topic), "jsonschema", schema_json(topic)
-            )
-            self._channels[topic] = self._writer.register_channel(topic, "json", schema)
+        self._channels: dict[type[Table], int] = {}
+        self._printers: dict[type[Table], RowPrinter] = {}
+        for table in TABLES:
+            topic = table.topic
+            schema = self._writer.register_schema(topic.schema_name, "jsonschema", topic.schema)
+            self._channels[table] = self._writer.register_channel(topic.name, "json", schema)
+            self._printers[table] = RowPrinter(topic)
         self._flushed_s = 0.0
-        self._slow = b""
+        self._last_rows: dict[type[Table], bytes] = {}
+        """Newest row of each topic that holds only changes, without its time."""
         self._has_cycles = False
 
     def __enter__(self) -> Self:
@@ -117,36 +109,43 @@ class RunLog:
         torque_constant_n_m_a: float = float("nan"),
         winding: Winding | None = None,
         initial_pose: InitialPose | None = None,
+        pose_evidence: PoseEvidence | None = None,
+        port_is_pseudo_terminal: bool | None = None,
     ) -> None:
-        """Log once, first, what runs; the ground is thinned: enough for a report to draw it."""
-        row = {
-            "format": FORMAT,
-            "software": version("snakewalk"),
-            "backend": backend,
-            "config_hash": digest(run, robot, world),
-            "seed": run.seed,
-            "run": run.model_dump(mode="json"),
-            "robot": robot.model_dump(mode="json"),
-            "world": world.model_dump(mode="json"),
-            "torque_constant_n_m_a": number(torque_constant_n_m_a),
-            "winding": None if winding is None else asdict(winding),
-            "laid": None
-            if initial_pose is None
-            else {
-                "heading_rad": float(initial_pose.heading_rad),
-                "joint_rad": exact(initial_pose.joint_rad),
-            },
-            "plan": {
-                "path_m": floats(plan.path_m),
-                "waypoints_m": floats(plan.waypoints_m),
-                "waypoint_radius_m": number(plan.waypoint_radius_m),
-                "predicted_speed_m_s": number(plan.predicted_speed_m_s),
-                "states": dict(plan.states or {}),
-            },
-            "ground": None if ground is None else thinned(ground),
-        }
-        self._add("/config", 0.0, row)
+        """Log the configuration, once and first; the ground is thinned to what a report draws."""
+        header = Header(
+            software=version("snakewalk"),
+            backend=backend,
+            config_hash=digest(run, robot, world),
+            seed=run.seed,
+            run=run,
+            robot=robot,
+            world=world,
+            plan=plan,
+            ground=ground,
+            torque_constant_n_m_a=torque_constant_n_m_a,
+            winding=winding,
+            initial_pose=initial_pose,
+            pose_evidence=pose_evidence or evidence_of_old_log(run, backend, robot.imu is not None),
+            port_is_pseudo_terminal=port_is_pseudo_terminal,
+        )
+        self._write(ConfigTable, 0.0, header.row())
         self._writer.flush()
+
+    def add(self, table: type[Table], time_s: float, **values: Any) -> None:
+        """Log a row of a topic, by field; a field that has a default may be left out.
+
+        Raises:
+            TypeError: a required field is missing, or a value is not a field of the topic.
+
+        """
+        if table.topic.only_changes:
+            now = b"".join([np.asarray(value).tobytes() for value in values.values()])
+            if now == self._last_rows.get(table):
+                return
+            self._last_rows[table] = now
+        values["time_s"] = time_s
+        self._write(table, time_s, values)
 
     def cycle(
         self,
@@ -154,168 +153,50 @@ class RunLog:
         asked_rad: ArrayLike,
         sent_rad: ArrayLike,
         state: JointState,
-        *,
-        deadline_s: float,
-        lateness_s: float,
-        wire_busy_s: float = float("nan"),
-        energy: MotorEnergy = UNKNOWN_ENERGY,
-        yield_rad: Floats | None = None,
-        verdict: VerdictKind = "pass",
-        reason: str = "",
-        joints: Sequence[int] = (),
+        **values: Any,
     ) -> None:
-        """One control cycle; ``/slow`` too when heat, voltage or alarms changed, and ``/imu``."""
-        asked, sent = np.asarray(asked_rad, dtype=float), np.asarray(sent_rad, dtype=float)
-        asked_text = exact_text(asked)
-        same = sent.tobytes() == asked.tobytes()
-        position, velocity, current, age = rounded_texts(
-            (state.position_rad, state.velocity_rad_s, state.current_a, state.age_s)
-        )
-        row = (
-            f'{{"time_s":{text(time_s)},"asked_rad":{asked_text},'
-            f'"sent_rad":{asked_text if same else exact_text(sent)},'
-            f'"yield_rad":{"null" if yield_rad is None else rounded_texts([yield_rad])[0]},'
-            f'"measured_rad":{position},"velocity_rad_s":{velocity},"current_a":{current},'
-            f'"age_s":{age},"valid":{flags_text(state.valid.tobytes(), state.valid.dtype.char)},'
-            f'"error":{flags_text(state.error.tobytes(), state.error.dtype.char)},'
-            f'"deadline_s":{text(deadline_s)},'
-            f'"lateness_s":{rounded_text(lateness_s)},"wire_busy_s":{rounded_text(wire_busy_s)},'
-            f'"electrical_j":{rounded_text(energy.electrical_j)},'
-            f'"mechanical_j":{rounded_text(energy.mechanical_j)},'
-            f'"verdict":"{verdict}","reason":{encode(reason)},'
-            f'"joints":{encode([int(j) for j in joints])}}}'
-        )
+        """Log a control cycle with what the servos and the IMU reported.
+
+        ``values`` are the other fields of ``CycleTable``.
+        """
         self._has_cycles = True
-        self._add_text("/cycle", time_s, row)
-        self._slow_row(time_s, state)
-        if state.imu is not None:
-            self._imu_row(time_s, state.imu)
-
-    def pose(
-        self,
-        time_s: float,
-        head_m: ArrayLike,
-        rotation: ArrayLike,
-        *,
-        links_m: ArrayLike | None = None,
-        centre_m: ArrayLike,
-        speed_m_s: float = float("nan"),
-        predicted_speed_m_s: float = float("nan"),
-        pulse_m_s: float = float("nan"),
-        path_s_m: float = float("nan"),
-        target: int = 0,
-    ) -> None:
-        """Where the body is: head (3,), rotation (3, 3), links (L, 3), centre of mass (3,)."""
-        given = (head_m, np.ravel(rotation), centre_m, *(() if links_m is None else (links_m,)))
-        head, turn, centre, *links = rounded_texts([np.asarray(a, dtype=float) for a in given])
-        row = (
-            f'{{"time_s":{text(time_s)},"head_m":{head},"rotation":{turn},'
-            f'"links_m":{links[0] if links else "null"},"centre_m":{centre},'
-            f'"speed_m_s":{rounded_text(speed_m_s)},'
-            f'"predicted_speed_m_s":{rounded_text(predicted_speed_m_s)},'
-            f'"pulse_m_s":{rounded_text(pulse_m_s)},"path_s_m":{rounded_text(path_s_m)},'
-            f'"target":{int(target)}}}'
+        self.add(
+            CycleTable,
+            time_s,
+            asked_rad=asked_rad,
+            sent_rad=sent_rad,
+            measured_rad=state.position_rad,
+            velocity_rad_s=state.velocity_rad_s,
+            current_a=state.current_a,
+            age_s=state.age_s,
+            valid=state.valid,
+            error=state.error,
+            **values,
         )
-        self._add_text("/pose", time_s, row)
-
-    def shadow(self, time_s: float, position_rad: Floats, current_a: Floats) -> None:
-        """What a simulated chain answers to the goals of the same cycle; (J,) each."""
-        position, current = rounded_texts((position_rad, current_a))
-        row = f'{{"time_s":{text(time_s)},"position_rad":{position},"current_a":{current}}}'
-        self._add_text("/shadow", time_s, row)
-
-    def path_replanned(self, time_s: float, points_m: ArrayLike) -> None:
-        """Log a path (n, 2) or (n, 3) that replaces the plan's."""
-        self._add("/path", time_s, {"time_s": time_s, "points_m": floats(points_m)})
-
-    def waypoints_changed(self, time_s: float, waypoints_m: ArrayLike) -> None:
-        """Log waypoints (w, 2), those reached first, that replace those in force."""
-        row = {"time_s": time_s, "waypoints_m": floats(waypoints_m)}
-        self._add("/waypoints", time_s, row)
-
-    def walk(
-        self,
-        time_s: float,
-        *,
-        state: int,
-        visited: int,
-        heading_error_rad: float,
-        ramp_rad: float,
-        candidates: int,
-        eta_q: float = float("nan"),
-    ) -> None:
-        """One decision of the walk."""
-        row = {
-            "time_s": time_s,
-            "state": int(state),
-            "visited": int(visited),
-            "heading_error_rad": number(heading_error_rad),
-            "ramp_rad": number(ramp_rad),
-            "candidates": int(candidates),
-            "eta_q": number(eta_q),
-        }
-        self._add("/walk", time_s, row)
-
-    def friction(
-        self,
-        time_s: float,
-        friction: FrictionConfig,
-        along_95: tuple[float, float],
-        across_95: tuple[float, float],
-    ) -> None:
-        """Friction that was found under the body, and its intervals of 95 %."""
-        row = {
-            "time_s": time_s,
-            "along": number(friction.along),
-            "across": number(friction.across),
-            "along_95": floats(along_95),
-            "across_95": floats(across_95),
-        }
-        self._add("/friction", time_s, row)
+        self.add(
+            SlowTable,
+            time_s,
+            temperature_c=state.temperature_c,
+            voltage_v=state.voltage_v,
+            hardware_error=state.hardware_error,
+        )
+        if state.imu is not None:
+            imu = state.imu
+            self.add(
+                ImuTable, time_s, rotation=imu.rotation, rate_rad_s=imu.rate_rad_s, age_s=imu.age_s
+            )
 
     def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
-        """Log something that happened; above ``info`` it is on the disk when this returns."""
-        self._add("/event", time_s, {"time_s": time_s, "level": level, "kind": kind, "text": text})
+        """Log an event; above ``info`` it is on the disk when this returns."""
+        self.add(EventTable, time_s, level=level, kind=kind, text=plain(text))
         if level != "info":
             self._writer.flush()
 
-    def qpos(self, time_s: float, qpos: ArrayLike) -> None:
-        """Generalised position (nq,) of the simulation, for film and replay."""
-        self._add("/qpos", time_s, {"time_s": time_s, "qpos": floats(qpos)})
-
-    def _slow_row(self, time_s: float, state: JointState) -> None:
-        now = (
-            state.temperature_c.tobytes()
-            + state.voltage_v.tobytes()
-            + state.hardware_error.tobytes()
-        )
-        if now == self._slow:
-            return
-        self._slow = now
-        row = {
-            "time_s": time_s,
-            "temperature_c": floats(state.temperature_c),
-            "voltage_v": floats(state.voltage_v),
-            "hardware_error": state.hardware_error.tolist(),
-        }
-        self._add("/slow", time_s, row)
-
-    def _imu_row(self, time_s: float, imu: ImuState) -> None:
-        turn, rate = rounded_texts((imu.rotation.ravel(), imu.rate_rad_s))
-        row = (
-            f'{{"time_s":{text(time_s)},"rotation":{turn},"rate_rad_s":{rate},'
-            f'"age_s":{rounded_text(imu.age_s)}}}'
-        )
-        self._add_text("/imu", time_s, row)
-
-    def _add(self, topic: str, time_s: float, row: Mapping[str, Any]) -> None:
-        self._add_text(topic, time_s, encode(row))
-
-    def _add_text(self, topic: str, time_s: float, row: str) -> None:
-        stamp_ns, data = round(time_s * 1e9), row.encode()
-        self._writer.add_message(self._channels[topic], stamp_ns, data, publish_time=stamp_ns)
+    def _write(self, table: type[Table], time_s: float, row: Mapping[str, Any]) -> None:
+        stamp_ns, data = round(time_s * 1e9), self._printers[table].row(row).encode()
+        self._writer.add_message(self._channels[table], stamp_ns, data, publish_time=stamp_ns)
         if self._on_row is not None:
-            self._on_row(topic, data)
+            self._on_row(table.topic.name, data)
         if time_s - self._flushed_s >= _FLUSH_S:
             self._flushed_s = time_s
             self._writer.flush()

@@ -17,6 +17,13 @@ from snakewalk.controller.motion.compliance import Compliance
 from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progress
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
+from snakewalk.controller.runlog.topics import (
+    FrictionTable,
+    PathTable,
+    PoseTable,
+    WalkTable,
+    WaypointTable,
+)
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor
@@ -114,7 +121,10 @@ class CycleObserver(Protocol):
     """Follows a run from cycle to cycle; it steers nothing."""
 
     def begin(self, state: JointState) -> None:
-        """Take the state in which the run begins, before its first cycle."""
+        """Accept the state in which the run begins, before its first cycle.
+
+        Torque is on: it returns well within the servos' bus watchdog (0.2 s).
+        """
         ...
 
     def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
@@ -246,7 +256,14 @@ class Drive:
         if found is None:
             return
         now_s = self._clock.now_s()
-        self._log.friction(now_s, found.friction, found.along_95, found.across_95)
+        self._log.add(
+            FrictionTable,
+            now_s,
+            along=found.friction.along,
+            across=found.friction.across,
+            along_95=found.along_95,
+            across_95=found.across_95,
+        )
         text = monitor.event_text()
         if text is not None:
             self._log.event(now_s, "friction", text)
@@ -269,7 +286,7 @@ class Drive:
         if self._open is not None and self._open.waypoints_m is not self._waypoints_m:
             self._waypoints_m = self._open.waypoints_m
             self._end_s = now_s + self._run.time_limit_s
-            log.waypoints_changed(now_s, self._waypoints_m)
+            log.add(WaypointTable, now_s, waypoints_m=self._waypoints_m)
         if path.reached > reached:
             log.event(now_s, "waypoint", f"waypoint {path.reached} reached")
         if path.replanned is not None:
@@ -278,10 +295,11 @@ class Drive:
                 log.event(now_s, "missed", text, "warning")
             else:
                 log.event(now_s, "replanned", text)
-            log.path_replanned(now_s, path.path_m(60))
+            log.add(PathTable, now_s, points_m=path.path_m(60))
         d = path.decision
         if d is not None:
-            log.walk(
+            log.add(
+                WalkTable,
                 now_s,
                 state=d.state,
                 visited=d.visited,
@@ -315,7 +333,7 @@ class Drive:
             deadline_s=tick.deadline_s,
             lateness_s=tick.lateness_s,
             wire_busy_s=self._wire_s - before_s,
-            energy=self._energy(),
+            **self._energy()._asdict(),
             yield_rad=None if self._compliance is None else self._compliance.yield_rad,
             verdict="veto" if self._link.tripped else "clamp" if clamped else "pass",
             reason=self._link.tripped or "",
@@ -326,10 +344,11 @@ class Drive:
         self._measure_speed()
         path = self._path
         pulse_m_s, along_m = path.pulse_m_s, path.along_m
-        self._log.pose(
+        self._log.add(
+            PoseTable,
             tick.deadline_s,
-            pose.head_in_world_m,
-            pose.rotation,
+            head_m=pose.head_in_world_m,
+            rotation=pose.rotation,
             links_m=view.link_m,
             centre_m=view.centre_m,
             speed_m_s=self._speed_m_s,

@@ -20,7 +20,8 @@ from snakewalk.controller.repertoire import repertoire_run
 from snakewalk.controller.run.backend import Backend, simulated
 from snakewalk.controller.run.factory import prepare_run
 from snakewalk.controller.runlog.record import Header, InitialPose, RunRecord
-from snakewalk.controller.runlog.writer import RunLog, VerdictKind
+from snakewalk.controller.runlog.topics import PoseTable
+from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import BodyPose, JointCommand
 
 
@@ -81,16 +82,17 @@ def replay(
                 deadline_s=cycle.deadline_s[k],
                 lateness_s=late_s,
                 wire_busy_s=wire_s - before_s,
-                energy=backend.energy(),
-                verdict=cast(VerdictKind, cycle.verdict[k]),
+                **backend.energy()._asdict(),
+                verdict=cycle.verdict[k],
                 reason=cycle.reason[k],
                 joints=cycle.joints[k],
             )
             view = body_in_world(robot, pose, state.position_rad)
-            out.pose(
+            out.add(
+                PoseTable,
                 cycle.time_s[k],
-                pose.head_in_world_m,
-                pose.rotation,
+                head_m=pose.head_in_world_m,
+                rotation=pose.rotation,
                 links_m=view.link_m,
                 centre_m=view.centre_m,
             )

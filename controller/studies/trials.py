@@ -20,13 +20,14 @@ from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import (
+    changed,
     is_gait,
     prepare_gait,
     prepare_job,
     with_compliance,
 )
-from snakewalk.controller.run.gait_run import GaitRun
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.terrain.summary import path_relief
 from snakewalk.controller.track.readers.load import load_track
 
@@ -67,7 +68,9 @@ class Trial:
     """Where the head started; None where the run could not be prepared."""
     waypoints: int = 0
     complete: bool = False
+    """Whether the body truly came to every waypoint, by the simulator, without a trip."""
     reached: int = 0
+    """Waypoints that the body truly came to, in order."""
     missed: int = 0
     """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
     duration_s: float = math.nan
@@ -107,7 +110,7 @@ class Trial:
 
 def prepare_case(
     case: Case, seed: int, spread_m: float, changes: Mapping[str, object]
-) -> WalkRun | GaitRun:
+) -> PreparedRun:
     """Prepare one trial's run; its start is moved by a normal deviate, drawn from the seed.
 
     A walk's start on unsafe ground is drawn again, so that the moved start does not fail by itself.
@@ -117,9 +120,9 @@ def prepare_case(
 
     """
     found = _prepared(case, seed, changes)
-    found = replace(found, run=with_compliance(found.run, case.compliance))
+    found = changed(found, run=with_compliance(found.run, case.compliance))
     if case.relief != 1.0:
-        found = replace(found, world=found.world.with_relief(case.relief))
+        found = changed(found, world=found.world.with_relief(case.relief))
     if spread_m == 0.0:
         return found
     relief = found.planner.relief if isinstance(found, WalkRun) else None
@@ -128,14 +131,14 @@ def prepare_case(
         x_m, y_m = start_m + spread_m * rng.standard_normal(2)
         if relief is None or relief.safe(x_m, y_m):
             moved = found.run.model_copy(update={"start_m": (float(x_m), float(y_m))})
-            return replace(found, run=moved)
+            return changed(found, run=moved)
     raise InputError(
         f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
         f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
     )
 
 
-def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> WalkRun | GaitRun:
+def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> PreparedRun:
     given = {"robot": case.robot, "world": case.world}
     options: dict[str, Any] = dict(changes) | {k: v for k, v in given.items() if v is not None}
     seconds = options.pop("seconds", None)
@@ -214,17 +217,18 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
         return replace(trial, cause="error", why=f"{type(error).__name__}: {error}")
 
 
-def _measured(trial: Trial, prepared: WalkRun | GaitRun) -> Trial:
+def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
     with TemporaryDirectory() as folder:
         finished = execute(prepared, Path(folder), stoppable=False)
         stood = ground_contact(finished.record, prepared.ground)
     numbers, outcome, off = finished.summary, finished.outcome, finished.pose.error
-    complete = outcome.complete
+    reached = outcome.reached if off is None else off.waypoints_reached
+    complete = outcome.tripped is None and reached == outcome.waypoints
     ended = None if complete else failure(finished.record)
     return replace(
         trial,
         complete=complete,
-        reached=outcome.reached,
+        reached=reached,
         missed=outcome.missed,
         duration_s=outcome.duration_s,
         speed_m_s=gait_displacement(finished.record).speed_m_s if trial.case.is_gait else math.nan,

@@ -5,7 +5,6 @@ socket of its own behind the gate: when it changes, ten times a second while it 
 state before the last one was taken, so that none waits on the way.
 """
 
-import json
 import math
 import threading
 import time
@@ -16,6 +15,7 @@ from typing import Any, Final
 
 from websockets.exceptions import ConnectionClosed
 
+from snakewalk.config.archive import parse_json
 from snakewalk.controller.view.dead_man import STALE_S, hold_command
 
 KEYS: Final = {0: "n", 1: "m", 2: "p", 3: "d", 8: "space", 9: "q"} | {
@@ -105,14 +105,14 @@ def read_state(message: str | bytes) -> PadState | None:
     """
     if len(message) > _MESSAGE_BYTES:
         raise ValueError("too long")
-    row = json.loads(message)
+    row = parse_json(message)
     if row is None:
         return None
     try:
         axes = [float(value) for value in row["axes"][: len(STICK)]]
         pressed = frozenset(k for k, down in enumerate(row["buttons"]) if down == 1)
         name, standard = str(row["name"]), row["mapping"] == "standard"
-    except (TypeError, KeyError) as fault:
+    except (TypeError, KeyError, ArithmeticError) as fault:
         raise ValueError("no state of a gamepad") from fault
     if not all(math.isfinite(value) for value in axes):
         raise ValueError("no number")

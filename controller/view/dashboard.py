@@ -1,5 +1,6 @@
 """The panels beside the scene: state, a row of bars for each servo, curves over time, events."""
 
+from collections.abc import Sequence
 from html import escape
 from typing import Final
 
@@ -8,7 +9,10 @@ import viser
 from viser import uplot
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.runlog.column import Panel
+from snakewalk.controller.runlog.panels import CurveValues, panel_curves
 from snakewalk.controller.runlog.record import Event, Header, RunRecord
+from snakewalk.controller.runlog.topics import TABLES
 
 SPAN_S: Final = 30.0
 """How much of the past the curves show (ours)."""
@@ -53,10 +57,13 @@ class Dashboard:
                 gui, "current less its shadow's, A", tuple(self._names), legend=False
             )
             self._apart.visible = False
-            self._speed = _plot(gui, "speed, m/s", ("measured", "predicted"))
-            self._supply = _plot(gui, "lowest supply, V", ("V",))
-            self._heat = _plot(gui, "hottest servo, °C", ("°C",))
-            self._late = _plot(gui, "cycle began late by, ms", ("ms",))
+            self._panels = {
+                panel: _plot(gui, panel, _curve_names(panel))
+                for panel in Panel
+                if not panel.is_of_one_joint and panel != Panel.CURRENT  # above, of all joints
+            }
+            for each in self._panels.values():
+                each.visible = False
         with tabs.add_tab("events"):
             self._events = gui.add_html("")
 
@@ -124,9 +131,9 @@ class Dashboard:
             f"text-align:right'>{head}{''.join(lines)}</table>"
         )
 
-    def show_curves(self, record: RunRecord, cycle: int, pose: int) -> None:
+    def show_curves(self, record: RunRecord, cycle: int) -> None:
         """Show the last seconds up to a row."""
-        rows, where = record.cycle, record.pose
+        rows = record.cycle
         first = int(np.searchsorted(rows.time_s, rows.time_s[cycle] - SPAN_S))
         pick = _spread(first, cycle)
         time_s = rows.time_s[pick]
@@ -136,14 +143,11 @@ class Dashboard:
         if len(record.shadow.time_s):
             self._apart.visible = True
             self._apart.data = (time_s, *_apart_a(record, pick).T)
-        self._late.data = (time_s, rows.lateness_s[pick] * 1e3)
-        begin = int(np.searchsorted(where.time_s, time_s[0]))
-        at = _spread(begin, pose)
-        self._speed.data = (where.time_s[at], where.speed_m_s[at], where.predicted_speed_m_s[at])
-        if len(record.slow.time_s):
-            slow = np.maximum(np.searchsorted(record.slow.time_s, time_s, side="right") - 1, 0)
-            self._supply.data = (time_s, _known(record.slow.voltage_v[slow], np.min))
-            self._heat.data = (time_s, _known(record.slow.temperature_c[slow], np.max))
+        for panel, plot in self._panels.items():
+            curves = panel_curves(record, panel)
+            if curves:
+                plot.visible = True
+                plot.data = (time_s, *_newest(panel, curves, time_s))
 
     def show_events(self, events: tuple[Event, ...]) -> None:
         """Show the newest events, the newest first."""
@@ -186,12 +190,22 @@ def _spread(first: int, last: int) -> np.ndarray:
     return np.unique(np.linspace(first, last, max(count, 2)).astype(int))
 
 
-def _known(values: Floats, of: object) -> Floats:
-    """Least or greatest of each row's known values; NaN where none is known."""
-    fill = np.inf if of is np.min else -np.inf
-    found = np.where(np.isfinite(values), values, fill)
-    ends = found.min(axis=1) if of is np.min else found.max(axis=1)
-    return np.where(np.isfinite(ends), ends, np.nan)
+def _curve_names(panel: Panel) -> tuple[str, ...]:
+    """Names of all curves of a panel."""
+    columns = [column for table in TABLES for column in table.topic.columns.values()]
+    return tuple(c.name for column in columns for c in column.curves if c.panel == panel)
+
+
+def _newest(panel: Panel, curves: Sequence[CurveValues], time_s: Floats) -> list[Floats]:
+    """Values (n,) of each curve of a panel that were the newest at some times."""
+    known = {each.curve.name: each.values[_rows_at(each.time_s, time_s)] for each in curves}
+    unknown = np.full(len(time_s), np.nan)
+    return [known.get(name, unknown) for name in _curve_names(panel)]
+
+
+def _rows_at(of_s: Floats, time_s: Floats) -> np.ndarray:
+    """Row that was the newest at each time; the first where there was none yet."""
+    return np.maximum(np.searchsorted(of_s, time_s, side="right") - 1, 0)
 
 
 def _bar(share: float, text: str) -> str:

@@ -7,6 +7,8 @@ from typing import Final
 
 STALE_S: Final = 0.3
 """A gamepad that says nothing for so long is not held (ours)."""
+_AHEAD_S: Final = 0.1
+"""A later time is not believed (ours): both processes read the same clock."""
 WITHOUT: Final = "pad=none"
 """Says that nobody has to hold a gamepad any more."""
 
@@ -32,21 +34,26 @@ class DeadMan:
         return self._now_s() < self._until_s
 
     def sort_out(self, commands: list[str]) -> list[str]:
-        """Take what is said of the gamepad; returns the other commands."""
-        others = []
-        for command in commands:
-            word, _, value = command.partition("=")
-            if word == "pad":
-                self._take(command, value)
-            else:
-                others.append(command)
-        return others
+        """Process the commands of a gamepad; returns the others, and those that are damaged."""
+        return [
+            command
+            for command in commands
+            if not command.startswith("pad=") or not self._process(command)
+        ]
 
-    def _take(self, command: str, value: str) -> None:
-        down, _, at_s = value.partition("@")
+    def _process(self, command: str) -> bool:
+        """Whether a command of a gamepad is valid; a time in the future is not."""
+        down, _, text = command.removeprefix("pad=").partition("@")
+        try:
+            at_s = float(text) if text else 0.0
+        except ValueError:
+            return False
         if command == WITHOUT:
             self._until_s = math.inf
-        elif down == "1":
-            self._until_s = float(at_s) + STALE_S
-        else:
+        elif down == "0":
             self._until_s = -math.inf
+        elif down == "1" and text and at_s <= self._now_s() + _AHEAD_S:
+            self._until_s = at_s + STALE_S
+        else:
+            return False
+        return True

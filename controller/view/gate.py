@@ -1,12 +1,14 @@
 """Who may open the page: checked at every request, before viser sees it.
 
-viser serves whoever reaches its port, and browsers let any web page talk to one on this machine. So
-a request has to name the host that is served, a socket has to come from our own page, and beyond
-this machine a token is asked for once, and kept in a cookie.
+viser serves every program that reaches its port, browsers let any web page send requests to this
+machine, and every user of this machine can reach 127.0.0.1. So a request has to name an expected
+host, a socket has to come from our own page, and both need the token, which a cookie keeps.
 """
 
 import hmac
 import http
+import ipaddress
+import re
 import secrets
 import socket
 from collections.abc import Callable
@@ -20,6 +22,8 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 _LOCAL: Final = frozenset({"127.0.0.1", "localhost", "::1"})
+_ANY: Final = frozenset({"0.0.0.0", "::"})
+_HOST: Final = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[\w.-]+)(:\d+)?")
 _ASK: Final = (
     "<!doctype html><title>snakewalk</title><meta name=viewport content='width=device-width'>"
     "<body style='font:16px system-ui;margin:3em'><form><p>{}</p><input name=token autofocus "
@@ -47,20 +51,19 @@ class Gate:
 
     def __init__(self, host: str, insert: Insert | None = None) -> None:
         self._insert = insert
-        self._local = host in _LOCAL
-        self.token = None if self._local else secrets.token_urlsafe(16)
-        """Asked for; None where only this machine is served."""
+        self._host = host
+        self.token = secrets.token_urlsafe(16)
+        """Asked for once in each browser."""
 
     def answer(self, request: Request, port: int) -> Response | None:
-        """Return the refusal, or None where the request may pass."""
-        host = request.headers.get("Host", "")
-        if self._local and urlsplit(f"//{host}").hostname not in _LOCAL:
-            return _response(http.HTTPStatus.FORBIDDEN, "this page is served on this machine only")
-        origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        """Return the refusal, or None if the request may pass."""
+        host = _only(request, "Host")
+        if not self._is_expected(host):
+            text = f"{escape(host) or 'no host'}: the page is not served by this name"
+            return _response(http.HTTPStatus.FORBIDDEN, text)
+        needs_origin = bool(request.headers.get_all("Origin") or request.headers.get_all("Upgrade"))
+        if needs_origin and not _is_of(_only(request, "Origin"), host):
             return _response(http.HTTPStatus.FORBIDDEN, "another page may not open this one")
-        if self.token is None:
-            return None
         cookie = f"snakewalk-{port}"
         if self._is_right(_cookie(request, cookie)):
             return None
@@ -75,7 +78,22 @@ class Gate:
         return _response(http.HTTPStatus.UNAUTHORIZED, _ASK.format(escape(text)))
 
     def _is_right(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode(), (self.token or "").encode())
+        return hmac.compare_digest(given.encode(errors="replace"), self.token.encode())
+
+    def _is_expected(self, host: str) -> bool:
+        """Whether a request may name this host: a name of another page may lead here."""
+        found = _HOST.fullmatch(host)
+        if found is None:
+            return False
+        name = found["name"].lower().strip("[]").removesuffix(".")
+        if self._host in _LOCAL or name in _LOCAL:
+            return name in _LOCAL
+        if name == self._host.lower().removesuffix("."):
+            return True
+        if self._host not in _ANY:
+            return False
+        own, _, _ = socket.gethostname().lower().partition(".")
+        return _is_address(name) or name.partition(".")[0] == own
 
     def guard(self, serve: Serve) -> Serve:
         """Return a ``websockets`` server that asks this gate before its own ``process_request``.
@@ -127,6 +145,29 @@ class Gate:
         with socket.create_connection((here, port), _CHECK_S) as line:
             line.sendall(b"GET / HTTP/1.1\r\nHost: elsewhere.example\r\nOrigin: http://x\r\n\r\n")
             return line.recv(64).startswith(b"HTTP/1.1 403")
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_of(origin: str, host: str) -> bool:
+    """Whether an origin is the page that is served at a host."""
+    try:
+        place = urlsplit(origin)
+    except ValueError:
+        return False
+    return place.scheme in {"http", "https"} and place.netloc.lower() == host.lower()
+
+
+def _only(request: Request, header: str) -> str:
+    """Value of a header that is there once; else empty."""
+    values = request.headers.get_all(header)
+    return values[0] if len(values) == 1 else ""
 
 
 def _ask_for_plain(request: Request) -> None:

@@ -13,9 +13,18 @@ from typing import Any, Final
 
 import viser
 
+from snakewalk.config.plain_text import plain
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.topics import (
+    ConfigTable,
+    CycleTable,
+    EventTable,
+    PoseTable,
+    SlowTable,
+    WaypointTable,
+)
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.view.dashboard import SPAN_S, Dashboard
 from snakewalk.controller.view.gait_panel import GaitPanel
@@ -49,9 +58,14 @@ def serve(line: socket.socket, host: str, port: int) -> None:
         return
     line.sendall(json.dumps({"url": url}).encode() + b"\n")
     page = _LivePage(server, WatcherEnd(line), gamepad)
-    with suppress(EOFError, OSError):
+    with suppress(EOFError):
         while True:
-            page.step()
+            try:
+                page.step()
+            except EOFError:
+                raise
+            except Exception as fault:  # the E-STOP stays
+                page.report(fault)
     server.stop()
 
 
@@ -74,6 +88,7 @@ class _LivePage:
         self._waypoint_panel: WaypointPanel | None = None
         self._takes_waypoints = False
         self._over = False
+        self._faults: set[str] = set()
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
 
     def step(self) -> None:
@@ -87,7 +102,7 @@ class _LivePage:
                 self._end.command(command)
         for topic, row in self._end.rows(_PERIOD_S):
             self._take(topic, row)
-            if topic == "/pose":
+            if topic == PoseTable.topic.name:
                 self._told_s = self._clock.now_s()
                 self._draw()
         if self._button is not None and now_s - max(self._told_s, 0.0) > _SILENT_S:
@@ -97,6 +112,15 @@ class _LivePage:
                 self._stop.ended(ended)
             elif self._told_s > 0.0 and not self._over:
                 self._stop.show(f"no news of the run for {now_s - self._told_s:.0f} s")
+
+    def report(self, fault: Exception) -> None:
+        """Report once what could not be shown."""
+        text = " ".join(
+            f"page: it cannot show everything ({fault or type(fault).__name__})".split()
+        )
+        if text not in self._faults:
+            self._faults.add(text)
+            print(f"snakewalk: {plain(text)}", file=sys.stderr, flush=True)
 
     def _commands(self) -> list[str]:
         """What was set in the page since the last call."""
@@ -111,12 +135,12 @@ class _LivePage:
         return found
 
     def _take(self, topic: str, row: dict[str, Any]) -> None:
-        if topic == "/button":
+        if topic == BUTTON:
             self._button = PressedButton(Path(row["path"]))
             self._stop.arm()
             return
-        if topic == "/config":
-            self._header = record_of({"/config": [row]}, complete=False, note="").header
+        if topic == ConfigTable.topic.name:
+            self._header = record_of({topic: [row]}, complete=False, note="").header
             with self._server.atomic():
                 self._scene = BodyScene(self._server, self._header)
                 self._scene.first_camera(self._server)
@@ -126,23 +150,23 @@ class _LivePage:
             tabs = self._dashboard.tabs
             self._gamepad_panel = GamepadPanel(self._server, tabs, self._gamepad)
             return
-        if topic == "/picture":
+        if topic == PICTURE:
             if self._dashboard is not None:
                 self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
             return
-        if topic == "/gait":
+        if topic == GAIT:
             self._gait = row
             self._show_gait()
             return
-        if topic == "/course":
+        if topic == COURSE:
             self._takes_waypoints = True
             self._take_waypoints()
             return
-        if topic == "/waypoints":
+        if topic == WaypointTable.topic.name:
             self._header = self._record({topic: [row]}).header
             return
         self._rows[topic].append(row)
-        if topic == "/event":
+        if topic == EventTable.topic.name:
             if row["kind"] in ("trip", "interrupt") or (row["kind"] == "stop" and not self._over):
                 self._over = True
                 self._stop.ended(row["text"])
@@ -169,7 +193,8 @@ class _LivePage:
         scene, dashboard, now_s = self._scene, self._dashboard, self._told_s
         if scene is None or dashboard is None:
             return
-        newest = {topic: list(self._rows[topic])[-1:] for topic in ("/cycle", "/pose", "/slow")}
+        names = (table.topic.name for table in (CycleTable, PoseTable, SlowTable))
+        newest = {name: list(self._rows[name])[-1:] for name in names}
         now = self._record(newest)
         with self._server.atomic():
             follow = dashboard.follow.value
@@ -183,7 +208,7 @@ class _LivePage:
             if now_s - self._curves_s >= _CURVES_S:
                 self._curves_s = now_s
                 past = self._record({topic: list(each) for topic, each in self._rows.items()})
-                dashboard.show_curves(past, len(past.cycle.time_s) - 1, len(past.pose.time_s) - 1)
+                dashboard.show_curves(past, len(past.cycle.time_s) - 1)
                 scene.show_paths(past.paths, float(past.cycle.time_s[-1]))
                 scene.show_trail(past.pose.centre_m)
 

@@ -12,7 +12,10 @@ from typing import Final
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.watcher import WatcherProcess
+from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
+from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.view.dead_man import DeadMan
 
 _PICTURE_S: Final = 0.5
@@ -30,9 +33,9 @@ class LiveView(WatcherProcess):
 
     def __init__(self, at: str = "127.0.0.1:8080") -> None:
         require_extra("the page needs", "viser")
-        super().__init__(_serve, *host_and_port(at), fault=f"--view-at {at}")
+        super().__init__(_serve, *host_and_port(at), what="page", fault=f"--view-at {at}")
         self.url = str(self.said["url"])
-        """To be opened in a browser; holds the token where one is asked for."""
+        """To be opened in a browser; contains the token."""
         self._picture: bytes | None = None
         self._picture_s = -math.inf
         self._dead_man = DeadMan()
@@ -49,17 +52,17 @@ class LiveView(WatcherProcess):
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Take the gait that an operator runs: the page then has its sliders."""
         row = {"name": name, "parameters": parameters}
-        self._end.add("/gait", json.dumps(row).encode())
+        self._end.add(GAIT, json.dumps(row).encode())
 
     def on_course(self) -> None:
         """Take it that the run's waypoints may be set: the page then takes clicks."""
-        self._end.add("/course", b"{}")
+        self._end.add(COURSE, b"{}")
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Take a row of the log; returns at once."""
-        if topic == "/pose" and self._picture is not None:
+        if topic == PoseTable.topic.name and self._picture is not None:
             picture, self._picture = self._picture, None
-            self._end.add("/picture", picture)
+            self._end.add(PICTURE, picture)
         self._end.add(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:
@@ -75,12 +78,10 @@ class LiveView(WatcherProcess):
             self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
 
 
+@plugin("observer", "page")
 @contextmanager
-def open_view(view: bool, at: str) -> Iterator[LiveView | None]:
-    """Serve the page of a run where it is asked for, and print its address."""
-    if not view:
-        yield None
-        return
+def open_page(at: str) -> Iterator[LiveView]:
+    """Live web page of a run, with a stop button."""
     with LiveView(at) as page:
         print(f"page: {page.url}", file=sys.stderr, flush=True)
         yield page

@@ -52,7 +52,7 @@ class _Shown:
         if curves:
             scene.show_paths(record.paths, at_s)
             scene.show_trail(record.pose.centre_m[: pose + 1])
-            board.show_curves(record, cycle, pose)
+            board.show_curves(record, cycle)
             board.show_events(tuple(each for each in record.events if each.time_s <= at_s + 1e-9))
 
 

@@ -16,7 +16,7 @@ _LEFT_PX, _TOP_PX, _WIDTH_PX = 16.0, 170.0, 300.0
 
 
 def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser.ViserServer, str]:
-    """Serve an empty page; returns it with its address, which holds the token if there is one.
+    """Serve an empty page; returns it with its address, which contains the token.
 
     ``insert`` is something of our own in it.
 
@@ -41,8 +41,11 @@ def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.set_panel_label("snakewalk")
-    query = "" if gate.token is None else f"/?token={gate.token}"
-    return server, f"http://{host}:{server.get_port()}{query}"
+    return server, f"http://{_in_url(host)}:{server.get_port()}/?token={gate.token}"
+
+
+def _in_url(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
 
 
 def _is_here(host: str) -> bool:

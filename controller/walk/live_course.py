@@ -15,6 +15,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.path_progress import Decision, PathProgress
+from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.walk.course import Course, OnCourse
 
@@ -28,6 +29,8 @@ END: Final = "end"
 """Leave them out, and end the run where the motion comes to rest."""
 WAYPOINTS_MAX: Final = 1000
 """That a run takes (ours)."""
+_COMMANDS_MAX: Final = 10
+"""Commands that are carried out in a step (ours): a person clicks less often."""
 _APART_M: Final = 0.05
 """Between where a path begins and where it leads (ours)."""
 
@@ -56,7 +59,7 @@ class LiveCourse(OnCourse):
         Args:
             motion: along a course.
             commands: set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``; others are
-                ignored.
+                rejected.
             check: raises ``InputError`` for a point (2,) where no waypoint may be, whatever path
                 leads there.
             on_event: takes ("operator", text) of what was done, ("refused", text) of what was not.
@@ -65,6 +68,8 @@ class LiveCourse(OnCourse):
         super().__init__(motion.course)
         self._motion, self._commands, self._check = motion, commands, check
         self._on_event = on_event
+        self._refusals = Refusals(lambda why: on_event("refused", why))
+        self._time_s = 0.0
         self._changed: str | None = None
         self._ends = self._told_complete = False
 
@@ -118,8 +123,16 @@ class LiveCourse(OnCourse):
         """Go on by ``dt_s``, and carry out what was set."""
         self._changed = None
         goal_rad = self._motion.step(dt_s, view)
-        for command in self._commands():
+        self._time_s += dt_s
+        commands = list(self._commands())
+        for command in commands[:_COMMANDS_MAX]:
             self._carry_out(command, view)
+        if len(commands) > _COMMANDS_MAX:
+            why = (
+                f"{len(commands)} commands at once; only the first {_COMMANDS_MAX} are carried out"
+            )
+            self._refusals.add(why, self._time_s)
+        self._refusals.step(self._time_s)
         if self.course.complete and not self._told_complete and not self._ends:
             self._on_event("operator", "no waypoint is left: it holds, and waits for another")
         self._told_complete = self.course.complete
@@ -127,7 +140,10 @@ class LiveCourse(OnCourse):
 
     def _carry_out(self, command: str, view: BodyView) -> None:
         word, _, value = command.partition("=")
-        if word not in (ADD, NEXT, CLEAR, END) or self._ends:
+        if self._ends:
+            return
+        if word not in (ADD, NEXT, CLEAR, END):
+            self._refusals.add(f"{command}: no command for waypoints", self._time_s)
             return
         left_m = self.waypoints_m[self.reached :]
         try:
@@ -140,7 +156,7 @@ class LiveCourse(OnCourse):
                 self._ends = word == END
                 text = "it comes to rest, and the run ends" if self._ends else "it stops here"
         except InputError as error:
-            self._on_event("refused", error.faults[0])
+            self._refusals.add(error.faults[0], self._time_s)
             return
         if word != ADD and len(left_m):
             text += f"; waypoints left out: {len(left_m)}"

@@ -52,6 +52,31 @@ def place(
     m.start_at_rest()
 
 
+def lay_down(
+    m: Mechanics,
+    robot: RobotConfig,
+    start_m: tuple[float, float],
+    heading_rad: float,
+    joint_rad: ArrayLike,
+) -> None:
+    """Put the body on a level floor, at rest, without settling: a thousandth of a second.
+
+    Its lowest link touches the floor without load. The time of the data does not change.
+
+    Raises:
+        ValueError: ``joint_rad`` is not (J,).
+
+    """
+    model, data = m.model, m.data
+    time_s = data.time
+    _pose(m, start_m, heading_rad, joint_rad)
+    data.qpos[2] -= float(_clearance_m(m, robot, None).min())
+    m.planes.lay(data)
+    mujoco.mj_forward(model, data)
+    m.start_at_rest()
+    data.time = time_s
+
+
 def float_at(
     m: Mechanics,
     robot: RobotConfig,

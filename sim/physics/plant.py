@@ -2,7 +2,6 @@
 
 import math
 from functools import partial
-from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -19,8 +18,8 @@ from snakewalk.sim.imu import Imu
 from snakewalk.sim.physics.body import build_model
 from snakewalk.sim.physics.mechanics import Mechanics, PhysicsError
 from snakewalk.sim.physics.obstacles import place_at_obstacle, start_fault
-from snakewalk.sim.physics.placing import float_at, place
-from snakewalk.sim.physics.stepper import CompiledSteps
+from snakewalk.sim.physics.placing import float_at, lay_down, place
+from snakewalk.sim.physics.stepper import Steps, make_steps
 from snakewalk.sim.plant import LinkMotion, ServoDrive
 
 FLOOR_STEP_S = 0.002
@@ -42,21 +41,8 @@ def _pose(place: Floats, pose: Floats) -> None:
     pose[3, 2] = w * w - x * x - y * y + z * z
 
 
-class Steps(Protocol):
-    """Drive, friction and ``mj_step``, a number of times."""
-
-    def run(self, steps: int, drive: ServoDrive) -> float:
-        """Advance ``steps`` steps; MuJoCo's time then."""
-        ...
-
-
 class MujocoPlant:
-    """A chain on its ground; starts straight at the origin, heading along x, at rest.
-
-    Raises:
-        PhysicsError: the memory layout of the installed MuJoCo cannot be verified.
-
-    """
+    """A chain on its ground; starts straight at the origin, heading along x, at rest."""
 
     def __init__(
         self,
@@ -84,7 +70,7 @@ class MujocoPlant:
         self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
         self._place_body((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
-        self.steps: Steps = CompiledSteps(self.mechanics)
+        self.steps: Steps = make_steps(self.mechanics)
         """The loop that advances the body."""
 
     @property
@@ -142,6 +128,22 @@ class MujocoPlant:
         fault = start_fault(self.mechanics, self.world)
         if fault is not None:
             raise InputError(f"world {self.world.name}: {fault}")
+
+    def lay_down(
+        self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
+    ) -> None:
+        """Put the body elsewhere on its level floor, at rest, between two steps.
+
+        It is quick enough for a running control loop, since the body does not settle; time, energy
+        and distance continue.
+
+        Raises:
+            ValueError: ``joint_rad`` is not (J,), or the ground is not a level, open floor.
+
+        """
+        if self.world.ground.kind != "flat" or self.world.obstacle is not None:
+            raise ValueError(f"world {self.world.name}: not a level, open floor")
+        lay_down(self.mechanics, self.robot, start_m, heading_rad, joint_rad)
 
     def set_state(self, before: Floats, now: Floats, dt_s: float) -> None:
         """Put it at MuJoCo's coordinates ``now`` (7 + J,), where it came from ``before`` in dt_s.

@@ -17,7 +17,14 @@ FEATURES: Final = (
     *("view", "exchange", "ros", "learning", "cli"),
 )
 """Packages of the controller that may import every core package, but not each other."""
-BETWEEN_FEATURES: Final[dict[tuple[str, str], str]] = {}
+BETWEEN_FEATURES: Final[dict[tuple[str, str], str]] = {
+    ("animals", "report"): "an animated skin is drawn by the film of a run",
+    ("cameras", "view"): "camera check shows its findings on the live page",
+    ("learning", "studies"): "policies are compared by the measures of a sweep",
+    ("ros", "exchange"): "a live node and an exported bag have the same messages",
+    ("studies", "repertoire"): "a replay begins where the recorded actions begin",
+    ("view", "studies"): "a page of several logs shows their comparison",
+}
 """Imports between feature packages, (from, to), each with its reason."""
 MOST_BETWEEN: Final = 10
 ORDER: Final = {
@@ -34,65 +41,8 @@ ORDER: Final = {
 }
 """All packages, from the bottom up."""
 VOCABULARY: Final = frozenset(
-    {"types", "clock", "errors", "link", "compiling", "least_squares", "attitude"}
+    {"types", "clock", "errors", "link", "compiling", "fallbacks", "least_squares", "attitude"}
 )
 """Modules of the drivers that every core package may import."""
 JOINING: Final = frozenset({"run", *FEATURES})
 """Packages of the controller that may import the bus and the simulator."""
-PENDING: Final[dict[str, frozenset[str]]] = {
-    "controller.animals.mesh.body_motion": frozenset({"controller.report.film"}),
-    "controller.animals.synthesis.synthesis_skin": frozenset({"controller.report.film"}),
-    "controller.bench.commands.cable_drop": frozenset({"controller.exchange.commands.listing"}),
-    "controller.cameras.camera_page": frozenset(
-        {"controller.view.live_view", "controller.view.page_server"}
-    ),
-    "controller.console.completion": frozenset({"controller.animals.mesh.body_motion"}),
-    "controller.console.options": frozenset(
-        {"controller.report.artifacts", "controller.run.execute"}
-    ),
-    "controller.images.mesh_files": frozenset({"controller.animals.mesh.mesh"}),
-    "controller.learning.commands.policy": frozenset({"controller.cli.watchers"}),
-    "controller.learning.policy_trials": frozenset({"controller.studies.sweep_measure"}),
-    "controller.pose.pose_provider": frozenset(
-        {
-            "controller.cameras.camera_pose",
-            "controller.cameras.device_camera",
-            "controller.cameras.rendered_camera",
-            "controller.run.backend",
-            "controller.run.prepared_run",
-        }
-    ),
-    "controller.repertoire.commands.playback": frozenset({"controller.cli.watchers"}),
-    "controller.repertoire.commands.repertoire": frozenset({"controller.cli.watchers"}),
-    "controller.report.artifacts": frozenset({"controller.animals.mesh.body_look"}),
-    "controller.report.commands.report": frozenset({"controller.animals.mesh.body_look"}),
-    "controller.report.film": frozenset({"controller.animals.mesh.bone_motion"}),
-    "controller.ros.commands.ros": frozenset(
-        {"controller.cli.watchers", "controller.exchange.body_frames", "controller.view.live_view"}
-    ),
-    "controller.ros.ros_node": frozenset({"controller.exchange.ros_messages"}),
-    "controller.run.commands.gait_run": frozenset(
-        {"controller.cli.watchers", "controller.view.live_view"}
-    ),
-    "controller.run.commands.plan": frozenset(
-        {"controller.repertoire.commands.repertoire", "controller.repertoire.repertoire_planning"}
-    ),
-    "controller.run.commands.play": frozenset({"controller.cli.watchers"}),
-    "controller.run.commands.run": frozenset(
-        {"controller.animals.mesh.body_look", "controller.cli.watchers"}
-    ),
-    "controller.run.execute": frozenset(
-        {
-            "controller.report.artifacts",
-            "controller.studies.shadow.diagnosis",
-            "controller.studies.shadow.run_shadow",
-        }
-    ),
-    "controller.run.factory": frozenset(
-        {"controller.repertoire.repertoire", "controller.repertoire.schedule_run"}
-    ),
-    "controller.run.map_provider": frozenset({"controller.mapping.stereo_head"}),
-    "controller.studies.replay": frozenset({"controller.repertoire.repertoire_run"}),
-    "controller.view.commands.view": frozenset({"controller.studies.run_comparison"}),
-}
-"""Upward imports that are still to be removed, by module."""

@@ -11,6 +11,7 @@ from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.topics import PoseTable, WalkTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import JointState
 
@@ -144,10 +145,11 @@ def make_log(
                 target += 1
                 log.event(t, "waypoint", f"waypoint {target} reached")
             going = t >= DELAY_S
-            log.pose(
+            log.add(
+                PoseTable,
                 t,
-                [*points[0], 0.03],
-                np.eye(3),
+                head_m=[*points[0], 0.03],
+                rotation=np.eye(3),
                 links_m=np.column_stack([points, np.full(links, 0.03)]),
                 centre_m=[*centre, 0.03],
                 speed_m_s=ETA * PULSE_M_S * (1 + 0.05 * np.sin(4 * t)) if going else 0.0,
@@ -161,7 +163,8 @@ def make_log(
                 choice = near if rng.random() < 0.6 else int(rng.choice([*visited, near]))
                 visited.add(choice)
                 error = float(rng.normal(0.0, 0.35))
-                log.walk(
+                log.add(
+                    WalkTable,
                     t,
                     state=choice,
                     visited=len(visited),

@@ -24,7 +24,9 @@ class ServedClock(SimClock):
             wait_s = 0.0
 
     def sleep_until_s(self, time_s: float) -> None:
-        """Let the server look as often as it does while idle."""
+        """Let the server look as often as it does while idle, first at what has been sent."""
+        if self.now_s() < time_s:
+            self.look(HAND_OVER_S)
         while self.now_s() < time_s:
             self.advance(min(IDLE_S, time_s - self.now_s()))
             self.look(0.0)

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
     Force,
     Individual,
@@ -20,8 +22,19 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.track.readers.keypoints import choice_of
+from snakewalk.controller.track.readers.load import load_keypoints
 
 
+@command(
+    "stride",
+    group=RECORDINGS,
+    examples=(
+        "stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip "
+        "--feet FL,FR,HL,HR -o mine.toml --picture stride.png",
+        "synthesise jacksboro-traverse --animal mine.toml --film",
+    ),
+)
 def stride(
     keypoints: Annotated[
         Path, typer.Argument(help="SLEAP, DeepLabCut, QTM or C3D, seen from above")
@@ -54,13 +67,6 @@ def stride(
     as_json: Json = False,
 ) -> None:
     """Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends."""
-    from snakewalk.controller.animals.legged.animal_stride import (  # noqa: PLC0415  heavy
-        Names,
-        measure_animal,
-    )
-    from snakewalk.controller.track.readers.keypoints import choice_of  # noqa: PLC0415
-    from snakewalk.controller.track.readers.load import load_keypoints  # noqa: PLC0415
-
     names = Names.of(spine, girdles, feet)
     written = [output] if picture is None else [output, picture]
     refuse_to_overwrite(written, force)
@@ -71,7 +77,7 @@ def stride(
     with atomic_write(output) as part:
         part.write_text(made.text(), encoding="utf-8")
     if picture is not None:
-        from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415
+        from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415  --picture: an extra
 
         draw_stride(made.stride, picture, f"{keypoints.name}: {made.stride.cycles:.1f} cycles")
     files = {"animal": str(output), "picture": None if picture is None else str(picture)}

@@ -2,12 +2,17 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.legged.animal_synthesis import read_animal, synthesise_animal
+from snakewalk.controller.animals.plots.animal_synthesis import draw_animal
+from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
+from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
@@ -26,15 +31,24 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
-
-if TYPE_CHECKING:
-    from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.film_look import ANIMAL
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
 """Of the files, by what is in them."""
 
 
+@command(
+    "synthesise",
+    group=MOTION,
+    examples=(
+        "synthesise -o motion",
+        "synthesise my-run.toml --seed 3 --json",
+        "synthesise jacksboro-traverse --animal lizard -o lizard --film",
+    ),
+)
 def synthesise(
     run: RunName = DEFAULT_RUN,
     output: Annotated[
@@ -74,8 +88,6 @@ def synthesise(
     as_json: Json = False,
 ) -> None:
     """Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP])."""
-    from snakewalk.controller.run.factory import prepare_walk  # noqa: PLC0415
-
     prepared = prepare_walk(
         run, keys=key_values("--set", set_), on_paper=True, seed=seed, motion=motion, robot=robot,
         world=world, track=track,
@@ -107,16 +119,12 @@ def synthesise(
 
 
 def _snake(
-    prepared: "WalkRun", frames: int | None, look: str, files: Mapping[str, Path]
+    prepared: WalkRun, frames: int | None, look: str, files: Mapping[str, Path]
 ) -> tuple[dict[str, object], bool]:
     """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
-    from snakewalk.controller.animals.mesh.body_look import ANIMAL  # noqa: PLC0415  heavy
-    from snakewalk.controller.animals.plots.snake_synthesis import draw_walk  # noqa: PLC0415
-    from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis  # noqa: PLC0415
-
     worn = None
     if "skin" in files or "film" in files:
-        from snakewalk.controller.animals.synthesis.synthesis_skin import SynthesisSkin  # noqa: PLC0415
+        from snakewalk.controller.animals.synthesis.synthesis_skin import SynthesisSkin  # noqa: PLC0415  --film and --glb: an extra
 
         worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
     elif look != ANIMAL:
@@ -135,19 +143,13 @@ def _snake(
 
 
 def _with_legs(
-    prepared: "WalkRun", frames: int | None, name: str, files: Mapping[str, Path]
+    prepared: WalkRun, frames: int | None, name: str, files: Mapping[str, Path]
 ) -> tuple[dict[str, object], bool]:
     """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
-    from snakewalk.controller.animals.legged.animal_synthesis import (  # noqa: PLC0415  heavy
-        read_animal,
-        synthesise_animal,
-    )
-    from snakewalk.controller.animals.plots.animal_synthesis import draw_animal  # noqa: PLC0415
-
     config = read_animal(name)
     body = None
     if "skin" in files or "film" in files:
-        from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415
+        from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415  --film and --glb: an extra
 
         body = AnimalBody.of(config)
     made = synthesise_animal(prepared, config, frames)

@@ -10,11 +10,12 @@ from snakewalk.config.animal import AnimalConfig, OrnamentConfig
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion
 from snakewalk.controller.animals.legged.prototype import SEGMENTS
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
-from snakewalk.controller.animals.mesh.mesh import Mesh, tube_faces, vertex_normals
+from snakewalk.controller.animals.mesh.mesh import tube_faces, vertex_normals
 from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin, Weights
 from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.images.mesh import Mesh
+from snakewalk.controller.track.bone_motion import BoneMotion
 
 _AROUND = 14
 """Corners of a ring."""

@@ -13,7 +13,7 @@ from snakewalk.config.loader import load, locate, shipped
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion, transformed
 from snakewalk.controller.animals.legged.prototype import LEGS, prototype
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.path import SplinePath
 
 ANIMALS = shipped("animals")

@@ -2,47 +2,58 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.config.world import Water
+from snakewalk.controller.animals.mesh.body_model import read_silhouettes
+from snakewalk.controller.animals.mesh.body_motion import robot_skin
+from snakewalk.controller.animals.mesh.body_skin import body_skin
+from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.run.film_look import ANIMAL
 from snakewalk.controller.runlog.record import Header
+from snakewalk.sim.rendering.looks import SkinLook
 
-if TYPE_CHECKING:
-    from snakewalk.controller.animals.mesh.rig import Rig
-    from snakewalk.sim.rendering.looks import SkinLook
-
-SERVOS: Final = "servos"
-ANIMAL: Final = "animal"
 _PLAIN = "snake"
 """The animal of a run whose recording holds no widths."""
 
 
-def check_look(look: str) -> None:
-    """Refuse a look that cannot be made, before a run.
+@plugin("look", "body")
+class BodyLook:
+    """The skin of a named body, or of a body's file."""
 
-    Raises:
-        InputError: no such skin, or an extra is missing.
+    def check(self, look: str) -> None:
+        """Reject a look that cannot be made, before a run.
 
-    """
-    if look == SERVOS:
-        return
-    require_extra("a skin needs", "trimesh")
+        Raises:
+            InputError: there is no such skin, or an extra is missing.
+
+        """
+        _check(look)
+
+    def make(self, look: str, header: Header) -> SkinLook:
+        """Return the skin of a run's film."""
+        return skin_look(look, header)
+
+
+@plugin("look", "animal")
+class AnimalLook(BodyLook):
+    """The animal of the run's recording, or a plain snake."""
+
+
+def _check(look: str) -> None:
     if look != ANIMAL:
-        from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415  an extra
-
         body_skin(look)
 
 
-def skin_look(look: str, header: Header) -> "SkinLook | None":
-    """Make the skin of a run's film; None is a capsule a link.
+def skin_look(look: str, header: Header) -> SkinLook:
+    """Make the skin of a run's film.
 
     Args:
-        look: ``servos``; ``animal``, which is the run's own recording where it holds widths, else a
+        look: ``animal``, which is the run's own recording where it holds widths, else a
             plain snake; or what ``body_skin`` takes.
         header: of the run.
 
@@ -50,13 +61,6 @@ def skin_look(look: str, header: Header) -> "SkinLook | None":
         InputError: no such skin, or an extra is missing.
 
     """
-    if look == SERVOS:
-        return None
-    require_extra("a skin needs", "trimesh", "mujoco")
-    from snakewalk.controller.animals.mesh.body_motion import robot_skin  # noqa: PLC0415  an extra
-    from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415
-    from snakewalk.controller.animals.mesh.rig import spine_rig  # noqa: PLC0415
-
     dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
     skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, Water))
@@ -66,7 +70,7 @@ def skin_look(look: str, header: Header) -> "SkinLook | None":
     return rig_look(replace(rig, rest_m=origins), dressed.texture, free=False)
 
 
-def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLook":
+def rig_look(rig: Rig, texture: Image | None, *, free: bool = True) -> SkinLook:
     """Make the look of a rig.
 
     Args:
@@ -75,8 +79,6 @@ def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLo
         free: whether its bones float, for a motion that no robot makes.
 
     """
-    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415  an extra
-
     return SkinLook(
         vertices_m=rig.mesh.vertices,
         uv=rig.mesh.uv,
@@ -91,8 +93,6 @@ def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLo
 
 def animal(track: str) -> str:
     """Name of the body that a motion was captured from: the recording's, or a plain snake."""
-    from snakewalk.controller.animals.mesh.body_model import read_silhouettes  # noqa: PLC0415
-
     try:
         read_silhouettes(Path(track))
     except InputError:

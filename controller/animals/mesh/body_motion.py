@@ -12,27 +12,25 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import Water
 from snakewalk.controller.animals.fish.postures import holds_postures, load_postures
-from snakewalk.controller.animals.mesh.bone_motion import (
-    BoneMotion,
-    even_points,
-    from_points,
-    swimming,
-)
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.console.result_files import LOG
-from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.gaits.registry import GAITS, SPINE_GAITS
 from snakewalk.controller.gaits.spine import SpineGait
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.report.film import body_qpos
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.track.bone_motion import (
+    BoneMotion,
+    even_points,
+    from_points,
+    swimming,
+)
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.drivers.types import BodyPose
 
 LOG_FPS = 25.0
 """Frames a second that are taken of a log, which holds more."""
-SWIMMERS: tuple[str, ...] = tuple(n for n, gait in GAITS.items() if issubclass(gait, SpineGait))
-"""Gaits that move a spine without a robot."""
 
 
 def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, BoneMotion]:
@@ -40,7 +38,7 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
 
     Args:
         skin: at rest.
-        source: a gait of ``SWIMMERS``; a log (``.mcap``, ``.mcap.part``, or a run's folder); or
+        source: a gait of ``SPINE_GAITS``; a log (``.mcap``, ``.mcap.part``, or a run's folder); or
             what ``load_track`` reads.
         fps: frames a second, of those there are; None takes all of a recording and 25 of a log.
 
@@ -53,7 +51,9 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
     if source in GAITS:
         gait = GAITS[source]
         if not issubclass(gait, SpineGait):
-            raise InputError(f"{source}: moves a robot, not a spine; spines: {', '.join(SWIMMERS)}")
+            raise InputError(
+                f"{source}: moves a robot, not a spine; spines: {', '.join(SPINE_GAITS)}"
+            )
         if fps is not None:
             raise InputError(f"{source}: a cycle has 24 frames; fps is for recordings and logs")
         return skin, swimming(gait(), skin.length_m)

@@ -25,10 +25,10 @@ from snakewalk.controller.animals.mesh.cross_sections import (
     ellipses,
     skin_model,
 )
-from snakewalk.controller.animals.mesh.mesh import Mesh
 from snakewalk.controller.animals.mesh.patches import Tube, fins
 from snakewalk.controller.animals.mesh.skin import Skin, carried, pde_skin
 from snakewalk.controller.animals.mesh.skin_texture import ACROSS, ALONG, painted
+from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.images.mesh_files import MESH_ENDINGS, read_mesh
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 

@@ -5,30 +5,15 @@ under the middle plane show the same pixel: the upper side's picture is mirrored
 mirror at the ellipse's centre, as the text may be read, would put a seam along both sides.)
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.animals.mesh.body_model import BodyModel
+from snakewalk.controller.images.mesh import Mesh
 
 AROUND = 32
 """Corners of a ring."""
 _CAP = 9  # rings of each tip
-
-
-@dataclass(frozen=True, slots=True)
-class Mesh:
-    """Triangles, seen from outside counter-clockwise; x forward, z up, the belly on z = 0."""
-
-    vertices: Floats
-    """(V, 3) metres, or body lengths where the body has no scale."""
-    normals: Floats
-    """(V, 3) unit length, outwards."""
-    uv: Floats
-    """(V, 2) place in the texture: along the body from the head, and across it from right (0)."""
-    faces: Ints
-    """(F, 3) indices of vertices."""
 
 
 def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
-from snakewalk.controller.animals.mesh.mesh import Mesh
 from snakewalk.controller.animals.mesh.skin import Skin, Weights, rest_fronts_m, weights
+from snakewalk.controller.images.mesh import Mesh
+from snakewalk.controller.track.bone_motion import BoneMotion
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,10 @@ from scipy.spatial import cKDTree
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.animals.mesh.cross_sections import AROUND, CrossSections
-from snakewalk.controller.animals.mesh.mesh import Mesh, tube_faces, vertex_normals
+from snakewalk.controller.animals.mesh.mesh import tube_faces, vertex_normals
 from snakewalk.controller.animals.mesh.patches import Fin, Tube
 from snakewalk.controller.animals.mesh.pde_surface import TURN
+from snakewalk.controller.images.mesh import Mesh
 
 _ROWS = 4  # of the mesh from one curve to the next
 _FIN_ROWS = 9

@@ -11,13 +11,13 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.animals.mesh.body_model import BodyModel
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion
-from snakewalk.controller.animals.mesh.mesh import Mesh
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.style import AMBER, BLUE, INK, RED, save_picture, style
+from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.images.mesh_files import SKIN_RGB
+from snakewalk.controller.track.bone_motion import BoneMotion
 
 _SUN = np.array([0.3, 0.5, 0.81])
 

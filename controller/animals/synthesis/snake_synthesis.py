@@ -10,7 +10,6 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion, from_points
 from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, graph_motion
 from snakewalk.controller.animals.synthesis.synthesis import (
     Behaviour,
@@ -26,10 +25,11 @@ from snakewalk.controller.mechanics.ground_step import (
     half_heights_m,
 )
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
-from snakewalk.controller.run.walk_run import POINTS, WalkRun
+from snakewalk.controller.run.kinds.walk_run import POINTS, WalkRun
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.shape.states import to_states
 from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.track.bone_motion import BoneMotion, from_points
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.walk.angle_track import AngleTrack
 

@@ -5,11 +5,16 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import PowerConfig
+from snakewalk.controller.bench.cable_drop import CONTACT_LIMIT_A, best_injection, drop_along
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Json, console, show
-from snakewalk.controller.exchange.commands.listing import RobotName
+from snakewalk.controller.console.options import Json, RobotName, console, show
+from snakewalk.sim.servo.supply import Cabling
 
 
+@command("robot power", examples=("robot power alternating16", "robot power my.toml --current 0.5"))
 def power(
     name: RobotName,
     current: Annotated[
@@ -26,15 +31,6 @@ def power(
     Cables and leads are those of the robot's table `power`; without one, cables as they are sold,
     and power at the first servo.
     """
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.robot import PowerConfig  # noqa: PLC0415
-    from snakewalk.controller.bench.cable_drop import (  # noqa: PLC0415
-        CONTACT_LIMIT_A,
-        best_injection,
-        drop_along,
-    )
-    from snakewalk.sim.servo.supply import Cabling  # noqa: PLC0415
-
     robot = load_robot(name)
     described = robot.power or PowerConfig()
     drop = drop_along(robot, described, current)

@@ -7,8 +7,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.config.template import robot_toml
+from snakewalk.controller.bench import chain_calibration
+from snakewalk.controller.bench.chain_calibration import SeenBend
+from snakewalk.controller.bench.eeprom_backup import back_up, backup_text
+from snakewalk.controller.bench.homing_offset import homing_written, plan_homing, without_zeros
+from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.options import Force, Json, Port, console, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.port.network_port import open_port
+from snakewalk.drivers.safety.stop_button import StopButton
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -16,6 +29,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.bench.homing_offset import HomingOffset
 
 
+@command("calibrate", group=BUS, examples=("calibrate --robot alternating16 -o my-robot.toml",))
 def calibrate(
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
     robot: Annotated[
@@ -48,22 +62,6 @@ def calibrate(
 
     Hang the robot up, or hold it: joints should carry no weight. Then lay it straight when asked.
     """
-    from snakewalk.config.errors import InputError  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415
-    from snakewalk.config.template import robot_toml  # noqa: PLC0415
-    from snakewalk.controller.bench import chain_calibration  # noqa: PLC0415
-    from snakewalk.controller.bench.eeprom_backup import back_up, backup_text  # noqa: PLC0415
-    from snakewalk.controller.bench.homing_offset import (  # noqa: PLC0415
-        homing_written,
-        plan_homing,
-        without_zeros,
-    )
-    from snakewalk.controller.bench.scan import pick_port  # noqa: PLC0415
-    from snakewalk.controller.console.result_files import refuse_to_overwrite  # noqa: PLC0415
-    from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus  # noqa: PLC0415
-    from snakewalk.drivers.port.network_port import open_port  # noqa: PLC0415
-    from snakewalk.drivers.safety.stop_button import StopButton  # noqa: PLC0415
-
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 0.0 < current <= 2.0:
@@ -121,7 +119,6 @@ def calibrate(
 
 
 def _write(out: Path, text: str) -> None:
-    from snakewalk.controller.console.result_files import atomic_write  # noqa: PLC0415
 
     with atomic_write(out) as part:
         part.write_text(text, encoding="utf-8")
@@ -145,8 +142,6 @@ class _Person:
         self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
     ) -> "SeenBend":
         """Wiggle until the answers make sense."""
-        from snakewalk.controller.bench.chain_calibration import SeenBend  # noqa: PLC0415
-
         while True:
             wiggle()
             answer = _ask(f"ID {servo_id}: which joint moved? 1 is next to the head, a = again: ")
@@ -168,7 +163,6 @@ class _Person:
 
 
 def _ask(question: str) -> str:
-    from snakewalk.config.errors import InputError  # noqa: PLC0415
 
     typer.echo(question, nl=False, err=True)
     try:

@@ -4,12 +4,23 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.loader import load_robot, load_run
+from snakewalk.controller.bench.adapter import permission
+from snakewalk.controller.bench.doctor import examine, examine_segments
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot
+from snakewalk.controller.run.backend import FILE_PORTS, on_ports, real_ports
+from snakewalk.drivers.port.port_map import is_port_map, port_map_text
 
 
+@command(
+    "doctor", group=BUS, examples=("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16")
+)
 def doctor(
     port: Annotated[
         str | None,
@@ -32,14 +43,6 @@ def doctor(
 
     Changes nothing, unless the joints are to wiggle: then the chain is set up as in a run.
     """
-    from snakewalk.config.loader import load_robot, load_run  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.adapter import permission  # noqa: PLC0415
-    from snakewalk.controller.bench.doctor import examine, examine_segments  # noqa: PLC0415
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
-    from snakewalk.controller.bench.scan import pick_port  # noqa: PLC0415
-    from snakewalk.controller.run.backend import FILE_PORTS, on_ports, real_ports  # noqa: PLC0415
-    from snakewalk.drivers.port.port_map import is_port_map, port_map_text  # noqa: PLC0415
-
     job = load_run(run)
     described = load_robot(robot if robot is not None else job.robot)
     if port is not None and (port == FILE_PORTS or is_port_map(port)):

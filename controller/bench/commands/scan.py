@@ -6,10 +6,14 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.controller.bench import scan as scanning
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.options import ChainPort, Json, console
 
 
+@command("scan", group=BUS, examples=("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))
 def scan(
     port: ChainPort = None,
     baud: Annotated[
@@ -18,9 +22,6 @@ def scan(
     as_json: Json = False,
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""
-    from snakewalk.controller.bench import scan as scanning  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.bench.port_lines import open_lines  # noqa: PLC0415
-
     scanning.check_bauds(baud or ())
     found = []
     noise: dict[str, dict[int, int]] = {}

@@ -8,13 +8,24 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.bench import emergency_stop
+from snakewalk.controller.bench.scan import check_bauds, pick_port
+from snakewalk.controller.bench.torque_off import torque_off
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import Json, console
+from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.port.port_map import is_port_map, ports_in
 
 if TYPE_CHECKING:
     from snakewalk.controller.bench.emergency_stop import StopOutcome
 
 
+@command(
+    "stop",
+    group=JOB,
+    examples=("stop", "stop --port /dev/ttyUSB0 --json", "stop runs/flat-square-walk-seed0"),
+)
 def stop(
     run: Annotated[
         str | None,
@@ -34,8 +45,6 @@ def stop(
     as_json: Json = False,
 ) -> None:
     """Stop a run at once: torque off, latched. Where no run holds the port: torque off to all."""
-    from snakewalk.controller.bench import emergency_stop  # noqa: PLC0415  --help stays quick
-
     if run is not None and port is not None:
         raise InputError("stop takes a run or --port, not both")
     who = f"snakewalk stop (process {os.getpid()})"
@@ -60,9 +69,6 @@ def stop(
 
 
 def _free_ports(port: str | None) -> list[str]:
-    from snakewalk.controller.bench.scan import pick_port  # noqa: PLC0415  heavy: the bus
-    from snakewalk.drivers.errors import PortError  # noqa: PLC0415
-    from snakewalk.drivers.port.port_map import is_port_map, ports_in  # noqa: PLC0415
 
     if port is not None and is_port_map(port):
         return ports_in(port)
@@ -73,8 +79,6 @@ def _free_ports(port: str | None) -> list[str]:
 
 
 def _torque_off(devices: Sequence[str], bauds: Sequence[int]) -> "list[StopOutcome]":
-    from snakewalk.controller.bench.scan import check_bauds  # noqa: PLC0415  heavy: the bus
-    from snakewalk.controller.bench.torque_off import torque_off  # noqa: PLC0415
 
     check_bauds(bauds)
     with stderr_console().status("") as status:

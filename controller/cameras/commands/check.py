@@ -6,11 +6,19 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.config.extras import require_extra
+from snakewalk.controller.cameras.camera_findings import camera_findings
+from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.options import VIEW_AT, Json, RunName, RunPort, Set, key_values
+from snakewalk.controller.run.factory import changed, prepare_job
+from snakewalk.controller.run.pose_provider import pose_faults
 
 
+@command(
+    "camera check",
+    examples=("camera check flat-square", "camera check my-run.toml --port /dev/ttyUSB0 --view"),
+)
 def check(
     run: RunName = "flat-square",
     port: RunPort = None,
@@ -20,27 +28,17 @@ def check(
     seconds: Annotated[float, typer.Option(min=1.0, max=36_000.0, help="how long it looks")] = 8.0,
     set_: Set = None,
     view: Annotated[bool, typer.Option("--view", help="show it in a browser meanwhile")] = False,
-    view_at: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="of the page; elsewhere it needs a token")
-    ] = VIEW_AT,
+    view_at: Annotated[str, typer.Option(metavar="HOST:PORT", help="of the page")] = VIEW_AT,
     as_json: Json = False,
 ) -> None:
     """Look through a run's camera, or the simulator's: markers, frame rate, latency, light.
 
     With --port the joints are read, never moved: turn one by hand, unevenly, for the latency.
     """
-    require_extra("a camera's check needs", "cv2", "skimage")
-    from dataclasses import replace  # noqa: PLC0415  --help stays quick
-
-    from snakewalk.controller.cameras.camera_findings import camera_findings  # noqa: PLC0415
-    from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody  # noqa: PLC0415
-    from snakewalk.controller.pose.pose_provider import pose_faults  # noqa: PLC0415
-    from snakewalk.controller.run.factory import prepare_job  # noqa: PLC0415
-
     prepared = prepare_job(run, keys=key_values("--set", set_))
     if device is not None:
         camera = prepared.run.camera.model_copy(update={"device": device})
-        prepared = replace(prepared, run=prepared.run.model_copy(update={"camera": camera}))
+        prepared = changed(prepared, run=prepared.run.model_copy(update={"camera": camera}))
     watch = CameraWatch(prepared, port)
     if watch.name == "simulated":
         job = prepared.run.model_copy(update={"pose": "camera"})
@@ -48,7 +46,7 @@ def check(
     with ExitStack() as stack:
         on_frame = nobody
         if view:
-            from snakewalk.controller.cameras.camera_page import open_camera_page  # noqa: PLC0415
+            from snakewalk.controller.cameras.camera_page import open_camera_page  # noqa: PLC0415  --view: an extra
 
             page = stack.enter_context(open_camera_page(view_at, prepared.run.camera, watch))
             on_frame = page.on_frame

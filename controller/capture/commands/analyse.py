@@ -9,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
     Individual,
     Json,
@@ -18,9 +19,17 @@ from snakewalk.controller.console.options import (
     Rate,
     console,
 )
+from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.track.analysis import analyse as measure
+from snakewalk.controller.track.readers.generated import EMBEDDED
+from snakewalk.controller.track.readers.keypoints import ALL, choice_of
+from snakewalk.controller.track.readers.load import check_rate, load_track
 
 
+@command(
+    "analyse", group=RECORDINGS, examples=("analyse worm-like", "analyse MIDLINES.csv --picture .")
+)
 def analyse(
     recordings: Annotated[
         list[str],
@@ -43,12 +52,6 @@ def analyse(
     as_json: Json = False,
 ) -> None:
     """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.track.analysis import analyse as measure  # noqa: PLC0415  heavy
-    from snakewalk.controller.track.readers.generated import EMBEDDED  # noqa: PLC0415
-    from snakewalk.controller.track.readers.keypoints import ALL, choice_of  # noqa: PLC0415
-    from snakewalk.controller.track.readers.load import check_rate, load_track  # noqa: PLC0415
-
     check_rate(rate, recordings)
     choice = choice_of(individual, keypoints, plane)
     files = _pictures(recordings, picture, force)
@@ -60,7 +63,7 @@ def analyse(
             load_track(name, *(None, None, ALL) if shipped else (rate, min_score, choice))
         )
         if file is not None:
-            from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415
+            from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415  --picture: an extra
 
             draw_analysis(one, file)
         found.append(one.facts() | {"picture": None if file is None else str(file)})

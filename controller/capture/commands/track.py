@@ -9,6 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
     Force,
     GivenRobot,
@@ -24,13 +25,24 @@ from snakewalk.controller.console.options import (
 
 if TYPE_CHECKING:
     from snakewalk.controller.capture.recording import RecordingFacts
+from snakewalk.controller.capture.recording import examine
+from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.track.readers.arrays import save_track
+from snakewalk.controller.track.readers.generated import EMBEDDED
+from snakewalk.controller.track.readers.keypoints import ALL, choice_of
+from snakewalk.controller.track.readers.load import check_rate
 
 
+@command(
+    "track",
+    group=RECORDINGS,
+    examples=("track", "track MIDLINES.csv --rate 60 --picture track.png"),
+)
 def track(
     recordings: Annotated[
         list[str] | None,
@@ -61,13 +73,6 @@ def track(
     check_picture(picture)
     refuse_to_overwrite([picture, output], force)
 
-    from snakewalk.controller.capture.recording import examine  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.track.readers.arrays import save_track  # noqa: PLC0415
-    from snakewalk.controller.track.readers.generated import EMBEDDED  # noqa: PLC0415
-    from snakewalk.controller.track.readers.keypoints import ALL, choice_of  # noqa: PLC0415
-    from snakewalk.controller.track.readers.load import check_rate  # noqa: PLC0415
-
     names = recordings or list(EMBEDDED)
     if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):
         raise InputError(f"{output}: one recording makes one .npz; {len(names)} are named")
@@ -83,7 +88,7 @@ def track(
         for name in show_progress(names, "recordings", len(names))
     ]
     if picture is not None:
-        from snakewalk.controller.capture.plots.recording import draw  # noqa: PLC0415
+        from snakewalk.controller.capture.plots.recording import draw  # noqa: PLC0415  --picture: an extra
 
         draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
     if output is not None:

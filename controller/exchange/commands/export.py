@@ -10,11 +10,25 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.exchange.flat_table import flat_tables, write_csv, write_parquet
+from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
+from snakewalk.controller.exchange.ros_bag import write_ros_bag
+from snakewalk.controller.runlog.reader import read_log
 
 
+@command(
+    "export",
+    group=JOB,
+    examples=(
+        "export runs/flat-square-walk-seed0/log.mcap --csv tables",
+        "export LOG --parquet tables --foxglove body.mcap",
+        "export LOG --ros2 bag.mcap --json",
+    ),
+)
 def export(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     csv: Annotated[
@@ -34,15 +48,6 @@ def export(
     as_json: Json = False,
 ) -> None:
     """Write a run's log as tables, as a ROS 2 bag, or for Foxglove with the body in 3-D."""
-    from snakewalk.controller.exchange.flat_table import (  # noqa: PLC0415  heavy; --help stays quick
-        flat_tables,
-        write_csv,
-        write_parquet,
-    )
-    from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene  # noqa: PLC0415
-    from snakewalk.controller.exchange.ros_bag import write_ros_bag  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
-
     _check_names(log, csv, parquet, ros2, foxglove)
     record = read_log(log)
     if record.note:

@@ -8,12 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
+from snakewalk.controller.mapping.raster_file import DEGREE, UNITS_M, RasterUnits
+from snakewalk.controller.mapping.world_file import MapWorld, map_beside
+from snakewalk.controller.terrain.elevation_map import CELL_HEIGHTS
 
 if TYPE_CHECKING:
     from snakewalk.controller.mapping.world_file import MapWorld
@@ -32,6 +37,14 @@ _LEAST, _MOST = 1e-6, 1e6
 """Of lengths, m, and of factors: what is beyond is in another unit (ours)."""
 
 
+@command(
+    "terrain from",
+    examples=(
+        "terrain from dem.tif --scale 0.002 -o hill.toml --picture hill.png",
+        "terrain from scan.pcd --crop 20,50,80,150 --scale 0.05 --fill 0.3 -o slope.toml",
+        "terrain from heights.png --cell 0.05 --height-step 0.001 -o garden.toml",
+    ),
+)
 def elevation(
     file: Annotated[
         Path,
@@ -70,18 +83,6 @@ def elevation(
     as_json: Json = False,
 ) -> None:
     """Make a world that `plan` and `run` take of a file of real ground; its holes stay known."""
-    from snakewalk.controller.mapping.elevation_file import (  # noqa: PLC0415
-        MapOptions,
-        read_elevation,
-    )
-    from snakewalk.controller.mapping.raster_file import (  # noqa: PLC0415
-        DEGREE,
-        UNITS_M,
-        RasterUnits,
-    )
-    from snakewalk.controller.mapping.world_file import MapWorld  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.terrain.elevation_map import CELL_HEIGHTS  # noqa: PLC0415
-
     positive = {
         "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
         "--cell": cell, "--height-step": height_step,
@@ -142,7 +143,6 @@ def check_world_files(
     """
     if out.suffix != ".toml":
         raise InputError(f"{out}: a world's file ends in .toml")
-    from snakewalk.controller.mapping.world_file import map_beside  # noqa: PLC0415
 
     check_picture(picture)
     results = [out, map_beside(out), picture]

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json
 from snakewalk.controller.mapping.commands.elevation import (
     Fill,
@@ -19,11 +21,20 @@ from snakewalk.controller.mapping.commands.elevation import (
     finish,
     not_positive,
 )
+from snakewalk.controller.mapping.raster_file import UNITS_M
+from snakewalk.controller.mapping.world_file import MapWorld
 
 if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
 
 
+@command(
+    "terrain from-stereo",
+    examples=(
+        "terrain from-stereo left.png right.png --calibration stereo.yml -o yard.toml",
+        "terrain from-stereo l.png r.png --calibration c.yml --height 0.5 --tilt 30 -o yard.toml",
+    ),
+)
 def stereo(
     left: Annotated[Path, typer.Argument(help="picture of the left camera")],
     right: Annotated[Path, typer.Argument(help="picture of the right camera, of the same moment")],
@@ -61,7 +72,6 @@ def stereo(
     (0, 0) of the world is below the left camera, x is where it looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
-    from snakewalk.controller.mapping.raster_file import UNITS_M  # noqa: PLC0415
     from snakewalk.controller.mapping.stereo_camera import (  # noqa: PLC0415
         read_calibration,
         rectify,
@@ -70,7 +80,6 @@ def stereo(
         CameraStand,
         stereo_ground,
     )
-    from snakewalk.controller.mapping.world_file import MapWorld  # noqa: PLC0415  --help stays quick
 
     positive = {
         "--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale,
@@ -138,8 +147,6 @@ def _picture(file: Path) -> "Image":
     import cv2  # noqa: PLC0415  an extra
     import numpy as np  # noqa: PLC0415
     from PIL import Image as Pictures  # noqa: PLC0415  an extra
-
-    from snakewalk.config.archive import check_expansion  # noqa: PLC0415  --help stays quick
 
     data = file.read_bytes()
     try:

@@ -6,10 +6,20 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.ground import build_ground
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.repertoire.crowd_film import FPS, CrowdScene, film_crowd
+from snakewalk.controller.repertoire.repertoire import load_repertoire
 
 
+@command(
+    "repertoire crowd", examples=("repertoire crowd", "repertoire crowd --bodies 300 -o herd.mp4")
+)
 def crowd(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     world: Annotated[
@@ -26,12 +36,7 @@ def crowd(
     as_json: Json = False,
 ) -> None:
     """Film many animals that wander over a terrain by recorded actions, without physics."""
-    from snakewalk.config.ground import build_ground  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.config.loader import load_robot, load_world  # noqa: PLC0415
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.repertoire.crowd_film import FPS, CrowdScene, film_crowd  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire import load_repertoire  # noqa: PLC0415
-
+    require_extra("films need", "av")
     if out.suffix != ".mp4":
         raise InputError(f"{out}: a film ends in .mp4")
     refuse_to_overwrite([out], force)

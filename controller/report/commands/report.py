@@ -5,11 +5,16 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, Look, show, write_artifacts
+from snakewalk.controller.console.options import Force, Json, Look, show
 from snakewalk.controller.console.result_files import refuse_mixture
+from snakewalk.controller.run.film_look import check_look
+from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.runlog.reader import read_log
 
 
+@command("report", group=JOB, examples=("report runs/flat-square-walk-seed0/log.mcap",))
 def report(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     out: Annotated[
@@ -18,20 +23,20 @@ def report(
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
     fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
     look: Look = "servos",
+    folders: Annotated[
+        bool, typer.Option("--folders", help="leave the folders of your files in report.html")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Make report.html, summary.json and film.mp4 again from a log."""
-    from snakewalk.controller.animals.mesh.body_look import check_look  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415  heavy; --help stays quick
-
     check_look(look)
     record = read_log(log)
     if record.note:
         LOGGER.warning("%s: %s", log, record.note)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
-    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look)
+    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look, folders=folders)
     if artifacts.report is None:
         raise SystemExit(2)
     files = artifacts.to_dict()

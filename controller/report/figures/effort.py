@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 from snakewalk.controller.figures.style import (
     AMBER,
     BLUE,
-    FLAT_V,
     GREY,
     RED,
     SKY,
@@ -16,6 +15,7 @@ from snakewalk.controller.figures.style import (
     trace,
 )
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import FLAT_V
 
 
 def effort_figure(record: RunRecord) -> Figure | None:

@@ -1,12 +1,14 @@
 """``snakewalk ros``: a robot in a ROS 2 graph."""
 
 import re
+from contextlib import nullcontext
 from typing import Annotated
 
 import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Force,
@@ -19,14 +21,31 @@ from snakewalk.controller.console.options import (
     ViewAt,
     World,
     key_values,
-    show_run,
 )
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.run.commands.gait import Param, parameters
+from snakewalk.controller.exchange.body_frames import joint_names
+from snakewalk.controller.motion.commanded import Commanded
+from snakewalk.controller.ros.ros_link import open_ros
+from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.run.commands.gait_options import Param, parameters
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import gait_by_name, prepare_commanded
+from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer
 
 _WEEK_S = 604_800.0
 
 
+@command(
+    "ros",
+    group=JOB,
+    examples=(
+        "ros",
+        "ros --robot my.toml --port /dev/ttyUSB0 --domain 7 --namespace snake",
+        "ros --robot alternating16 --gait rolling --network",
+    ),
+)
 def ros(
     robot: Robot = None,
     world: World = None,
@@ -66,24 +85,14 @@ def ros(
     as_json: Json = False,
 ) -> None:
     """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
-    from snakewalk.controller.cli.watchers import Watchers  # noqa: PLC0415  heavy
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.exchange.body_frames import joint_names  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.motion.commanded import Commanded  # noqa: PLC0415
-    from snakewalk.controller.ros.ros_link import open_ros  # noqa: PLC0415
-    from snakewalk.controller.ros.ros_options import RosOptions  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415
-    from snakewalk.controller.run.factory import gait_by_name, prepare_commanded  # noqa: PLC0415
-    from snakewalk.controller.view.live_view import open_view  # noqa: PLC0415
-
     if not timeout > 0.0:
         raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
     if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):
         raise InputError(f"--namespace {namespace}: expected a name as snake or lab/snake")
     options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
     begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
-    with open_ros(options) as link, open_view(view, view_at) as page:
-        assert link is not None, "it is asked for"
+    opened = open_observer(PAGE, view_at) if view else nullcontext()
+    with open_ros(options) as link, opened as page:
         prepared = prepare_commanded(
             lambda body, on_event: Commanded(
                 body,

@@ -6,12 +6,16 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.gamepad import Gamepad
+from snakewalk.controller.console.keyboard import Keyboard
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Compliant,
@@ -28,10 +32,18 @@ from snakewalk.controller.console.options import (
     ViewAt,
     World,
     key_values,
-    show_run,
 )
+from snakewalk.controller.console.plain_console import PlainConsole
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.motion.operator import KEYS, Operator
+from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_gait, with_compliance
+from snakewalk.controller.run.finish import by_evidence, costs_of_transport, show_run
+from snakewalk.controller.run.observer_watch import ADVICE
+from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -39,11 +51,19 @@ if TYPE_CHECKING:
     from snakewalk.controller.console.keyboard import Keyboard
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.operator import Operator
-    from snakewalk.controller.run.gait_run import GaitRun
+    from snakewalk.controller.run.kinds.gait_run import GaitRun
+    from snakewalk.controller.run.watchers import PageControls
     from snakewalk.controller.runtime.drive import OnEvent
-    from snakewalk.controller.view.live_view import LiveView
 
 
+@command(
+    "gait run",
+    examples=(
+        "gait run sidewinding --param lift_rad=0.15 --seconds 10",
+        "gait run lateral-undulation --robot yaw16 --live",
+        "gait run rolling --port /dev/ttyUSB0",
+    ),
+)
 def run_gait(
     name: Name,
     robot: Robot = None,
@@ -88,12 +108,6 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.metrics.displacement import gait_displacement  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_gait, with_compliance  # noqa: PLC0415
-
     if by not in {"blend", "cpg"}:
         raise InputError(f"--by {by}: expected blend or cpg")
     with ExitStack() as stack:
@@ -115,6 +129,8 @@ def run_gait(
         )
         prepared = replace(prepared, run=with_compliance(prepared.run, compliance))
         run = prepared.run
+        if hands is not None:
+            hands.policy = run.safety.lost_observer
         folder = stack.enter_context(run_folder(f"gait-{run.name}-{prepared.robot.name}", out))
         bar = stack.enter_context(TimeBar(run.name, seconds, _names(prepared, hands)))
         paced = (watchers is not None or prepared.make_operator is not None) and port is None
@@ -145,16 +161,18 @@ def run_gait(
         result |= {
             "frequency_hz": round(displacement.frequency_hz, 3),
             "cycles": displacement.cycles,
+        }
+        moved = {
             "forward_body_lengths_cycle": _digits(displacement.forward_bl),
             "left_body_lengths_cycle": _digits(displacement.left_bl),
             "up_body_lengths_cycle": _digits(displacement.up_bl),
             "turn_rad_cycle": _digits(displacement.turn_rad),
             "speed_m_s": _digits(displacement.speed_m_s),
         }
+        result |= by_evidence(finished, moved)
     result |= {
         "electrical_energy_j": finished.summary.electrical_energy_j,
-        "electrical_cost_of_transport": finished.summary.electrical_cost_of_transport,
-        "mechanical_cost_of_transport": finished.summary.mechanical_cost_of_transport,
+        **costs_of_transport(finished.summary),
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
     }
@@ -165,13 +183,16 @@ class _Hands:
     """What an operator has in hand: keyboard, gamepad, page."""
 
     def __init__(
-        self, devices: "list[Keyboard | Gamepad | LiveView]", page: "LiveView | None"
+        self, devices: "list[Keyboard | Gamepad | PageControls]", page: "PageControls | None"
     ) -> None:
         self._devices = devices
         self._page = page
         self._waiting: list[str] = []
         self._off = False
         self._motion: GaitMotion | None = None
+        self._lost: str | None = None
+        self.policy = "stop"
+        """``safety.lost_observer`` of the run."""
 
     @property
     def gait(self) -> str | None:
@@ -183,13 +204,27 @@ class _Hands:
         for device in self._devices:
             self._waiting += device.pressed()
         self._off = self._off or "t" in self._waiting
-        return "the operator switched torque off" if self._off else None
+        return "the operator switched torque off" if self._off else self._lost_device()
+
+    def _lost_device(self) -> str | None:
+        """Return which device with a torque-off key is gone; only warn if the run says so."""
+        local = [
+            cast("Keyboard | Gamepad", each) for each in self._devices if each is not self._page
+        ]
+        gone = [device.gone for device in local if device.gone is not None]
+        if not gone:
+            return None
+        if self.policy == "stop":
+            return f"{gone[0]}; {ADVICE}"
+        if self._lost is None:
+            self._lost = gone[0]
+            LOGGER.warning("%s; the run goes on (safety.lost_observer)", gone[0])
+        return None
 
     def operator(
         self, motion: "GaitMotion", robot: "RobotConfig", on_event: "OnEvent"
     ) -> "Operator":
         """Put the keys that were pressed in charge of a motion."""
-        from snakewalk.controller.motion.operator import Operator  # noqa: PLC0415
 
         def on_change(kind: str, text: str) -> None:
             on_event(kind, text)
@@ -213,19 +248,14 @@ class _Hands:
 
 
 def _hands(
-    stack: ExitStack, live: bool, gamepad: Path | None, page: "LiveView | None"
+    stack: ExitStack, live: bool, gamepad: Path | None, page: "PageControls | None"
 ) -> _Hands | None:
     """Open what an operator has in hand, and say what it does; None without an operator."""
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
-    from rich.console import Console  # noqa: PLC0415
 
-    from snakewalk.controller.console.gamepad import Gamepad  # noqa: PLC0415
-    from snakewalk.controller.console.keyboard import Keyboard  # noqa: PLC0415
-    from snakewalk.controller.motion.operator import KEYS  # noqa: PLC0415
-
-    devices: list[Keyboard | Gamepad | LiveView] = []
+    devices: list[Keyboard | Gamepad | PageControls] = []
     keys: list[str] = []
     if page is not None:
         devices.append(page)
@@ -235,7 +265,7 @@ def _hands(
     if gamepad is not None:
         devices.append(stack.enter_context(Gamepad(gamepad)))
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
-    Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
+    PlainConsole(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return _Hands(devices, page)
 
 

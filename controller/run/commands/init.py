@@ -6,8 +6,12 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.document import json_schema
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot, load_run, load_world, shipped
+from snakewalk.config.template import template
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
@@ -26,6 +30,11 @@ _WORLD = """The world: what the robot moves on.
 A line behind # shows a key with its default. Another ground: replace the table [ground]."""
 
 
+@command(
+    "init",
+    group=JOB,
+    examples=("init mine", "init mine --robot xl330-16", "init mine --from ramp-10-up"),
+)
 def init(
     folder: Annotated[
         Path, typer.Argument(file_okay=False, help="it is made if it is not there")
@@ -43,10 +52,6 @@ def init(
     as_json: Json = False,
 ) -> None:
     """Write run.toml, robot.toml and world.toml to change, with their schemas for editors."""
-    from snakewalk.config.document import json_schema  # noqa: PLC0415  --help stays quick
-    from snakewalk.config.loader import load_robot, load_run, load_world, shipped  # noqa: PLC0415
-    from snakewalk.config.template import template  # noqa: PLC0415
-
     if from_ is None:
         known = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
         fitting = (name for name, body in known.items() if body == (robot or "yaw16"))

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
@@ -23,9 +23,20 @@ from snakewalk.controller.console.options import (
     key_values,
     show,
 )
-from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.console.plugins import require
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.terrain.summary import path_relief, path_warnings
 
 
+@command(
+    "plan",
+    group=JOB,
+    examples=(
+        "plan",
+        "plan flat-slalom --motion serpenoid --json",
+        "plan flat-slalom --with repertoire -o plan.json --run",
+    ),
+)
 def plan(
     run: RunName = DEFAULT_RUN,
     robot: Robot = None,
@@ -55,12 +66,11 @@ def plan(
     as_json: Json = False,
 ) -> None:
     """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
-    if with_ not in {None, "repertoire"}:
-        raise InputError(f"--with {with_}: no such planner; there is: repertoire")
     if with_ is not None:
+        planner = require("planner", with_, "--with")
         if motion is not None or track is not None or seed is not None or set_:
             raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
-        _plan_with_repertoire(
+        planner.load()(
             run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,
         )  # fmt: skip
@@ -69,8 +79,6 @@ def plan(
         raise InputError(
             "--repertoire, --beam, --out, --run and --physics belong to --with repertoire"
         )
-    from snakewalk.controller.run.factory import prepare_walk  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.terrain.summary import path_relief, path_warnings  # noqa: PLC0415
 
     prepared = prepare_walk(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
@@ -123,48 +131,3 @@ def plan(
 
 def _deg(angle_rad: float) -> float:
     return round(math.degrees(angle_rad), 1)
-
-
-def _plan_with_repertoire(
-    run: str,
-    *,
-    repertoire: Path | None,
-    robot: str | None,
-    world: str | None,
-    beam: int,
-    physics: int,
-    out: Path | None,
-    carry: bool,
-    force: bool,
-    as_json: bool,
-) -> None:
-    """Search, show, and where asked save, time on the physics, and run."""
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.repertoire.commands.repertoire import carry_out  # noqa: PLC0415
-    from snakewalk.controller.repertoire.repertoire_planning import (  # noqa: PLC0415  heavy; --help stays quick
-        plan_facts,
-        plan_route,
-        save_plan,
-        search_cost,
-    )
-
-    refuse_to_overwrite([out], force)
-    if physics or carry:
-        require_extra("candidates and runs on the physics need", "mujoco")
-    job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
-    found = plan_facts(job)
-    if not as_json:
-        found["actions"] = ", ".join(job.action_names)
-    if physics:
-        with ProgressBar("candidates on the physics", physics) as bar:
-            cost = search_cost(job, physics, beam=beam, on_progress=bar.update)
-        found |= cost.to_dict()
-    if out is not None:
-        save_plan(job, out)
-        found["plan"] = str(out)
-    complete = True
-    if carry:
-        found["ran"], complete = carry_out(job, None, None, False, None, force)
-    show(found, as_json)
-    if not complete:
-        raise SystemExit(1)

@@ -6,6 +6,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -20,11 +21,20 @@ from snakewalk.controller.console.options import (
     ViewAt,
     World,
     key_values,
-    show_run,
 )
+from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_playback
+from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.watchers import watched
 
 
+@command(
+    "play",
+    group=MOTION,
+    examples=("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"),
+)
 def play(
     track: Annotated[
         str,
@@ -52,11 +62,6 @@ def play(
     as_json: Json = False,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.cli.watchers import watched  # noqa: PLC0415
-    from snakewalk.controller.console.progress import TimeBar, in_real_time  # noqa: PLC0415
-    from snakewalk.controller.run.execute import execute  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.run.factory import prepare_playback  # noqa: PLC0415
-
     prepared = prepare_playback(
         track,
         robot=robot,

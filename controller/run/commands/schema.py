@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from snakewalk.config.document import SCHEMAS, json_schema
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import Force
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.motion.policy import Policy
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -22,6 +25,7 @@ KINDS: Final = (
 """Of ``models``, known before they are built."""
 
 
+@command("schema", group=JOB, examples=("schema run", "schema robot -o robot.json"))
 def schema(
     kind: Annotated[
         str,
@@ -34,8 +38,6 @@ def schema(
     force: Force = False,
 ) -> None:
     """Print the JSON Schema of a TOML file, with which editors complete and check it."""
-    from snakewalk.config.document import json_schema  # noqa: PLC0415  --help stays quick
-
     if kind not in KINDS:
         raise InputError(f"{kind}: no such file; there are {', '.join(KINDS)}")
     refuse_to_overwrite([out], force)
@@ -49,7 +51,4 @@ def schema(
 
 def models() -> "dict[str, type[BaseModel]]":
     """Model of each kind of file."""
-    from snakewalk.config.document import SCHEMAS  # noqa: PLC0415  --help stays quick
-    from snakewalk.controller.motion.policy import Policy  # noqa: PLC0415
-
     return {**SCHEMAS, "policy": Policy}

@@ -8,9 +8,12 @@ import typer
 from rich.table import Column, Table
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.studies.run_comparison import compared_run, differing, log_names
 
 if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
@@ -19,6 +22,14 @@ _LONGEST = 44
 """Characters of a value in the table."""
 
 
+@command(
+    "compare",
+    group=JOB,
+    examples=(
+        "compare runs/flat-square-walk-seed0/log.mcap runs/flat-square-walk-seed1/log.mcap",
+        "compare runs/*/log.mcap --picture compared.png --json",
+    ),
+)
 def compare(
     logs: Annotated[list[Path], typer.Argument(help="log.mcap of two runs or more")],
     picture: Annotated[
@@ -32,12 +43,6 @@ def compare(
         raise InputError(f"{logs[0]}: one log is compared with nothing; give two or more")
     check_picture(picture)
     refuse_to_overwrite([picture], force)
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
-    from snakewalk.controller.studies.run_comparison import (  # noqa: PLC0415  heavy; --help stays quick
-        compared_run,
-        differing,
-        log_names,
-    )
 
     runs = []
     for log, name in zip(logs, log_names(logs), strict=True):
@@ -46,7 +51,7 @@ def compare(
             LOGGER.warning("%s: %s", log, record.note)
         runs.append(compared_run(record, name))
     if picture is not None:
-        from snakewalk.controller.studies.plots.run_comparison import (  # noqa: PLC0415  an extra
+        from snakewalk.controller.studies.plots.run_comparison import (  # noqa: PLC0415  --picture: an extra
             draw_comparison,
         )
 

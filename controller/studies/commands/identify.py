@@ -11,9 +11,34 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import checked, load_robot, load_world, with_keys
+from snakewalk.config.template import robot_toml, template
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Robot, World, check_files, console
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.studies.identification.friction_fit import (
+    FrictionLog,
+    fit_friction,
+    with_mass,
+)
+from snakewalk.controller.studies.identification.pendulum_fit import (
+    error_deg,
+    fit_pendulum,
+    robot_error_deg,
+)
+from snakewalk.controller.studies.identification.pendulum_log import read_pendulum_log
+from snakewalk.controller.studies.identification.servo_constants import (
+    CONSTANTS,
+    bam_text,
+    check_servo,
+    read_bam,
+    robot_comment,
+    robot_with,
+)
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -40,6 +65,17 @@ class _Outs(NamedTuple):
     robot: Path | None
 
 
+@command(
+    "identify",
+    group=BUS,
+    examples=(
+        "identify kp200.json kp800.json -o xl330.json",
+        "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
+        "identify kp400.json --start xl330.json --no-fit --json",
+        "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
+        "identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
+    ),
+)
 def identify(
     logs: Annotated[
         list[Path],
@@ -121,7 +157,6 @@ def _robot_file(robot: str | None, out: Path | None) -> _RobotFile | None:
             "to with the constants"
         )
     _check_robot_out(out)
-    from snakewalk.config.loader import load_robot  # noqa: PLC0415  heavy; --help stays quick
 
     return _RobotFile(load_robot(robot), out)
 
@@ -134,8 +169,6 @@ def _check_robot_out(out: Path | None) -> None:
 def _read_runs(
     paths: list[Path], judge: list[Path], given: "WorldConfig | None", *, lifting: bool
 ) -> "dict[Path, FrictionLog]":
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
-    from snakewalk.controller.studies.identification.friction_fit import FrictionLog  # noqa: PLC0415  heavy
 
     logs = {}
     for path in (*paths, *judge):
@@ -168,11 +201,6 @@ def _friction(
     workers: int,
     as_json: bool,
 ) -> None:
-    from snakewalk.config.loader import checked, load_world  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.config.template import template  # noqa: PLC0415
-    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.studies.identification.friction_fit import fit_friction  # noqa: PLC0415
 
     require_extra("friction from a run's log needs", "mujoco")
     refuse_to_overwrite(outs, force)
@@ -271,8 +299,6 @@ def _spine_kg(robot: "RobotConfig") -> float:
 
 
 def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path]) -> None:
-    from snakewalk.config.template import robot_toml  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.studies.identification.friction_fit import with_mass  # noqa: PLC0415
 
     after = with_mass(robot, float(f"{mass.value:.4g}")).model_copy(update={"name": out.stem})
     comment = (
@@ -295,19 +321,6 @@ def _servo(
     force: bool,
     as_json: bool,
 ) -> None:
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.studies.identification.pendulum_fit import (  # noqa: PLC0415  heavy; --help stays quick
-        error_deg,
-        fit_pendulum,
-        robot_error_deg,
-    )
-    from snakewalk.controller.studies.identification.pendulum_log import read_pendulum_log  # noqa: PLC0415
-    from snakewalk.controller.studies.identification.servo_constants import (  # noqa: PLC0415
-        CONSTANTS,
-        bam_text,
-        check_servo,
-        read_bam,
-    )
 
     if not fit and start is None:
         raise InputError("--no-fit judges constants: give them with --start FILE")
@@ -377,12 +390,6 @@ def _servo(
 
 
 def _write_robot(file: _RobotFile, found: "ServoConstants", logs: list[Path]) -> "RobotConfig":
-    from snakewalk.config.loader import with_keys  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.config.template import robot_toml  # noqa: PLC0415
-    from snakewalk.controller.studies.identification.servo_constants import (  # noqa: PLC0415
-        robot_comment,
-        robot_with,
-    )
 
     after = with_keys(robot_with(file.before, found), {"name": file.out.stem}, str(file.out))
     with atomic_write(file.out) as part:

@@ -9,11 +9,16 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.studies import replay as replaying
 
 
+@command("replay", group=JOB, examples=("replay runs/flat-square-walk-seed0/log.mcap --json",))
 def replay(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on metal")],
     tolerance_rad: Annotated[
@@ -30,10 +35,6 @@ def replay(
     if out is not None and out.resolve() == log.resolve():
         raise InputError(f"{out}: is the log itself; give another name")
     refuse_to_overwrite([out], force)
-
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
-    from snakewalk.controller.studies import replay as replaying  # noqa: PLC0415  heavy
 
     require_extra("a replay needs", "mujoco")
     record = read_log(log)

@@ -7,10 +7,23 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load_world
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Json, World, check_files, console
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of
 
 
+@command(
+    "shadow",
+    group=JOB,
+    examples=(
+        "shadow runs/gait-lateral-undulation-yaw16/log.mcap",
+        "gait run lateral-undulation --port /dev/ttyUSB0 --shadow",
+    ),
+)
 def shadow(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, on metal or simulated")],
     world: World = None,
@@ -18,11 +31,6 @@ def shadow(
     as_json: Json = False,
 ) -> None:
     """Send a log's goals to a simulated robot, and name the cause of what differs; 1 if one is."""
-    from snakewalk.config.loader import load_world  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.runlog.reader import read_log  # noqa: PLC0415
-    from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of  # noqa: PLC0415
-
     require_extra("a shadow needs", "mujoco")
     check_files(None, None, world)
     record = read_log(log)

@@ -11,9 +11,16 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Set, console, key_values
+from snakewalk.controller.console.pool import each
+from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.studies.sweep_measure import measure
+from snakewalk.controller.studies.sweep_points import plan_sweep
+from snakewalk.controller.studies.sweep_table import Table as Sweep
+from snakewalk.controller.studies.sweep_table import digest, read_table
 
 _HEADS = {
     "points": "n",
@@ -30,6 +37,14 @@ _HEADS = {
 """Columns of the printed table, units under the names; the JSON has them all."""
 
 
+@command(
+    "sweep",
+    group=MOTION,
+    examples=(
+        "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
+        "sweep --dask tcp://cluster:8786 --points 500",
+    ),
+)
 def sweep(
     gaits: Annotated[
         list[str] | None,
@@ -65,13 +80,6 @@ def sweep(
     refuse_to_overwrite([out], force=True)  # a table grows
     keys = key_values("--set", set_)
 
-    from snakewalk.controller.console.pool import each  # noqa: PLC0415
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.studies.sweep_measure import measure  # noqa: PLC0415
-    from snakewalk.controller.studies.sweep_points import plan_sweep  # noqa: PLC0415
-    from snakewalk.controller.studies.sweep_table import Table as Sweep  # noqa: PLC0415
-    from snakewalk.controller.studies.sweep_table import digest, read_table  # noqa: PLC0415
-
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds, keys=keys)
     for line in () if as_json else planned.left_out:
@@ -96,7 +104,7 @@ def sweep(
     held = read_table(out) if out.exists() else []
     rows = [asdict(one) for one in digest(held)]
     if picture is not None:
-        from snakewalk.controller.studies.plots.sweep import draw_sweep  # noqa: PLC0415
+        from snakewalk.controller.studies.plots.sweep import draw_sweep  # noqa: PLC0415  --picture: an extra
 
         draw_sweep(held, picture)
     if as_json:

@@ -13,6 +13,7 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
@@ -22,7 +23,11 @@ from snakewalk.controller.console.options import (
     TrackFile,
     console,
 )
+from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.run.factory import moves_by_gait
+from snakewalk.controller.studies import trials as study
+from snakewalk.controller.studies.trials_table import TrialsTable
 
 _HEADS = {
     "run": "run",
@@ -52,6 +57,11 @@ _HEADS = {
 _TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
 
 
+@command(
+    "trials",
+    group=JOB,
+    examples=("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
+)
 def trials(
     runs: Annotated[
         list[str] | None,
@@ -120,11 +130,6 @@ def trials(
     check_picture(picture)
     refuse_to_overwrite([picture], force)
     refuse_to_overwrite([out], force=True)  # a table grows
-
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.run.factory import moves_by_gait  # noqa: PLC0415
-    from snakewalk.controller.studies import trials as study  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.studies.trials_table import TrialsTable  # noqa: PLC0415
 
     require_extra("trials need", "mujoco")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]

@@ -9,10 +9,21 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import Json, Robot, Set, key_values, show
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.gaits.gait import fitting_robot
+from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.studies import tune as search
+from snakewalk.controller.studies.sweep_points import robot_file
 
 
+@command(
+    "tune",
+    group=MOTION,
+    examples=("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"),
+)
 def tune(
     gait: Annotated[
         str, typer.Argument(help="one of: snakewalk gait list", autocompletion=completion.GAITS)
@@ -38,12 +49,6 @@ def tune(
         raise InputError(f"{out}: a set of parameters ends in .toml")
     refuse_to_overwrite([out], force)
     keys = key_values("--set", set_)
-
-    from snakewalk.controller.console.progress import ProgressBar  # noqa: PLC0415
-    from snakewalk.controller.gaits.gait import fitting_robot  # noqa: PLC0415
-    from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415
-    from snakewalk.controller.studies import tune as search  # noqa: PLC0415  heavy; --help stays quick
-    from snakewalk.controller.studies.sweep_points import robot_file  # noqa: PLC0415
 
     require_extra("tuning needs", "mujoco")
     body = robot or fitting_robot([make_gait(gait).needs])

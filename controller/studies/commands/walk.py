@@ -7,13 +7,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.shape.walks import RULES, check_rule
+from snakewalk.controller.studies.graph_study import graph_source, run_study
 
 if TYPE_CHECKING:
     from snakewalk.controller.studies.graph_study import StudyResult
 
 
+@command(
+    "walk",
+    group=MOTION,
+    examples=("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json"),
+)
 def walk(
     graph: Annotated[
         list[str] | None,
@@ -41,10 +50,6 @@ def walk(
     check_picture(picture)
     refuse_to_overwrite([picture], force)
 
-    from snakewalk.controller.console.progress import show_progress  # noqa: PLC0415
-    from snakewalk.controller.shape.walks import RULES, check_rule  # noqa: PLC0415
-    from snakewalk.controller.studies.graph_study import graph_source, run_study  # noqa: PLC0415
-
     graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
     for spec in graphs:  # refuse bad input before any work starts
         graph_source(spec)
@@ -56,7 +61,7 @@ def walk(
         for spec, name in show_progress(cases, "walks", len(cases))
     ]
     if picture is not None:
-        from snakewalk.controller.studies.plots.walk import draw  # noqa: PLC0415
+        from snakewalk.controller.studies.plots.walk import draw  # noqa: PLC0415  --picture: an extra
 
         draw(results, picture)
     if as_json:

@@ -68,29 +68,41 @@ class Goals:
     sent_rad: Floats
     """(T, J)"""
 
-    @staticmethod
-    def of(
-        run: RunConfig,
-        robot: RobotConfig,
-        world: WorldConfig,
-        due_s: Floats,
-        sent_rad: Floats,
-        measured_rad: Floats,
-    ) -> "Goals":
-        """Return the last seconds of a run; their shadow begins where the joints were then.
 
-        Args:
-            run: the run.
-            robot: its chain.
-            world: a level floor: heading and place do not matter.
-            due_s: (T,) when the cycles were due.
-            sent_rad: (T, J) goals.
-            measured_rad: (T, J) angles.
+def is_gap(pause_s: float, run: RunConfig) -> bool:
+    """Return whether a chain whose cycles pause for so long was stopped by its bus watchdogs."""
+    return pause_s >= run.safety.watchdog_s and pause_s > 1.5 / run.cycle_hz
 
-        """
-        rows = slice(-round(MOST_S * run.cycle_hz), None)
-        pose = InitialPose(run.start_heading_rad or 0.0, measured_rad[rows][0])
-        return Goals(run, robot, world, pose, due_s[rows] - due_s[rows][0], sent_rad[rows])
+
+def last_part(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    due_s: Floats,
+    sent_rad: Floats,
+    current_a: Floats,
+    measured_rad: Floats,
+) -> tuple[Goals, Floats]:
+    """Return the last seconds of a run: its goals, and currents and angles (2, T, J) in them.
+
+    They begin after the last pause of the cycles; the shadow starts where the joints were then.
+
+    Args:
+        run: the run.
+        robot: its chain.
+        world: a level floor: heading and place do not matter.
+        due_s: (T,) when the cycles were due; one or more.
+        sent_rad: (T, J) goals.
+        current_a: (T, J) currents.
+        measured_rad: (T, J) angles.
+
+    """
+    gaps = [k for k, pause_s in enumerate(np.diff(due_s), 1) if is_gap(float(pause_s), run)]
+    first = max(len(due_s) - round(MOST_S * run.cycle_hz), gaps[-1] if gaps else 0)
+    measured = np.stack([current_a, measured_rad])[:, first:]
+    pose = InitialPose(run.start_heading_rad or 0.0, measured[1, 0])
+    since_start_s = due_s[first:] - due_s[first]
+    return Goals(run, robot, world, pose, since_start_s, sent_rad[first:]), measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,12 +272,17 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
     world = header.world if world is None else world
     check_level(world)
     count = next((k for k, verdict in enumerate(cycle.verdict) if verdict == "veto"), None)
-    due_s, measured_rad = cycle.deadline_s[:count], cycle.measured_rad[:count]
-    if len(due_s) < LEAST_S * header.run.cycle_hz:
-        raise InputError(f"the log holds less than {LEAST_S:g} s: too little to tell what differs")
-    goals = Goals.of(header.run, header.robot, world, due_s, cycle.sent_rad[:count], measured_rad)
-    rows = len(goals.since_start_s)
-    return goals, np.stack([cycle.current_a[:count], measured_rad])[:, -rows:]
+    rows = (cycle.deadline_s, cycle.sent_rad, cycle.current_a, cycle.measured_rad)
+    due_s, sent_rad, current_a, measured_rad = (each[:count] for each in rows)
+    least = LEAST_S * header.run.cycle_hz
+    if len(due_s) >= least:
+        parts = (due_s, sent_rad, current_a, measured_rad)
+        goals, measured = last_part(header.run, header.robot, world, *parts)
+        if len(goals.since_start_s) >= least:
+            return goals, measured
+    raise InputError(
+        f"the log has less than {LEAST_S:g} s without a pause: too little to tell what differs"
+    )
 
 
 def answers(goals: Goals, deviation: Deviation) -> Floats:

@@ -1,5 +1,6 @@
 """The shadow of a run: a row for each cycle, an alarm while it lasts, and the cause at its end."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
@@ -11,9 +12,19 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.controller.runlog.topics import ShadowTable
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.studies.shadow.diagnosis import LEAST_S, Goals, diagnose
+from snakewalk.controller.studies.shadow.diagnosis import (
+    LEAST_S,
+    MOST_S,
+    check_level,
+    diagnose,
+    is_gap,
+    last_part,
+)
 from snakewalk.controller.studies.shadow.shadow import Shadow
 from snakewalk.drivers.types import JointState
 
@@ -68,15 +79,20 @@ class ShadowAlarm:
         )
 
 
+@plugin("observer", "shadow")
 class RunShadow:
-    """The shadow of a run: begins where the run's joints are, logs each cycle, raises the alarm.
+    """The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.
+
+    Its simulator is built with it, before the robot has torque: that takes longer than the
+    servos' bus watchdog allows.
 
     Args:
         run: the run.
         robot: its chain.
         world: the ground that it is believed to be on.
         ground: the world's height field, where it has one.
-        pose: initial pose for joint angles (J,) as first measured.
+        initial_pose: where a simulated robot starts; None on servos, whose shadow starts at the
+            angles that are measured first.
         log: gets a row for each cycle, and the alarm.
         on_event: gets the alarm.
 
@@ -91,43 +107,72 @@ class RunShadow:
         robot: RobotConfig,
         world: WorldConfig,
         ground: HeightField | None,
-        pose: Callable[[Floats], InitialPose],
+        initial_pose: InitialPose | None,
         log: RunLog,
         on_event: Callable[[str, str], None],
     ) -> None:
-        self._of = (run, robot, world, ground)
-        self._pose, self._log, self._on_event = pose, log, on_event
-        self._rows: list[tuple[float, Floats, Floats, Floats]] = []
+        self._of = (run, robot, world)
+        self._log, self._on_event = log, on_event
+        rows = round(MOST_S * run.cycle_hz) + 1
+        self._rows: deque[tuple[float, Floats, Floats, Floats]] = deque(maxlen=rows)
         self._alarm = ShadowAlarm(robot, run.cycle_hz)
-        self._shadow: Shadow | None = None
+        self._measured_start = initial_pose is None
+        start = initial_pose or self._pose(np.zeros(robot.joint_count))
+        self._shadow = Shadow(run, robot, world, ground, start)
         self._first_s: float | None = None
+        self._last_s = 0.0
+
+    @staticmethod
+    def check(world: WorldConfig) -> None:
+        """Reject ground on which a shadow means nothing.
+
+        Raises:
+            InputError: the ground is no level, open floor.
+
+        """
+        check_level(world)
 
     def begin(self, state: JointState) -> None:
-        """Put the shadow where the joints are; before the first cycle, as it takes a while."""
-        self._shadow = Shadow(*self._of, self._pose(state.position_rad))
+        """Put the shadow where the joints are; quick, as torque is on."""
+        if self._measured_start:
+            self._shadow.restart(self._pose(state.position_rad))
 
     def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
         """Follow one cycle: its goals as sent, and the state that was read before."""
-        if self._shadow is None:
-            return
         if self._first_s is None:
             self._first_s = deadline_s
+        elif is_gap(deadline_s - self._last_s, self._of[0]):
+            self._shadow.restart(self._pose(state.position_rad))
+            self._first_s = deadline_s
+        self._last_s = deadline_s
         shadow = self._shadow.step(deadline_s - self._first_s, sent_rad)
         self._rows.append((deadline_s, sent_rad, state.current_a, state.position_rad))
-        self._log.shadow(deadline_s, shadow.position_rad, shadow.current_a)
+        self._log.add(
+            ShadowTable,
+            deadline_s,
+            position_rad=shadow.position_rad,
+            current_a=shadow.current_a,
+        )
         for text in self._alarm.update(state, shadow):
             self._log.event(deadline_s, "shadow", text, "warning")
             self._on_event("shadow", text)
 
     def end(self, time_s: float) -> None:
         """Say what explains the difference; torque is off by then, as this takes many seconds."""
-        run, robot, world, _ = self._of
-        if len(self._rows) < LEAST_S * run.cycle_hz:
+        run, robot, world = self._of
+        if not self._rows:
             return
         due_s, sent_rad, current_a, measured_rad = (
             np.array(each) for each in zip(*self._rows, strict=True)
         )
-        goals = Goals.of(run, robot, world, due_s, sent_rad, measured_rad)
-        found = diagnose(goals, np.stack([current_a, measured_rad]))
+        goals, measured = last_part(run, robot, world, due_s, sent_rad, current_a, measured_rad)
+        if len(goals.since_start_s) < LEAST_S * run.cycle_hz:
+            return
+        found = diagnose(goals, measured)
         self._log.event(time_s, "shadow", found.text(robot), "warning" if found.named else "info")
         self._on_event("shadow", found.text(robot))
+
+    def _pose(self, joint_rad: Floats) -> InitialPose:
+        """Return the pose with joints at angles (J,), heading along the run's start."""
+        run, robot, _ = self._of
+        return pose_with(robot, run.start_heading_rad or 0.0, joint_rad)

@@ -15,7 +15,7 @@ from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
 class Shadow:
-    """A chain in the simulator, from a pose on.
+    """A chain in the simulator; it is ready for the first step when it has been made.
 
     Args:
         run: start, rate and physics step.
@@ -40,7 +40,16 @@ class Shadow:
         self._chain, self._clock = backend.chain, backend.clock
         self.head_pose = cast(Callable[[], BodyPose], backend.pose)
         """Pose of its head; a simulated body always has one."""
+        self._lay_down = cast(Callable[[InitialPose], None], backend.lay_down)
         self._chain.enable()
+        self._start_s = self._clock.now_s()
+
+    def restart(self, pose: InitialPose) -> None:
+        """Put the chain at another pose, at rest, and count time from there.
+
+        It is quick enough between two cycles of a robot that has torque. The ground is level.
+        """
+        self._lay_down(pose)
         self._start_s = self._clock.now_s()
 
     def step(self, since_start_s: float, sent_rad: Floats) -> JointState:

@@ -13,7 +13,7 @@ from snakewalk.controller.cameras.overhead_camera import CameraModel
 from snakewalk.controller.kinematics.links import pose_at
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.clock import WallClock

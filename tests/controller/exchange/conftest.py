@@ -11,6 +11,15 @@ from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.topics import (
+    FrictionTable,
+    PathTable,
+    PoseTable,
+    QposTable,
+    ShadowTable,
+    WalkTable,
+    WaypointTable,
+)
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import BodyPose, ImuState, JointState
 
@@ -62,15 +71,38 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 np.zeros(joints),
                 an_attitude(k),
             )
-            file.cycle(time_s, angles, angles / 3.0, state, deadline_s=time_s, lateness_s=0.0)
+            file.cycle(
+                *(time_s, angles, angles / 3.0, state),
+                deadline_s=time_s,
+                lateness_s=0.0,
+                wire_busy_s=0.004,
+                electrical_j=0.1 * k,
+                mechanical_j=0.05 * k,
+                yield_rad=angles / 9.0,
+                verdict="clamp" if k == 3 else "pass",
+                joints=(2, 4) if k == 3 else (),
+            )
             turn = Rotation.random(random_state=k).as_matrix()
             head = rng.normal(size=3)
             angles[15] = 0.0
             body = body_in_world(robot, BodyPose(time_s, head, turn), angles)
-            file.pose(time_s, head, turn, links_m=body.link_m, centre_m=body.centre_m)
-            file.shadow(time_s, angles / 2.0, angles / 5.0)
-        file.waypoints_changed(0.2, [[2.0, 1.0], [0.0, 3.0]])
-        file.path_replanned(0.2, [[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
+            file.add(
+                PoseTable,
+                time_s,
+                **dict.fromkeys(("speed_m_s", "predicted_speed_m_s", "pulse_m_s", "path_s_m"), 0.1),
+                head_m=head,
+                rotation=turn,
+                links_m=body.link_m,
+                centre_m=body.centre_m,
+            )
+            file.add(ShadowTable, time_s, position_rad=angles / 2.0, current_a=angles / 5.0)
+        file.add(WaypointTable, 0.2, waypoints_m=[[2.0, 1.0], [0.0, 3.0]])
+        file.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
+        walk = {"heading_error_rad": 0.2, "ramp_rad": -0.1, "eta_q": 0.7}
+        file.add(WalkTable, 0.3, state=5, visited=2, candidates=4, **walk)
+        friction = {"along_95": (0.11, 0.15), "across_95": (0.5, 0.6)}
+        file.add(FrictionTable, 0.3, along=0.13, across=0.56, **friction)
+        file.add(QposTable, 0.3, qpos=np.arange(7 + joints) / 7.0)
         file.event(0.38, "trip", "joint 7: current", level="error")
     return path
 

@@ -8,10 +8,14 @@ import pytest
 
 from snakewalk.controller.exchange.flat_table import flat_tables, write_csv, write_parquet
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import TABLES
 
 UNITS = ("_rad", "_rad_s", "_a", "_s", "_m", "_m_s", "_c", "_v", "_j")
 UNITLESS = {
-    *("verdict", "reason", "joints", "target", "level", "kind", "text", "number"),
+    *("verdict", "reason", "joints", "target", "level", "kind", "text", "number", "key", "value"),
+    *("state", "visited", "candidates", "eta_q", "along", "across"),
+    *(f"{of}_95_{bound}" for of in ("along", "across") for bound in ("low", "high")),
+    *(f"qpos{k}" for k in range(23)),
     *(f"rotation_{i}{j}" for i in range(3) for j in range(3)),
 }
 
@@ -50,8 +54,7 @@ def test_parquet_gives_every_number_back(record: RunRecord, tmp_path: Path) -> N
 
 def test_units_stand_in_the_names(record: RunRecord) -> None:
     tables = {table.name: table for table in flat_tables(record)}
-    names = {"cycle", "slow", "pose", "imu", "shadow", "path", "waypoints", "event"}
-    assert set(tables) == names
+    assert set(tables) == {table.topic.table_name for table in TABLES}
     columns = [name for table in tables.values() for name in table.columns]
     flags = [f"{of}_joint{k}" for of in ("valid", "error", "hardware_error") for k in range(16)]
     assert {c for c in columns if not c.endswith(UNITS)} == UNITLESS | set(flags)

@@ -46,12 +46,21 @@ def written(record: RunRecord, path: Path) -> Messages:
 
 
 def faults(value: Any, schema: Any, where: str) -> list[str]:
-    """What of a message its schema forbids, as far as the schemas here say anything."""
-    if schema["type"] == "array":
-        ok = isinstance(value, list)
-        return [f for one in value for f in faults(one, schema["items"], where)] if ok else [where]
-    if schema["type"] != "object":
-        return [] if isinstance(value, PYTHON_TYPES[schema["type"]]) else [where]
+    """Faults of a message by its schema, as far as the schemas here say anything."""
+    if "enum" in schema:
+        return [] if value in schema["enum"] else [where]
+    kinds = [schema["type"]] if isinstance(schema["type"], str) else schema["type"]
+    if value is None:
+        return [] if "null" in kinds else [where]
+    if kinds[0] == "array":
+        ok, items = isinstance(value, list), schema.get("items")
+        if not ok or items is None:
+            return [] if ok else [where]
+        return [fault for one in value for fault in faults(one, items, where)]
+    if kinds[0] != "object":
+        return [] if isinstance(value, PYTHON_TYPES[kinds[0]]) else [where]
+    if "properties" not in schema:
+        return [] if isinstance(value, dict) else [where]
     known = schema.get("properties", {})
     wrong = [f"{where}: no {name}" for name in schema.get("required", []) if name not in value]
     wrong += [f"{where}: has {name}" for name in value if name not in known]

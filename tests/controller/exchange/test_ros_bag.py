@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.controller.exchange.body_frames import body_frames, joint_names
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
-from snakewalk.controller.runlog.record import ImuTable, RunRecord
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import ImuTable
 
 pytest.importorskip("rosbags")
 Messages = dict[str, list[tuple[int, Any]]]

@@ -17,7 +17,7 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.mapping.stereo_head import StereoHead
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_walk, with_map
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.sim.physics.plant import MujocoPlant
 from tests.helpers.command import snakewalk

@@ -7,7 +7,8 @@ import pytest
 
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import roll_rad
-from snakewalk.controller.runlog.record import Event, PlanSummary, PoseTable, RunRecord
+from snakewalk.controller.runlog.record import Event, PlanSummary, RunRecord
+from snakewalk.controller.runlog.topics import PoseTable
 
 SECONDS, HZ, PULSE_M_S, PREDICTED_M_S = 60.0, 10.0, 0.3, 0.25
 PATH_M = np.array([[0.0, 0.0], [30.0, 0.0]])

@@ -12,7 +12,8 @@ from snakewalk.controller.metrics.path_error import (
     travelled_m,
     waypoint_times_s,
 )
-from snakewalk.controller.runlog.record import PlanSummary, PoseTable, RunRecord
+from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.topics import PoseTable
 
 UNKNOWN = np.array([np.nan])
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
-from snakewalk.controller.runlog.record import CycleTable, RunRecord
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import CycleTable
 
 PERIOD_S = 0.02
 

@@ -252,3 +252,33 @@ def test_whatever_is_commanded_the_goals_keep_the_limits(
     # mean speeds of two cycles, between which one motion may end and another begin: half a cycle of
     # the one's acceleration, and a whole one of the other's
     assert bend <= 1.5 * 1.03 * ROBOT.joint_acceleration_limit_rad_s2
+
+
+def test_a_flood_of_different_faults_is_a_few_lines() -> None:
+    bench = Bench()
+    bench.run(0.5, *(JointGoals([f"arm{k}"], [0.1]) for k in range(500)))
+    assert len(bench.events) == 10
+    bench.run(1.0)
+    assert bench.events[-1] == ("refused", "490 more commands were rejected")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        JointGoals([f"joint{k}" for k in range(75_000)], [0.0] * 75_000),
+        JointGoals(["x" * 1_000_000], [0.0]),
+        JointGoals(["joint0", "joint0"], [0.1, -0.1]),
+        JointGoals(["joint0"], [math.nan]),
+        JointTrajectory(["joint0", "joint0"], np.ones(1), np.array([[0.1, -0.1]])),
+        JointTrajectory(["joint0"], np.array([math.nan]), np.zeros((1, 1))),
+        Refused("x" * 1_000_000),
+    ],
+    ids=["75000 names", "long name", "conflict", "nan", "conflict in points", "nan time", "long"],
+)
+def test_an_impossible_command_is_one_short_line_and_moves_nothing(command: Command) -> None:
+    bench = Bench()
+    goal = bench.run(0.5, command)
+    assert not goal.any()
+    ((kind, text),) = bench.events
+    assert kind == "refused"
+    assert len(text) <= 300

@@ -33,7 +33,7 @@ from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
 from snakewalk.controller.run.factory import prepare_walk
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.drivers.types import BodyPose
 
 DT_S = 0.02

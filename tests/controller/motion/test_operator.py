@@ -220,3 +220,48 @@ def test_a_pad_tells_whether_a_shoulder_is_held_and_one_that_is_gone_holds_none(
             gone.setattr(os, "read", unplugged)
             assert device.pressed() == []
         assert not device.held
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "gait=" + "x" * 500_000,
+        "frequency_hz=" + "[" * 100_000,
+        "frequency_hz=nan",
+        "frequency_hz=1e999",
+        "pad=1@soon",
+        "\ufffd=\ufffd",
+    ],
+)
+def test_a_damaged_command_of_the_page_is_one_short_line(command: str) -> None:
+    hands = Hands()
+    before = hands.operator.motion.gait.params
+    hands.press(command, command)
+    assert len(hands.said) == 1
+    assert hands.said[0].startswith("refused: ")
+    assert len(hands.said[0]) <= 320
+    assert hands.operator.motion.gait.params == before
+
+
+def test_conflicting_values_leave_the_last_and_pasted_text_holds_no_cycle_up() -> None:
+    hands = Hands()
+    hands.press("winding_rad=0.5", "winding_rad=0.6")
+    assert hands.operator.motion.gait.params.winding_rad == 0.6
+    hands.press(*["right"] * 5000)
+    assert hands.said.count("refused: 5000 keys at once; only the first 100 are carried out") == 1
+
+
+def test_pasted_text_is_read_in_parts_and_a_closed_terminal_is_known() -> None:
+    ours, theirs = pty.openpty()
+    with Keyboard(theirs) as keyboard:
+        os.write(ours, b"n" * 4000)
+        assert len(keyboard.pressed()) <= 16 * 256
+        assert keyboard.gone is None
+        os.close(ours)
+        for _ in range(3):  # what was typed before comes first
+            keyboard.pressed()
+        assert keyboard.gone is not None
+        assert keyboard.pressed() == []
+        other, keyboard._file = pty.openpty()  # there is one to restore
+    for file in (other, keyboard._file, theirs):
+        os.close(file)

@@ -1,5 +1,7 @@
 """Many bodies at once are the same as one by one; level of detail; secondary controller."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,7 +114,7 @@ def test_a_body_that_goes_brakes_before_it_rests(repertoire: Repertoire) -> None
     asked = [0.6, 0.0, 0.0, 0.0, -0.5, 0.02, 0.0, 0.6]
     chosen = [names[control.choose(speed)] for speed in asked]
     assert chosen == [
-        *("forward-fast", "brake", "rest", "rest", "reverse", "brake", "rest", "forward-fast"),
+        *("forward-fast", "brake", "rest", "rest", "reverse", "rest", "rest", "forward-fast"),
     ]
     assert names[SecondaryController(repertoire).choose(0.0)] == "rest"
 
@@ -130,6 +132,43 @@ def test_the_controller_picks_by_speed_and_by_turn(repertoire: Repertoire) -> No
     assert names[control.nearest(9.0)] == "forward-fast"
     assert names[control.nearest(0.6, 0.4)] == "left-gentle"
     assert names[control.nearest(0.6, -2.0)] == "right-sharp"
+
+
+@pytest.mark.parametrize(
+    ("asked", "name", "missing"),
+    [
+        ((-0.4, 0.3), "reverse", "goes backward and turns left"),
+        ((-0.4, -2.0), "reverse", "goes backward and turns right"),
+        ((-0.4, 0.1), "reverse", ""),
+        ((0.0, 0.9), "rest", "rests and turns left"),
+        ((0.05, 0.0), "rest", ""),
+        ((0.4, 0.3), "left-gentle", ""),
+        ((0.4, 0.1), "forward-medium", ""),
+    ],
+)
+def test_no_turn_changes_the_direction_of_travel(
+    repertoire: Repertoire, asked: tuple[float, float], name: str, missing: str
+) -> None:
+    control = SecondaryController(repertoire)
+    assert repertoire.segments[control.nearest(*asked)].name == name
+    assert control.missing(*asked) == missing
+
+
+def test_a_repertoire_without_a_direction_never_goes_the_other_way(repertoire: Repertoire) -> None:
+    kept = [s for s in repertoire.segments if s.kind != "reverse"]
+    control = SecondaryController(replace(repertoire, segments=tuple(kept)))
+    assert kept[control.choose(-0.5, 0.4)].name == "rest"
+    assert control.missing(-0.5, 0.0) == "goes backward"
+    straight = [s for s in kept if s.kind in {"forward", "rest", "brake"}]
+    control = SecondaryController(replace(repertoire, segments=tuple(straight)))
+    assert control.missing(0.5, 0.05) == "goes forward and turns left"
+    assert control.missing(0.5, 0.0) == ""
+
+
+def test_a_speed_or_turn_that_differs_much_is_far(repertoire: Repertoire) -> None:
+    control = SecondaryController(repertoire)
+    far = {(0.6, 0.9): False, (9.0, 0.0): True, (0.6, 2.0): True, (0.6, 0.5): False}
+    assert {asked: control.is_far(*asked) for asked in far} == far
 
 
 def test_a_segment_repeated_too_long_is_changed_for_one_alike(repertoire: Repertoire) -> None:

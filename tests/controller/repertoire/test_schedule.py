@@ -8,11 +8,13 @@ import pytest
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.playback import ScheduleConfig
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_run, prepare_schedule
+from snakewalk.controller.run.factory import prepare_run
 from snakewalk.drivers.types import BodyPose
+from tests.helpers.command import snakewalk
 
 
 @pytest.fixture(scope="module")
@@ -104,3 +106,50 @@ def test_what_cannot_be_played_is_said(file: Path) -> None:
             prepare_schedule(file, WANTED, **given)
     with pytest.raises(ConfigError, match="patience"):
         prepare_schedule(file, WANTED, patience=0)
+
+
+@pytest.mark.parametrize("port", [(), ("--port", "/dev/ttyUSB0")])
+def test_a_direction_that_was_not_recorded_is_rejected_before_torque(
+    file: Path, tmp_path: Path, port: tuple[str, ...]
+) -> None:
+    out = ("--out", str(tmp_path / "run"), "--no-film")
+    done = snakewalk(
+        *("repertoire", "play", str(file), "--speed=-0.4", "--turn", "0.3", *port, *out)
+    )
+    assert done.returncode == 2
+    assert "no action goes backward and turns left (-0.4 m/s, 0.3 rad/s from 0.0 s)" in done.stderr
+    assert "reverse (-0.38 m/s, 0.00 rad/s)" in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_direction_that_is_missing_for_a_moment_is_a_transition(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    speed = ((0.0, 0.6), (4.0, 0.6), (4.4, -0.4))
+    turn = ((0.0, 0.9), (4.0, 0.9), (4.4, 0.0))
+    prepare_schedule(file, ScheduleConfig(speed_m_s=speed, turn_rad_s=turn))
+    assert not caplog.messages
+    with pytest.raises(InputError, match=r"goes backward and turns left .*from 4\.2 s"):
+        prepare_schedule(file, ScheduleConfig(speed_m_s=speed, turn_rad_s=0.9))
+
+
+def test_an_action_that_is_much_slower_than_requested_is_reported(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    prepare_schedule(file, ScheduleConfig(speed_m_s=1.5))
+    assert "the nearest action to 1.5 m/s and 0 rad/s (from 0.0 s) is forward-fast" in caplog.text
+
+
+def test_a_body_that_goes_backward_comes_to_rest_without_going_forward(
+    file: Path, tmp_path: Path
+) -> None:
+    wanted = ScheduleConfig(
+        speed_m_s=((0.0, -0.4), (3.0, -0.4), (3.1, 0.0)), turn_rad_s=0.0, duration_s=7.0
+    )
+    finished = execute(prepare_schedule(file, wanted), tmp_path)
+    names = {k: s.name for k, s in enumerate(prepare_schedule(file, wanted).repertoire.segments)}
+    assert isinstance(finished.source, ScheduleMotion)
+    assert {names[one.action] for one in finished.source.played} == {"reverse", "rest"}
+    along_m = finished.record.pose.head_m[:, 0]
+    assert along_m[-1] < along_m[0] - 0.8
+    assert along_m[-1] - along_m.min() < 0.1

@@ -11,7 +11,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.report import artifacts
 from snakewalk.controller.report.film import body_qpos, film_run, speed_up
 from snakewalk.controller.runlog.reader import read_log
-from snakewalk.controller.runlog.record import QposTable, RunRecord
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import QposTable
 
 Make = Callable[..., Path]
 

@@ -45,6 +45,7 @@ from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_commanded
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.runlog.topics import PathTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
@@ -110,7 +111,7 @@ class Graph:
             name="ros",
             keys=keys,
         )
-        with _spinning(self.node):
+        with _spinning(self.node, self.robot.reject):
             finished = execute(prepared, folder, port, view=self, on_progress=on_progress)
             self._end.close(1.0)
             with suppress(EOFError):
@@ -297,7 +298,7 @@ def test_the_path_in_force_waits_for_whoever_comes_late(
         heard = client.listen(PathMessage, "/path", latched)
         client.until(lambda: heard)
         assert [pose.pose.position.x for pose in heard[0].poses] == [0.0, 2.0]
-        log.path_replanned(0.2, [[0.0, 1.0, 0.5], [2.0, 2.0, 0.4], [3.0, 2.0, 0.4]])
+        log.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4], [3.0, 2.0, 0.4]])
         graph.robot.step(1.0)
         client.until(lambda: len(heard) == 2)
     assert [pose.pose.position.y for pose in heard[1].poses] == [1.0, 2.0, 2.0]
@@ -307,7 +308,7 @@ def test_the_path_in_force_waits_for_whoever_comes_late(
 def test_nothing_is_taken_before_the_run_has_begun(graph: Graph, client: Client) -> None:
     stop = client.node.create_client(Trigger, "/snakewalk/stop")
     goals = client.node.create_publisher(JointState, "/robot_joint_command", 10)
-    with _spinning(graph.node):
+    with _spinning(graph.node, graph.robot.reject):
         client.until(lambda: stop.service_is_ready() and goals.get_subscription_count())
         answer = stop.call_async(Trigger.Request())
         goals.publish(JointState(name=["joint0"], position=[0.1]))
@@ -359,6 +360,87 @@ def test_what_the_middleware_says_is_told_in_a_line() -> None:
     said = json.loads(ours.makefile("rb").readline())
     assert "namespace" in said["fault"]
     assert "\n" not in said["fault"]
+
+
+def test_no_message_ends_the_run_or_silences_the_stop_service(
+    graph: Graph, client: Client, tmp_path: Path
+) -> None:
+    goals = client.node.create_publisher(JointState, "/robot_joint_command", 10)
+    trajectories = client.node.create_publisher(JointTrajectory, "/robot_joint_trajectory", 10)
+    gaits = client.node.create_publisher(String, "/robot_gait", 10)
+    stop = client.node.create_client(Trigger, "/snakewalk/stop")
+    names = [f"joint{k}" for k in range(75_000)]
+    soon = client.node.get_clock().now().nanoseconds // 10**9 + 1000
+    no_text = b"\0\1\0\0" + (2).to_bytes(4, "little") + b"\xff\0"
+    nested = "rolling frequency_hz=" + "[" * 100_000
+    hostile = [
+        (goals, JointState(name=names, position=[0.0] * len(names)), "names 75000 joints"),
+        (goals, JointState(name=[], position=[0.0] * len(names)), "names 0 joints"),
+        (goals, JointState(name=["x" * 2_000_000], position=[0.0]), "MB; at most 1.0 MB"),
+        (goals, JointState(name=["joint0"], position=[np.nan]), "nan is not a number"),
+        (goals, JointState(name=["joint0"] * 2, position=[0.1, -0.1]), "names a joint twice"),
+        (goals, JointState(name=["joint0"], position=[0.1, 0.2]), "1 names and 2 positions"),
+        (
+            goals,
+            JointState(header=Header(stamp=Time(sec=soon)), name=["joint0"], position=[0.1]),
+            r"s ahead; at most 1 s",
+        ),
+        (
+            trajectories,
+            JointTrajectory(joint_names=names, points=[point(1.0, *[0.0] * len(names))]),
+            "trajectory: names 75000 joints",
+        ),
+        (
+            trajectories,
+            JointTrajectory(joint_names=["joint0"], points=[point(1.0, *[0.0] * 100_000)] * 100),
+            "trajectory: .* MB; at most 1.0 MB",
+        ),
+        (
+            trajectories,
+            JointTrajectory(joint_names=["joint0"], points=[point(1.0, np.nan)]),
+            "nan is not a number",
+        ),
+        (
+            trajectories,
+            JointTrajectory(joint_names=["joint0"] * 2, points=[point(1.0, 0.1, 0.2)]),
+            "names a joint twice",
+        ),
+        (gaits, String(data="x" * 2_000_000), "no such gait"),
+        (gaits, String(data=nested), "gait|frequency_hz"),
+        (gaits, String(data="rolling frequency_hz=nan"), "frequency_hz"),
+        (gaits, String(data="rolling frequency_hz=0.2 frequency_hz=0.4"), "is given twice"),
+        (gaits, no_text, "no such gait"),
+    ]
+    answers: list[Any] = []
+
+    def script() -> Iterator[None]:
+        client.until(lambda: stop.service_is_ready() and gaits.get_subscription_count())
+        client.until(goals.get_subscription_count)
+        client.until(trajectories.get_subscription_count)
+        while not graph.robot._cycles:
+            yield
+        for publisher, message, _ in hostile:
+            publisher.publish(message)
+            client.until(lambda: graph.robot._pending)
+            yield
+            for _ in range(10):  # so that no line is left out
+                yield
+        for _ in range(1000):
+            goals.publish(JointState(name=["x" * 10_000] * 200, position=[0.0] * 200))
+        answers.append(stop.call_async(Trigger.Request()))
+        client.until(lambda: graph.robot._button._map[0])  # type: ignore[union-attr]
+
+    finished = graph.run(tmp_path / "run", script())
+    client.until(answers[0].done)
+    assert answers[0].result().success
+    assert finished.outcome.tripped == "stop requested by ROS service /snakewalk/stop"
+    refused = [event.text for event in finished.record.events if event.kind == "refused"]
+    for (_, _, why), text in zip(hostile, refused, strict=False):
+        assert re.search(why, text), text
+        assert len(text) <= 300
+        assert text.isprintable()
+    assert len(hostile) <= len(refused) <= len(hostile) + 2
+    assert np.abs(finished.record.cycle.sent_rad).max() == 0.0
 
 
 def test_servos_on_a_port_are_moved_and_switched_off(

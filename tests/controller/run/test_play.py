@@ -13,8 +13,8 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.motion.recorded import RAMP_S
 from snakewalk.controller.run.factory import prepare_playback, prepare_run, prepare_walk
-from snakewalk.controller.run.recorded_joints import recorded_joints
 from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.track.recorded_joints import recorded_joints
 from tests.helpers.in_process import leave_out_pages
 
 

@@ -13,7 +13,7 @@ from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.console.options import DEFAULT_RUN
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.runlog.reader import read_log
 
 

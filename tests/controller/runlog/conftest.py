@@ -8,8 +8,14 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
-from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.runlog.record import MotorEnergy, PlanSummary, Winding
+from snakewalk.controller.runlog.topics import (
+    FrictionTable,
+    PathTable,
+    PoseTable,
+    QposTable,
+    WalkTable,
+)
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import JointState
 
@@ -65,15 +71,19 @@ def write_log(path: Path, cycles: int) -> Path:
                 deadline_s=t,
                 lateness_s=0.0,
                 wire_busy_s=0.0046,
-                energy=MotorEnergy(0.1 * k, 0.02 * k) if k % 2 else MotorEnergy(),
+                **(MotorEnergy(0.1 * k, 0.02 * k) if k % 2 else MotorEnergy())._asdict(),
                 verdict="clamp" if k % 7 == 0 else "pass",
                 reason="rate" if k % 7 == 0 else "",
                 joints=(1, 5) if k % 7 == 0 else (),
             )
             links = None if k % 2 else np.full((JOINTS + 1, 3), 0.1 * k)
-            log.pose(t, [t, 0.0, 0.03], np.eye(3), links_m=links, centre_m=[t, 0.0, 0.03])
+            centre_m = [t, 0.0, 0.03]
+            log.add(
+                PoseTable, t, head_m=centre_m, rotation=np.eye(3), links_m=links, centre_m=centre_m
+            )
             if k % 40 == 0:
-                log.walk(
+                log.add(
+                    WalkTable,
                     t,
                     state=k,
                     visited=k // 40,
@@ -81,9 +91,16 @@ def write_log(path: Path, cycles: int) -> Path:
                     ramp_rad=-0.1,
                     candidates=3,
                 )
-                log.qpos(t, np.arange(23) + 0.5)
-        log.friction(1.0, FrictionConfig(along=0.13, across=0.56), (0.11, 0.15), (0.5, 0.6))
-        log.path_replanned(1.0, [[0.0, 1.0], [2.0, 2.0]])
+                log.add(QposTable, t, qpos=np.arange(23) + 0.5)
+        log.add(
+            FrictionTable,
+            1.0,
+            along=0.13,
+            across=0.56,
+            along_95=(0.11, 0.15),
+            across_95=(0.5, 0.6),
+        )
+        log.add(PathTable, 1.0, points_m=[[0.0, 1.0], [2.0, 2.0]])
     return path
 
 

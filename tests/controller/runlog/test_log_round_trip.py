@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from snakewalk.config.loader import digest, load_robot, load_run, load_world
 from snakewalk.controller.runlog.reader import LogError, read_log
 from snakewalk.controller.runlog.record import PlanSummary, Winding
-from snakewalk.controller.runlog.schema import TOPICS
 from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.topics import TABLES, WaypointTable
 from snakewalk.controller.runlog.writer import RunLog, part_path
 from snakewalk.drivers.types import JointState
 
@@ -88,11 +88,11 @@ def test_waypoints_that_were_set_on_the_way_are_the_plans(tmp_path: Path) -> Non
             backend="sim",
             plan=PlanSummary(np.zeros((2, 2)), first, 0.3),
         )
-        log.waypoints_changed(1.0, [*first, (3.0, 1.0)])
-        log.waypoints_changed(2.0, [first[0], (0.0, 4.0)])
-        log.waypoints_changed(3.0, np.zeros((0, 2)))
-        log.waypoints_changed(4.0, [first[0], (0.0, 4.0)])
-        log.waypoints_changed(5.0, [first[0], (0.0, 4.0), (1.0, 4.0)])
+        log.add(WaypointTable, 1.0, waypoints_m=[*first, (3.0, 1.0)])
+        log.add(WaypointTable, 2.0, waypoints_m=[first[0], (0.0, 4.0)])
+        log.add(WaypointTable, 3.0, waypoints_m=np.zeros((0, 2)))
+        log.add(WaypointTable, 4.0, waypoints_m=[first[0], (0.0, 4.0)])
+        log.add(WaypointTable, 5.0, waypoints_m=[first[0], (0.0, 4.0), (1.0, 4.0)])
     record = read_log(path)
     np.testing.assert_array_equal(record.header.plan.waypoints_m, [[1, 0], [0, 4], [1, 4]])
     assert record.header.plan.set_s is not None
@@ -138,7 +138,7 @@ def test_other_readers_see_schemas_and_the_injected_time(write: Write, tmp_path:
         reader = make_reader(file, validate_crcs=True)
         summary = reader.get_summary()
         assert summary is not None
-        assert {c.topic for c in summary.channels.values()} == set(TOPICS)
+        assert {c.topic for c in summary.channels.values()} == {t.topic.name for t in TABLES}
         for schema, channel, message in reader.iter_messages():
             assert schema is not None
             assert schema.encoding == "jsonschema"
@@ -196,7 +196,7 @@ def test_reading_says_what_is_wrong(tmp_path: Path) -> None:
 
 
 def test_a_log_of_before_opens_without_energies(write: Write, tmp_path: Path) -> None:
-    rows: dict[str, list[dict[str, object]]] = {topic: [] for topic in TOPICS}
+    rows: dict[str, list[dict[str, object]]] = {t.topic.name: [] for t in TABLES}
     with write(tmp_path / "run.mcap", 5).open("rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages():
             row = json.loads(message.data)

@@ -103,3 +103,69 @@ def test_a_stopped_page_holds_the_end_of_a_run_up_no_longer_than_it_may() -> Non
     run, _, _ = ends()
     run.add("/config", b"x" * 5_000_000)
     run.close(0.01)
+
+
+def test_a_line_that_is_too_long_is_rejected_and_the_next_arrives() -> None:
+    run, _, far = ends()
+    for part in (b"x" * 100_000,) * 12:
+        far.sendall(part)
+        assert run.commands() == []
+    far.sendall(b'"]}\nfrequency_hz=0.4\n')
+    assert run.commands() == ["frequency_hz=0.4"]
+    assert run.rejected() == ["a command of 1.2 MB; at most 1.0 MB is accepted"]
+    assert run.rejected() == []
+    far.sendall(b"x" * 100_000 + b"\n")
+    assert [len(line) for line in run.commands()] == [100_000]
+
+
+def test_of_a_flood_the_newest_hundred_are_kept_and_the_rest_is_reported() -> None:
+    run, _, far = ends()
+    far.sendall(b"".join(b"%d\n" % k for k in range(1000)))
+    assert run.commands() == [str(k) for k in range(900, 1000)]
+    assert set(run.rejected()) == {"more than 100 commands at once; the oldest are dropped"}
+
+
+def test_an_observer_never_waits_for_a_run_that_does_not_receive() -> None:
+    run, page, _ = ends()
+    for k in range(100):
+        page.command(f"{k}:" + "x" * 200_000)
+        page.ask()
+        assert list(page.rows(0.0)) == []
+    assert sum(map(len, page._waiting)) <= 4 << 20
+    arrived: list[str] = []
+    while page._has_more:
+        arrived += run.commands()
+        list(page.rows(0.0))
+    arrived += run.commands() + run.commands()
+    assert {len(line.partition(":")[2]) for line in arrived} == {200_000}, "only whole lines"
+    assert arrived[-1].startswith("99:")
+    run.add("/cycle", b"{}")
+    run.add("/pose", b"{}")
+    assert [topic for topic, _ in page.rows(1.0)] == ["/cycle", "/pose"], "no request was dropped"
+
+
+def test_an_observer_that_closed_or_stopped_is_known() -> None:
+    run, page, far = ends()
+    now_s = 0.0
+
+    def cycles(seconds: float, step_s: float = 0.02) -> bool:
+        nonlocal now_s
+        for _ in range(round(seconds / step_s)):
+            now_s += step_s
+            cycle(run, 1)
+            silent = run.is_silent(now_s)
+        return silent
+
+    assert not cycles(10.0), "it may still build its scene"
+    for _ in range(3):
+        page.ask()
+        assert not cycles(2.0)
+    assert cycles(1.5), "it was sent rows and has not asked again"
+    page.ask()
+    assert not cycles(1.0)
+    now_s += 100.0  # the run stood still, not the page
+    assert not run.is_silent(now_s)
+    assert not run.is_closed
+    far.close()
+    cycle(run, 2)
+    assert run.is_closed

@@ -11,7 +11,7 @@ pytest.importorskip("viser")
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from snakewalk.controller.view.browser_gamepad import SCRIPT, BrowserGamepad
+from snakewalk.controller.view.browser_gamepad import SCRIPT, BrowserGamepad, read_state
 from snakewalk.controller.view.dead_man import STALE_S, WITHOUT, DeadMan, hold_command
 from snakewalk.controller.view.page_server import open_page
 
@@ -159,14 +159,17 @@ def test_the_page_has_the_script_and_its_socket_is_behind_the_gate(
     assert answer.getheader("Content-Encoding") == "identity"
     line.close()
     address = f"ws://127.0.0.1:{port}/gamepad"
+    own = {"Origin": f"http://127.0.0.1:{port}"}
     for headers, status in (
-        ({}, 401),
+        ({}, 403),
+        (own, 401),
+        (cookie, 403),
         (cookie | {"Origin": "http://evil.example"}, 403),
     ):
         with pytest.raises(InvalidStatus) as refused, connect(address, additional_headers=headers):
             pass
         assert refused.value.response.status_code == status
-    with connect(address, additional_headers=cookie) as socket:
+    with connect(address, additional_headers=cookie | own) as socket:
         for message in (state(), state(4, 1)):
             socket.send(message)
             assert socket.recv(10.0) == "taken"
@@ -177,3 +180,42 @@ def test_the_page_has_the_script_and_its_socket_is_behind_the_gate(
         with pytest.raises(ConnectionClosed):
             socket.recv(10.0)
     assert gamepad.commands() == [hold_command(False, gamepad._told_s)]
+
+
+NO_STATE = [
+    "[" * 1900,
+    '{"a":' * 390,
+    "[1]",
+    "7",
+    '"x"',
+    '{"axes":[1e999],"buttons":[],"name":"","mapping":""}',
+    json.dumps({"axes": [10**400], "buttons": [], "name": "", "mapping": "standard"}),
+]
+
+
+@pytest.mark.parametrize("text", NO_STATE, ids=range(len(NO_STATE)))
+def test_what_is_no_state_of_a_gamepad_is_a_value_error(text: str) -> None:
+    with pytest.raises(ValueError):  # noqa: PT011
+        read_state(text)
+
+
+DAMAGED = [
+    "pad=1@",
+    "pad=1",
+    "pad=1@soon",
+    "pad=1@nan",
+    "pad=1@inf",
+    "pad=1@5.2",
+    "pad=",
+    "pad=2",
+]
+
+
+@pytest.mark.parametrize("command", DAMAGED)
+def test_a_damaged_or_future_word_of_a_gamepad_moves_nothing_and_is_handed_on(command: str) -> None:
+    dead_man = DeadMan(lambda: 5.0)
+    assert dead_man.sort_out([hold_command(False, 4.9)]) == []
+    assert dead_man.sort_out([command, "d"]) == [command, "d"]
+    assert not dead_man.held
+    assert dead_man.sort_out([hold_command(True, 5.0)]) == []
+    assert dead_man.held

@@ -72,7 +72,7 @@ def browsed(child: subprocess.Popen[str], width: int = 700, script: str = "") ->
     playwright = pytest.importorskip("playwright.sync_api")
     assert child.stderr is not None
     line = child.stderr.readline()
-    url = re.search(r"http://127\.0\.0\.1:\d+", line)
+    url = re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", line)
     assert url is not None, line + child.stderr.read()
     with playwright.sync_playwright() as play:
         browser = play.chromium.launch(

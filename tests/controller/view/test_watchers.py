@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snakewalk.controller.cli.watchers import Watchers, watched
+from snakewalk.controller.run.watchers import Watchers, watched
 
 
 class Taker:

@@ -135,7 +135,8 @@ def test_what_cannot_be_is_refused_in_a_sentence(command: str, why: str) -> None
     live = Live()
     before_m = live.motion.waypoints_m
     live.steps(1, command, "frequency_hz=0.4", "q")
-    assert live.said == [("refused", why)]
+    others = ["frequency_hz=0.4: no command for waypoints", "q: no command for waypoints"]
+    assert live.said == [("refused", text) for text in (why, *others)]
     assert live.motion.waypoints_m is before_m
 
 
@@ -167,3 +168,31 @@ def test_a_walk_without_waypoints_rests_and_goes_on_to_another(motion: str) -> N
     assert pulses_m_s[99] == pytest.approx(pulses_m_s[-1], rel=0.1)
     assert pulses_m_s[199] == 0.0
     assert np.abs(np.diff(pulses_m_s)).max() < 0.05 * max(pulses_m_s)
+
+
+DAMAGED = [
+    "waypoint=nan,0",
+    "next=1e9,x",
+    "next=" + "[" * 100_000,
+    "pad=1@soon",
+    "x" * 900_000,
+    "=",
+]
+
+
+@pytest.mark.parametrize("command", DAMAGED, ids=range(len(DAMAGED)))
+def test_a_damaged_command_is_one_short_line(command: str) -> None:
+    live = Live()
+    before_m = live.motion.waypoints_m
+    live.steps(5, command, command)
+    ((kind, text),) = live.said
+    assert kind == "refused"
+    assert len(text) <= 300
+    assert live.motion.waypoints_m is before_m
+
+
+def test_more_commands_than_a_person_clicks_are_not_all_carried_out() -> None:
+    live = Live()
+    live.steps(1, *(f"waypoint=1,{k}" for k in range(1, 30)))
+    assert len(live.motion.waypoints_m) == 11
+    assert live.said[-1] == ("refused", "29 commands at once; only the first 10 are carried out")

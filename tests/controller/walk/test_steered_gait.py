@@ -13,7 +13,7 @@ from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job, prepare_run, prepare_walk
-from snakewalk.controller.run.steered_run import SteeredRun
+from snakewalk.controller.run.kinds.steered_run import SteeredRun
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, TURN_LIMIT, SteeredGait

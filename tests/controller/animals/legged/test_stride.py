@@ -16,7 +16,7 @@ from snakewalk.controller.animals.legged.animal_synthesis import (
 )
 from snakewalk.controller.animals.legged.stride import measure_stride
 from snakewalk.controller.run.factory import prepare_job
-from snakewalk.controller.run.walk_run import WalkRun
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.track.readers.keypoints import choice_of
 from snakewalk.controller.track.readers.load import load_keypoints
 from tests.helpers.command import snakewalk

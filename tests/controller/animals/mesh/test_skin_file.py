@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.mesh.body_model import spindle
-from snakewalk.controller.animals.mesh.bone_motion import BoneMotion, even_points, from_points
 from snakewalk.controller.animals.mesh.cross_sections import ellipses
 from snakewalk.controller.animals.mesh.patches import Tube
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin, pde_skin
 from snakewalk.controller.animals.mesh.skin_file import Y_UP, write_skin
+from snakewalk.controller.track.bone_motion import BoneMotion, even_points, from_points
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.track import Track
 from tests.oracles.gltf_player import GltfPlayer

@@ -7,7 +7,13 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run.deviation import Deviation
-from snakewalk.controller.studies.shadow.diagnosis import Cause, Goals, Signatures, answers
+from snakewalk.controller.studies.shadow.diagnosis import (
+    Cause,
+    Goals,
+    Signatures,
+    answers,
+    last_part,
+)
 
 JOINTS, HZ, SECONDS = 4, 50.0, 4.0
 
@@ -20,7 +26,8 @@ def goals() -> Goals:
     due_s = np.arange(SECONDS * HZ) / HZ
     phase = 2.0 * np.pi * (0.5 * due_s[:, np.newaxis] - np.arange(JOINTS) / JOINTS)
     sent_rad = 0.5 * np.minimum(due_s, 1.0)[:, np.newaxis] * np.sin(phase)
-    return Goals.of(run, robot, load_world("flat"), due_s, sent_rad, sent_rad)
+    current_a = np.zeros_like(sent_rad)
+    return last_part(run, robot, load_world("flat"), due_s, sent_rad, current_a, sent_rad)[0]
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,12 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.console.result_files import SUMMARY
 from snakewalk.controller.metrics.comparison import compare
 from snakewalk.controller.run import backend, execute
 from snakewalk.controller.run.deviation import Deviation
 from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.studies.shadow.diagnosis import MOST_S, goals_of
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A
 
 
@@ -55,6 +57,21 @@ def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     said = json.loads(ended.stdout)  # the log alone says the same
     assert (ended.exit_code, said["named"], said["at"]) == (1, "weaker servo", 1)
     assert said["text"] == events[-1]
+
+
+def test_a_run_of_half_a_minute_is_judged_by_its_last_seconds(tmp_path: Path) -> None:
+    finished = execute.execute(short_run(30.0), tmp_path / "run", shadow=True, stoppable=False)
+    record = finished.record
+    assert record.cycle.time_s[-1] - record.cycle.time_s[0] > 30.0
+    assert len(record.shadow.time_s) == len(record.cycle.time_s)
+    events = [event.text for event in record.events if event.kind == "shadow"]
+    assert len(events) == 1
+    assert events[0].startswith("nothing differs from the shadow")
+    assert (finished.log.parent / SUMMARY).is_file()
+    goals, measured = goals_of(record)
+    assert measured.shape == (2, *goals.sent_rad.shape)
+    np.testing.assert_array_equal(measured[1], record.cycle.measured_rad[-len(measured[1]) :])
+    assert goals.since_start_s[-1] == pytest.approx(MOST_S, abs=0.03)
 
 
 def test_a_robot_as_told_is_its_shadow_and_a_shadow_changes_nothing(tmp_path: Path) -> None:

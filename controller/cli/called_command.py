@@ -1,0 +1,80 @@
+"""A command as it is called: it checks its words and files first, and reports at a chosen level."""
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.messages import messages
+from snakewalk.controller.console.options import (
+    LogFile,
+    LogLevel,
+    Quiet,
+    Verbose,
+    check_files,
+    check_idle,
+)
+
+
+class CalledCommand(TyperCommand):
+    """A command that refuses a value which would replace another one of the same option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Read the words behind a command's name."""
+        words = list(args)
+        rest = super().parse_args(ctx, args)  # --help ends here
+        if not ctx.resilient_parsing:  # of completion
+            order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
+            for option in dict.fromkeys(order):
+                if order.count(option) > 1 and _takes_one_value(option):
+                    told = f"given {order.count(option)} times, and takes one value: leave one"
+                    raise typer.BadParameter(told, ctx=ctx, param=option)
+        return rest
+
+
+def _takes_one_value(option: Any) -> bool:
+    """Whether a second value of an option replaces the first; a flag that only sets does not."""
+    return not (option.multiple or (option.is_flag and not option.secondary_opts))
+
+
+def with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of what it says, and check the files that it names first.
+
+    Faults in these files are told before anything heavy is imported.
+    """
+    signature = inspect.signature(function, eval_str=True)
+    defaults = {name: one.default for name, one in signature.parameters.items()}
+
+    @wraps(function)
+    def command(
+        *, verbose: Verbose, quiet: Quiet, log_level: LogLevel, log_file: LogFile, **options: Any
+    ) -> Any:
+        if (log_level is not None) + verbose + quiet > 1:
+            raise InputError("--verbose, --quiet and --log-level say the same thing: leave one")
+        check_idle(options, defaults)
+        level = log_level or ("debug" if verbose else "warning" if quiet else "info")
+        with messages(level, log_file):
+            named = {key: value for key, value in options.items() if isinstance(value, str)}
+            check_files(named.get("run"), named.get("robot"), named.get("world"))
+            return function(**options)
+
+    own = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        for name, kind, default in (
+            ("verbose", Verbose, False),
+            ("quiet", Quiet, False),
+            ("log_level", LogLevel, None),
+            ("log_file", LogFile, None),
+        )
+    ]
+    paragraphs = (inspect.getdoc(function) or "").split("\n\n")
+    command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
+    command.__annotations__ = function.__annotations__ | {one.name: one.annotation for one in own}
+    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[*signature.parameters.values(), *own]
+    )
+    return command

@@ -1,0 +1,51 @@
+"""Declaration of a command: its words, its group in ``--help``, and runnable examples."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+F = TypeVar("F", bound=Callable[..., object])
+T = TypeVar("T")
+
+JOB: Final = "The job"
+MOTION: Final = "Motion"
+RECORDINGS: Final = "Recordings"
+BUS: Final = "The bus"
+"""Groups of ``snakewalk --help``."""
+_ATTRIBUTE: Final = "snakewalk_command"
+
+
+@dataclass(frozen=True, slots=True)
+class CommandInfo:
+    """Words, group and examples of a command."""
+
+    words: str
+    """``scan``, or ``bus serve`` for a command of a family."""
+    group: str
+    """Group in ``--help``; the family's own where it is empty."""
+    examples: tuple[str, ...]
+    """Command lines without the leading ``snakewalk``."""
+
+
+def command(words: str, *, group: str = "", examples: tuple[str, ...] = ()) -> Callable[[F], F]:
+    """Declare a function as a command; ``python -m tests.architecture.manifests`` lists it."""
+
+    def declare(function: F) -> F:
+        setattr(function, _ATTRIBUTE, CommandInfo(words, group, examples))
+        return function
+
+    return declare
+
+
+def command_info(function: Callable[..., object]) -> CommandInfo:
+    """Return the declaration of a command's function."""
+    info = getattr(function, _ATTRIBUTE)
+    assert isinstance(info, CommandInfo)
+    return info
+
+
+def plugin(kind: str, name: str) -> Callable[[T], T]:
+    """Declare an object as a plug-in of a kind of ``console.plugins.KINDS``."""
+    assert kind
+    assert name
+    return lambda target: target

@@ -1,0 +1,154 @@
+"""Registry of plug-ins: what each package offers, found without importing the packages.
+
+A package lists its plug-ins in a manifest: a module without imports whose ``PLUGINS`` is a tuple of
+``(kind, name, help, "module:attribute", group)``. The manifests of snakewalk's own packages are
+``snakewalk/controller/*/manifest.py``. Another distribution declares an entry point of the group
+``snakewalk.plugins`` that names its manifest. The module of a plug-in is imported when the plug-in
+is used. ``docs/how-to/add-a-plug-in.md`` shows one of each kind.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, Final
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.messages import LOGGER
+
+ENTRY_POINTS: Final = "snakewalk.plugins"
+"""Group of the entry points of other distributions."""
+KINDS: Final = ("command", "run", "motion", "pose", "map", "observer", "look", "planner", "results")
+"""Kinds of plug-ins."""
+OWN: Final = "snakewalk"
+
+
+class PluginError(InputError):
+    """A plug-in cannot be imported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """One plug-in, as a manifest lists it."""
+
+    kind: str
+    """One of ``KINDS``."""
+    name: str
+    """Words of a command; the value of an option for the other kinds."""
+    help: str
+    """One line."""
+    target: str
+    """``module:attribute``."""
+    group: str
+    """Group of a command in ``--help``."""
+    package: str
+    """Distribution, or package of snakewalk, that provides it."""
+
+    def load(self) -> Any:
+        """Import the plug-in.
+
+        Raises:
+            PluginError: its module does not import, or has no such attribute.
+
+        """
+        module, _, attribute = self.target.partition(":")
+        try:
+            return getattr(import_module(module), attribute)
+        except InputError:
+            raise
+        except Exception as error:
+            if self.package.startswith(f"{OWN}."):
+                raise
+            raise PluginError(
+                f"{self.kind} {self.name} of {self.package}: cannot be imported "
+                f"({type(error).__name__}: {error}); repair or uninstall {self.package}"
+            ) from error
+
+
+def plugins(kind: str | None = None) -> tuple[Plugin, ...]:
+    """Return all plug-ins, or those of one kind; snakewalk's own come first."""
+    return tuple(each for each in (*own_plugins(), *foreign_plugins()) if kind in (None, each.kind))
+
+
+def find(kind: str, name: str) -> Plugin | None:
+    """Return a plug-in; snakewalk's own wins over another one of the same name."""
+    for offered in (own_plugins, foreign_plugins):
+        for each in offered():
+            if each.kind == kind and each.name == name:
+                return each
+    return None
+
+
+def names(kind: str) -> list[str]:
+    """Return the names of all plug-ins of a kind."""
+    return list(dict.fromkeys(each.name for each in plugins(kind)))
+
+
+def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Plugin:
+    """Return a plug-in that an option names.
+
+    Args:
+        kind: one of ``KINDS``.
+        name: the value of the option.
+        option: how a message names the option.
+        others: further valid values, which are no plug-ins.
+
+    Raises:
+        InputError: there is none; lists the valid values.
+
+    """
+    found = find(kind, name)
+    if found is None:
+        raise InputError(unknown(option, name, [*others, *names(kind)]))
+    return found
+
+
+def unknown(option: str, name: str, valid: Iterable[str]) -> str:
+    """Say that a value is unknown, and which one was probably meant."""
+    valid = list(dict.fromkeys(valid))
+    near = get_close_matches(name, valid, 1, 0.7)
+    meant = f"did you mean {near[0]}? " if near else ""
+    return f"{option} {name}: unknown; {meant}valid: {', '.join(valid)}"
+
+
+@cache
+def own_plugins() -> tuple[Plugin, ...]:
+    """Return the plug-ins of snakewalk's own packages."""
+    manifests = sorted(Path(__file__).parents[1].glob("*/manifest.py"))
+    return tuple(
+        plugin
+        for file in manifests
+        for plugin in _read(
+            import_module(f"snakewalk.controller.{file.parent.name}.manifest").PLUGINS,
+            f"{OWN}.{file.parent.name}",
+        )
+    )
+
+
+@cache
+def foreign_plugins() -> tuple[Plugin, ...]:
+    """Return the plug-ins of other distributions; a broken manifest is one warning line."""
+    return tuple(plugin for entry in entry_points(group=ENTRY_POINTS) for plugin in _of(entry))
+
+
+def _of(entry: EntryPoint) -> Iterator[Plugin]:
+    package = entry.dist.name if entry.dist is not None else entry.value
+    try:
+        yield from _read(entry.load().PLUGINS, package)
+    except Exception as error:
+        LOGGER.warning(
+            "plug-ins of %s: ignored, its manifest cannot be read (%s: %s)",
+            *(package, type(error).__name__, error),
+        )
+
+
+def _read(rows: Iterable[tuple[str, ...]], package: str) -> list[Plugin]:
+    found = []
+    for kind, name, about, target, *group in rows:
+        if kind not in KINDS:
+            raise ValueError(f"unknown kind {kind!r}; valid: {', '.join(KINDS)}")
+        found.append(Plugin(kind, name, about, target, "".join(group), package))
+    return found

@@ -1,0 +1,19 @@
+"""A mesh of triangles with a texture."""
+
+from dataclasses import dataclass
+
+from snakewalk.config.arrays import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles, seen from outside counter-clockwise; x forward, z up, the belly on z = 0."""
+
+    vertices: Floats
+    """(V, 3) metres, or body lengths where the body has no scale."""
+    normals: Floats
+    """(V, 3) unit length, outwards."""
+    uv: Floats
+    """(V, 2) place in the texture: along the body from the head, and across it from right (0)."""
+    faces: Ints
+    """(F, 3) indices of vertices."""

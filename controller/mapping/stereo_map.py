@@ -1,0 +1,79 @@
+"""The robot's stereo head as a map source: the ground is known as far as the head has seen it."""
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+
+import numpy as np
+
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.console.result_files import MAP
+from snakewalk.controller.mapping.stereo_head import StereoHead
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.map_provider import MapContext, MapProvider
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.drivers.types import BodyPose, JointState
+
+
+@plugin("map", "stereo")
+class StereoMap:
+    """A map from the pictures of the robot's stereo head."""
+
+    def faults(self, prepared: PreparedRun, *, on_port: bool) -> list[str]:
+        """Return why the head cannot map the ground here, one line per fault."""
+        run, robot = prepared.run, prepared.robot
+        faults = []
+        if robot.stereo_head is None:
+            faults.append(
+                f"mapping: robot {robot.name} has no stereo head: describe it in its file, table "
+                "[stereo_head], or take alternating16-stereo"
+            )
+        if on_port:
+            faults.append("mapping: pictures are the simulator's; on servos give the world's map")
+        if run.motion not in ("walk", "serpenoid"):
+            faults.append(f"mapping: motion {run.motion} plans once; take walk or serpenoid")
+        if prepared.ground is None:
+            faults.append(f"mapping: world {prepared.world.name} is level; there is nothing to map")
+        if not run.pose_is_true:
+            faults.append(
+                f"mapping: pose {run.pose} knows no heights; the pictures' places come from the "
+                "simulator, as from a motion capture"
+            )
+        return faults
+
+    @contextmanager
+    def open(self, context: MapContext) -> Iterator[MapProvider]:
+        """Map the ground on the way; the map is left in the run's folder.
+
+        Raises:
+            OffscreenError: nothing here draws without a screen.
+
+        """
+        prepared, backend = context.prepared, context.backend
+        measure, folder, on_event = context.measure, context.folder, context.on_event
+        provider = MapProvider(measure)
+        if not isinstance(prepared, WalkRun) or prepared.ground_map is None:
+            yield provider
+            return
+        ground, clock, ground_map = prepared.ground, backend.clock, prepared.ground_map
+        assert ground is not None
+        assert backend.qpos is not None
+        assert backend.pose is not None
+        provider.ground_map, provider.true_ground = ground_map, ground
+        ground_map.clear()
+        made = StereoHead(
+            prepared.run, prepared.robot, prepared.world, ground, backend.qpos, ground_map
+        )
+        with closing(made) as head:
+            head.observe(clock.now_s(), backend.pose(), backend.qpos()[7:])
+            head.fuse(np.inf)  # the run begins when the first picture is matched
+
+            def measured(state: JointState) -> BodyPose:
+                pose = measure(state)
+                head.observe(clock.now_s(), pose, state.position_rad)
+                provider.follow(pose.head_in_world_m)
+                return pose
+
+            provider.measure = measured
+            yield provider
+        ground_map.write(folder / MAP)
+        on_event("map", ", ".join(f"{key} {value}" for key, value in provider.facts().items()))

@@ -1,0 +1,53 @@
+"""``snakewalk plan --with repertoire``: a plan of recorded actions."""
+
+from pathlib import Path
+
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.console.options import show
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.repertoire.commands.repertoire_run import carry_out
+from snakewalk.controller.repertoire.repertoire_planning import (
+    plan_facts,
+    plan_route,
+    save_plan,
+    search_cost,
+)
+
+
+@plugin("planner", "repertoire")
+def plan_with_repertoire(
+    run: str,
+    *,
+    repertoire: Path | None,
+    robot: str | None,
+    world: str | None,
+    beam: int,
+    physics: int,
+    out: Path | None,
+    carry: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Search over recorded actions; show, and where asked save, time on the physics, and run."""
+    refuse_to_overwrite([out], force)
+    if physics or carry:
+        require_extra("candidates and runs on the physics need", "mujoco")
+    job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
+    found = plan_facts(job)
+    if not as_json:
+        found["actions"] = ", ".join(job.action_names)
+    if physics:
+        with ProgressBar("candidates on the physics", physics) as bar:
+            cost = search_cost(job, physics, beam=beam, on_progress=bar.update)
+        found |= cost.to_dict()
+    if out is not None:
+        save_plan(job, out)
+        found["plan"] = str(out)
+    complete = True
+    if carry:
+        found["ran"], complete = carry_out(job, None, None, False, None, force)
+    show(found, as_json)
+    if not complete:
+        raise SystemExit(1)

@@ -1,0 +1,41 @@
+"""``snakewalk list``: what is shipped and installed."""
+
+import json
+
+from rich.table import Table
+
+from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import Json, console
+from snakewalk.controller.console.plugins import OWN, plugins
+
+
+@command("list", group=JOB, examples=("list --json",))
+def list_(as_json: Json = False) -> None:
+    """List what is shipped and installed: runs, robots, worlds, recordings, policies, plug-ins."""
+    rows = {
+        "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
+        "robots": [
+            [n, f"{b.joint_count} {', '.join(dict.fromkeys(b.servo_models))}, {b.length_m:.2f} m"]
+            for n in shipped("robots")
+            for b in [load_robot(n)]
+        ],
+        "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
+        "recordings": [[n, "snakewalk track, play, run --track"] for n in shipped("recordings")],
+        "policies": [[n, "snakewalk policy list, run"] for n in shipped("policies")],
+        "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
+        "plug-ins": [
+            [f"{each.kind} {each.name}", each.package]
+            for each in plugins()
+            if each.kind != "command" or not each.package.startswith(f"{OWN}.")
+        ],
+    }
+    if as_json:
+        print(json.dumps({kind: [name for name, _ in rs] for kind, rs in rows.items()}))
+        return
+    for kind, lines in rows.items():
+        table = Table(title=kind, title_justify="left", box=None, show_header=False)
+        for line in lines:
+            table.add_row(f"  {line[0]}", line[1])
+        console.print(table)
+    console.print("all gaits: snakewalk gait list")

@@ -1,0 +1,1 @@
+"""Kinds of runs: one module per kind of motion, each a prepared run."""

@@ -1,0 +1,109 @@
+"""A run that plays a recording in time on a robot."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.playback import PlaybackConfig
+from snakewalk.controller.motion.recorded import Recorded
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
+from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.track.recorded_joints import recorded_joints
+
+_LINEAR = 0.9  # of the limit: angles up to it are played as they are
+_MOST = 0.995  # of the limit: the spline between frames goes a little beyond them
+
+
+def clip_softly(joints: Floats, limit_rad: Floats) -> Floats:
+    """Joint angles (T, J) within their limits (J,), without the corner of a hard clip.
+
+    Up to 0.9 of the limit they are unchanged. A corner would ask for any acceleration, and slow the
+    whole recording.
+    """
+    start, room = _LINEAR * limit_rad, (_MOST - _LINEAR) * limit_rad
+    size = np.abs(joints)
+    soft = start + room * np.tanh(np.maximum(size - start, 0.0) / room)
+    return np.asarray(np.sign(joints) * np.where(size > start, soft, size))
+
+
+@dataclass(frozen=True)
+class PlaybackRun(PathlessRun):
+    """A ``PreparedRun`` of a recording."""
+
+    @cached_property
+    def joint_track(self) -> tuple[Floats, Floats]:
+        """Times (T,) in the animal's own time from 0 on, and joint angles (T, J) to be played."""
+        time_s, joints = self._as_recorded
+        if self._asked.clip:
+            joints = clip_softly(joints, np.array(self.robot.limit_rad))
+        return time_s, joints
+
+    @cached_property
+    def _as_recorded(self) -> tuple[Floats, Floats]:
+        """The same before joints are clipped."""
+        time_s, joints = recorded_joints(self.run.track, self.robot)
+        return time_s, self._asked.scale * joints
+
+    @property
+    def _asked(self) -> PlaybackConfig:
+        return self.run.playback or PlaybackConfig()
+
+    @property
+    def speed(self) -> float:
+        """Speed of the playback over the animal's own."""
+        asked = self._asked.speed
+        most = 1.0 / Recorded(self.robot, *self.joint_track).slowed
+        if asked is not None and asked > most > 0.0 and self._recorded(asked).slowed > 1.0:
+            raise InputError(
+                f"--speed {asked:g}: the joints of {self.robot.name} follow {self.run.track} up to "
+                f"{most:.3f} times the animal's own speed; leave --speed out, or make the motion "
+                "smaller by --scale"
+            )
+        return most if asked is None else asked
+
+    @property
+    def clipped(self) -> str | None:
+        """What clipping took away, in words; None where it took nothing away."""
+        past = np.abs(self._as_recorded[1]) - np.array(self.robot.limit_rad)
+        if not (past > 0.0).any():
+            return None
+        frame, joint = (int(k) for k in np.unravel_index(np.argmax(past), past.shape))
+        return (
+            f"joints clipped to their limits in {int((past > 0.0).any(axis=1).sum())} of "
+            f"{len(past)} frames, most by {past.max():.2f} rad: {self.robot.joint_name(joint)} in "
+            f"frame {frame}"
+        )
+
+    @property
+    def duration_s(self) -> float:
+        """Duration of the playback."""
+        return self._recorded(self.speed).duration_s
+
+    def initial_pose(self) -> InitialPose:
+        """Return the first shape of the recording."""
+        return pose_with(self.robot, self.start_heading_rad, self.joint_track[1][0])
+
+    def check_plan(self) -> PlanSummary:
+        """Check range, speed and acceleration of every joint over the whole recording."""
+        self._recorded(self.speed)
+        return plan_without_path(self.run)
+
+    def make_source(self, on_event: OnEvent) -> MotionSource:
+        """Return a fresh motion that plays the recording."""
+        if self._asked.scale != 1.0:
+            on_event("limit", f"joint angles scaled by {self._asked.scale:g}")
+        told = self.clipped
+        if told is not None:
+            on_event("limit", told)
+        if self.speed < 1.0:
+            on_event("limit", f"played at {self.speed:.2f} times the animal's speed")
+        return self._recorded(self.speed)
+
+    def _recorded(self, speed: float) -> Recorded:
+        time_s, joints = self.joint_track
+        return Recorded(self.robot, time_s / speed, joints)

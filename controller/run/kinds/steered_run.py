@@ -1,0 +1,82 @@
+"""A run of a gait along waypoints: its path, its checks and its motion."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.gaits.gait import Gait
+from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.prepared_run import PathRun
+from snakewalk.controller.runlog.record import PlanSummary
+from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.walk.course import Course
+from snakewalk.controller.walk.landing import Landing
+from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, SteeredGait, check_turns
+
+
+@dataclass(frozen=True)
+class SteeredRun(PathRun, GaitRun):
+    """A ``PreparedRun`` of a gait that is steered along a path."""
+
+    @cached_property
+    def ashore(self) -> Gait | None:
+        """The gait on land, of a run that comes out of the water."""
+        table = self.config.ashore
+        return None if table is None else make_gait(table.name, table.parameters)
+
+    def check_plan(self) -> PlanSummary:
+        """Check that the gait can be steered, and within the joints' ranges; lay the path.
+
+        Raises:
+            InputError: it cannot, or the run asks for what belongs to a gait without waypoints.
+
+        """
+        if self.ground is not None and not self.robot.limbs:
+            raise InputError(
+                f"run {self.run.name}: a gait goes along waypoints on flat floors only, unless the "
+                "body has legs"
+            )
+        config = self.config
+        if config.then or config.look_heading_rad is not None or config.look_at_m is not None:
+            raise InputError(
+                f"run {self.run.name}: a gait along waypoints takes no then, look_heading_rad or "
+                "look_at_m in its table [gait]"
+            )
+        try:
+            for gait in filter(None, (self.gait, self.ashore)):
+                check_turns(gait, self.robot)
+        except InputError as error:
+            faults = [f"run {self.run.name}: {fault}" for fault in error.faults]
+            raise InputError(faults) from None
+        return PlanSummary(
+            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
+            waypoints_m=np.array(self.run.waypoints_m),
+            waypoint_radius_m=self.run.waypoint_radius_m,
+        )
+
+    def make_source(self, on_event: OnEvent) -> MotionSource:
+        """Return a fresh motion."""
+        run = self.run
+        course = Course(
+            self.planner,
+            run.waypoints_m,
+            start_m=np.array(run.start_m),
+            radius_m=run.waypoint_radius_m,
+            length_m=self.robot.length_m,
+            travel_per_body=CYCLES_PER_BODY,
+        )
+        swim = SteeredGait(self.gait, self.robot, course, run.walk.carrot_m)
+        walk, table = self.ashore, self.config.ashore
+        if walk is None or table is None:
+            return swim
+        return Landing(
+            swim,
+            lambda cycles: SteeredGait(walk, self.robot, course, run.walk.carrot_m, cycles=cycles),
+            self.robot,
+            headway=table.headway,
+            on_ashore=lambda text: on_event("ashore", text),
+        )

@@ -1,0 +1,88 @@
+"""Single values of a run's files, replaced by key: ``--set`` and the keyword ``keys``."""
+
+import math
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Final, TypeVar
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import with_keys
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+
+C = TypeVar("C", RunConfig, RobotConfig, WorldConfig)
+_FIELDS = {
+    "run": tuple(RunConfig.model_fields),
+    "robot": tuple(RobotConfig.model_fields),
+    "world": tuple(WorldConfig.model_fields),
+}
+"""Keys and tables at the top of each file."""
+
+
+_OWN_MOTION: Final = {"run.robot": "--robot", "run.motion": "the command"}
+OF_A_SOURCE: Final = _OWN_MOTION | {"run.time_limit_s": "--seconds"}
+OF_A_GAIT: Final = _OWN_MOTION | {
+    "run.gait": "--param, --seconds, --then, --by, --look-heading-rad"
+}
+OF_A_SCHEDULE: Final = _OWN_MOTION | {
+    "run.repertoire": "FILE, --speed, --turn, --schedule, --seconds"
+}
+OF_A_RECORDING: Final = _OWN_MOTION | {
+    "run.track": "TRACK",
+    "run.playback": "--speed, --scale, --clip",
+}
+"""Keys that a command's own options set, with these options."""
+
+
+def checked_keys(
+    keys: Mapping[str, object] | None, refused: Mapping[str, str] | None = None
+) -> dict[str, object]:
+    """Return keys of the three files, angles in rad; ``refused`` keys or tables have options.
+
+    Raises:
+        InputError: a key is of none of the files, or is refused; one line each.
+
+    """
+    faults: list[str] = []
+    for key in keys or {}:
+        file, dot, rest = key.partition(".")
+        if file not in _FIELDS or not (dot and all(rest.split("."))):
+            faults.append(f"{key}: a key begins with run., robot. or world.{_meant(file, rest)}")
+        for own, option in (refused or {}).items():
+            if key == own or key.startswith(f"{own}."):
+                faults.append(f"{key}: is given by {option}")
+    if faults:
+        raise InputError(faults)
+    return dict(_in_rad(key, value) for key, value in (keys or {}).items())
+
+
+def _meant(first: str, rest: str) -> str:
+    """Say which key was meant where the first word is that of no file."""
+    files = get_close_matches(first, _FIELDS, 1, 0.7)
+    if files and rest:
+        return f"; did you mean {files[0]}.{rest}?"
+    for file, fields in _FIELDS.items():
+        for near in get_close_matches(first, fields, 1, 0.7):
+            return f"; did you mean {'.'.join(filter(None, (file, near, rest)))}?"
+    return ""
+
+
+def _in_rad(key: str, value: object) -> tuple[str, object]:
+    """Files have radians; people think of slopes in degrees."""
+    if not key.endswith("_deg"):
+        return key, value
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        value = math.radians(value)
+    return f"{key.removesuffix('_deg')}_rad", value
+
+
+def with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
+    """Replace values of the run's, the robot's or the world's file by their keys.
+
+    Raises:
+        InputError: one line per fault.
+
+    """
+    own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
+    return with_keys(config, own, f"{file} {config.name}") if own else config

@@ -1,0 +1,76 @@
+"""The servos of a run: gains for its motion, and checks of supply, current and cycle rate."""
+
+from collections.abc import Sequence
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.drivers.bus.budget import robot_budget
+
+GAIT_PITCH_SHARE = 0.75
+"""Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
+(1.5 A of an XM430; ours): soft ones would not carry the links."""
+
+
+def check_supply(robot: RobotConfig) -> None:
+    """Refuse a supply at which a servo would do nothing but raise its alarm.
+
+    Raises:
+        InputError: with the model's range of voltages, and the one that its page recommends.
+
+    """
+    for facts in robot.models_by_id.values():
+        if facts.motor is None:  # its file does not say
+            continue
+        low_v, high_v = facts.motor.voltage_v
+        if not low_v <= robot.servo.supply_v <= high_v:
+            raise InputError(
+                f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {facts.model} "
+                f"takes {low_v:g} to {high_v:g} V; recommended: supply_v = "
+                f"{facts.motor.nominal_v:g}"
+            )
+
+
+def check_servos(run: RunConfig, robot: RobotConfig) -> None:
+    """Refuse a wrong supply, a cycle longer than its period, and a current that no servo reaches.
+
+    Raises:
+        InputError: with the model's voltages; with the highest rate that fits; with the current at
+            which the model stalls.
+
+    """
+    check_supply(robot)
+    if run.safety.current_limit_a is not None:
+        try:
+            robot.check_over_current("safety.current_limit_a", run.safety.current_limit_a)
+        except ValueError as fault:
+            raise InputError(f"run {run.name}: {fault}") from None
+    robot_budget(robot, robot.servo.baud, fast=True).check(run.cycle_hz)
+
+
+def with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) -> RobotConfig:
+    """Set the servos up: pitch joints that carry links, all as soft as the least of ``soft``."""
+    servo = robot.servo
+    changes: dict[str, float] = {}
+    if pitch:
+        changes["pitch_p_gain"] = max(servo.pitch_p_gain, servo.position_p_gain)
+        carry_a = GAIT_PITCH_SHARE * robot.over_current_a
+        changes["pitch_current_limit_a"] = max(servo.pitch_current_limit_a, carry_a)
+    if soft:
+        changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
+    joints = []
+    for joint, axis in zip(robot.joints, robot.all_axes, strict=False):  # there may be none
+        own: dict[str, float | None] = {}
+        for key, least in (
+            ("position_p_gain", changes.get("pitch_p_gain")),
+            ("current_limit_a", changes.get("pitch_current_limit_a")),
+        ):
+            value = getattr(joint, key)
+            if value is not None and least is not None and axis == "p":
+                own[key] = max(value, least)
+        if soft:
+            own["position_p_gain"] = None
+        joints.append(joint.model_copy(update=own))
+    return robot.model_copy(
+        update={"servo": servo.model_copy(update=changes), "joints": tuple(joints)}
+    )

@@ -1,0 +1,213 @@
+"""Description of a log's fields: type, shape, digits, and the curve that shows a field.
+
+``topics`` declares a table class for each topic; each of its fields is annotated with a ``Column``.
+Writer, reader, exports and curves read these descriptions.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import (
+    Any,
+    ClassVar,
+    Final,
+    Literal,
+    TypeVar,
+    dataclass_transform,
+    get_args,
+    get_type_hints,
+)
+
+from snakewalk.config.arrays import Floats
+
+Json = dict[str, Any]
+Kind = Literal["exact", "rounded", "integer", "flag", "text", "joints", "points", "object"]
+"""``exact`` floats keep every digit, ``rounded`` ones six decimals; ``joints`` are indices of some
+joints, ``points`` lists of coordinates, ``object`` is any JSON."""
+Watched = Literal["all", "newest", ""]
+UNITS: Final = ("rad_s", "m_s", "rad", "a", "s", "m", "c", "v", "j")
+"""Suffixes of names that are units; the longest comes first."""
+JOINT, LINK, ANY = "joint", "link", "any"
+"""Sizes that differ from robot to robot, and from row to row."""
+_JSON_TYPES: Final = {
+    "integer": "integer",
+    "joints": "integer",
+    "flag": "boolean",
+    "text": "string",
+}
+REQUIRED: Final = object()
+_NAN: Final = float("nan")
+
+
+class Panel(StrEnum):
+    """Panels of curves, in the order in which pages show them; title with unit."""
+
+    SPEED = "forward speed, m/s"
+    CURRENT = "current, A"
+    CYCLE = "in a cycle, ms"
+    HEAT = "hottest servo, °C"
+    SUPPLY = "lowest supply, V"
+    FRICTION = "estimated friction"
+    JOINT_ANGLE = "joint's angle, rad"
+    """Of the joint that the reader of the page selects."""
+    JOINT_CURRENT = "joint's current, A"
+
+    @property
+    def is_of_one_joint(self) -> bool:
+        """Whether the panel shows the joint that the reader of the page selects."""
+        return self in (Panel.JOINT_ANGLE, Panel.JOINT_CURRENT)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values; empty if there is none."""
+        return self.partition(", ")[2]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A curve of a field over time."""
+
+    panel: Panel
+    name: str
+    colour: str
+    """Name of a colour of the report's palette."""
+    joints: Literal["", "largest", "least", "mean"] = ""
+    """Value that is drawn of a field with a value for each joint."""
+    magnitude: bool = False
+    """Whether the sign is left out."""
+    scale: float = 1.0
+    """Factor from the field's unit to the panel's."""
+    flat: float | None = None
+    """Span up to which the values are constant: the page then states the value in words."""
+    constant: str = ""
+    """Words for constant values; default: name, median and unit."""
+    gaps: str = ""
+    """Field of the same topic that is false where the curve has a gap."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A field of a topic. Its unit is the end of its name."""
+
+    description: str
+    """Goes into the topic's JSON schema."""
+    kind: Kind = "rounded"
+    shape: tuple[str | int, ...] = ()
+    """Of one row: numbers, ``JOINT``, ``LINK`` or ``ANY``."""
+    default: Any = REQUIRED
+    """Value of a row that lacks the field, written now or read from an older log."""
+    is_known: bool = False
+    """Whether a single number is never null."""
+    is_printed_alone: bool = False
+    """Whether the digits of an array do not depend on unknown numbers in other arrays."""
+    choices: tuple[str, ...] = ()
+    """All texts that occur, if the field is one of a few."""
+    curves: tuple[Curve, ...] = ()
+
+    @property
+    def schema(self) -> Json:
+        """JSON schema of the field."""
+        if self.choices:
+            return {"enum": list(self.choices)}
+        name = _JSON_TYPES.get(self.kind, "number")
+        kind: str | list[str] = name
+        if self.kind == "points":
+            kind = "array"
+        elif self.kind == "object":
+            kind = "object" if self.default is REQUIRED else ["object", "null"]
+        elif self.shape and self.default is None:
+            kind = ["array", "null"]
+        elif self.shape:
+            items = {"type": [name, "null"]}
+            return {"type": "array", "items": items, "description": self.description}
+        elif name == "number" and not self.is_known:
+            kind = [name, "null"]
+        return {"type": kind, "description": self.description}
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """Properties of a topic as a whole."""
+
+    name: str
+    """Begins with a slash."""
+    columns: Mapping[str, Column]
+    is_fast: bool
+    """Whether rows are printed with a fixed number of digits, which is quicker."""
+    only_changes: bool
+    """Whether a row that differs from the last one only in time is left out."""
+    watched: Watched
+    """Rows that a page and a ROS node receive: all, the newest, or none."""
+
+    @property
+    def table_name(self) -> str:
+        """Name of an exported table."""
+        return self.name.removeprefix("/")
+
+    @property
+    def schema_name(self) -> str:
+        """Name under which the topic's schema is registered."""
+        return f"snakewalk.{self.table_name.capitalize()}"
+
+    @property
+    def schema(self) -> bytes:
+        """JSON schema (draft 7) of a row."""
+        properties = {name: column.schema for name, column in self.columns.items()}
+        return json.dumps(
+            {"title": self.schema_name, "type": "object", "properties": properties},
+            separators=(",", ":"),
+        ).encode()
+
+
+class Table:
+    """Base class of all tables: a field is an array with an entry for each row of the topic."""
+
+    __slots__ = ()
+    topic: ClassVar[Topic]
+    time_s: Floats
+    """Of all tables but ``ConfigTable``."""
+
+
+T = TypeVar("T", bound=Table)
+_registered: list[type[Table]] = []
+
+
+@dataclass_transform(frozen_default=True)
+def topic(
+    name: str, *, is_fast: bool = False, only_changes: bool = False, watched: Watched = "newest"
+) -> Callable[[type[T]], type[T]]:
+    """Return a decorator that makes a class the table of a topic and registers it."""
+
+    def register(made: type[T]) -> type[T]:
+        table = dataclass(frozen=True, slots=True)(made)
+        hints = get_type_hints(table, include_extras=True)
+        columns = {each.name: _column(hints[each.name]) for each in fields(table)}  # type: ignore[arg-type]
+        table.topic = Topic(name, columns, is_fast, only_changes, watched)
+        _registered.append(table)
+        return table
+
+    return register
+
+
+def registered_tables() -> tuple[type[Table], ...]:
+    """Return the table of each topic that is declared so far."""
+    return tuple(_registered)
+
+
+def unit_of(name: str) -> str:
+    """Unit in the name of a field; empty if there is none."""
+    return next((unit for unit in UNITS if name.endswith(f"_{unit}")), "")
+
+
+def _column(hint: Any) -> Column:
+    """Return the column of an annotation.
+
+    Raises:
+        TypeError: it has none.
+
+    """
+    found = [each for each in get_args(hint) if isinstance(each, Column)]
+    if len(found) != 1:
+        raise TypeError(f"{hint}: each field of a topic is Annotated with one Column")
+    return found[0]

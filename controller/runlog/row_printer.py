@@ -1,0 +1,156 @@
+"""Rows of a topic as JSON."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from snakewalk.controller.runlog.column import LINK, REQUIRED, Column, Topic
+from snakewalk.controller.runlog.encode import (
+    DIGITS,
+    encode,
+    exact,
+    exact_text,
+    flags_text,
+    floats,
+    number,
+    rounded_text,
+    rounded_texts,
+    text,
+)
+
+
+class RowPrinter:
+    """Prints the rows of one topic as JSON."""
+
+    def __init__(self, topic: Topic) -> None:
+        self._topic = topic
+        columns = topic.columns
+        self._required = {name for name, each in columns.items() if each.default is REQUIRED}
+        self._defaults = {name: each.default for name, each in columns.items()}
+        self._arrays = [
+            (name, (-1, 3) if each.shape == (LINK, 3) else (-1,))
+            for name, each in columns.items()
+            if _is_printed_together(each)
+        ]
+        """Arrays of a fast topic that one call prints, and their shapes."""
+        row_of_goals = _exact_row()
+        self._numbers = [
+            name for name, each in columns.items() if each.kind in DIGITS and not each.shape
+        ]
+        """Single numbers, which the template prints if all are finite."""
+        self._printers = [
+            (at, None if _is_printed_together(each) else _printer(each, row_of_goals))
+            for at, (name, each) in enumerate(columns.items())
+            if name not in self._numbers
+        ]
+        formats = {name: DIGITS[columns[name].kind] for name in self._numbers}
+        self._template = _row_template({name: formats.get(name, "s") for name in columns})
+        self._unknown_template = _row_template(dict.fromkeys(columns, "s"))
+
+    def row(self, values: Mapping[str, Any]) -> str:
+        """Return the JSON of a row; a field that has a default may be missing.
+
+        Raises:
+            TypeError: a required field is missing, or a value is not a field of the topic.
+            ValueError: an exact number is not finite.
+
+        """
+        if len(values) != len(self._defaults):
+            self._check(values)
+            values = {**self._defaults, **values}
+        try:
+            if self._topic.is_fast:
+                return self._fast_row(values)
+            columns = self._topic.columns.items()
+            return encode({name: json_value(column, values[name]) for name, column in columns})
+        except KeyError:
+            self._check(values)
+            raise
+
+    def _check(self, values: Mapping[str, Any]) -> None:
+        missing = sorted(self._required - values.keys())
+        unknown = sorted(values.keys() - self._defaults.keys())
+        if missing or unknown:
+            raise TypeError(
+                f"{self._topic.name}: missing fields: {missing}; fields that it lacks: {unknown}"
+            )
+
+    def _fast_row(self, values: Mapping[str, Any]) -> str:
+        arrays = [
+            np.asarray(values[name], dtype=float).reshape(shape)
+            for name, shape in self._arrays
+            if values[name] is not None
+        ]
+        printed = iter(rounded_texts(arrays))
+        cells = [values[name] for name in self._defaults]
+        for at, print_one in self._printers:
+            if print_one is not None:
+                cells[at] = print_one(cells[at])
+            else:
+                cells[at] = "null" if cells[at] is None else next(printed)
+        if math.isfinite(sum([values[name] for name in self._numbers])):
+            return self._template % tuple(cells)
+        for at, (name, column) in enumerate(self._topic.columns.items()):
+            if name in self._numbers:
+                cells[at] = text(cells[at]) if column.kind == "exact" else rounded_text(cells[at])
+        return self._unknown_template % tuple(cells)
+
+
+def _row_template(formats: Mapping[str, str]) -> str:
+    return "{" + ",".join(f'"{name}":%{each}' for name, each in formats.items()) + "}"
+
+
+def json_value(column: Column, value: Any) -> Any:
+    """Return the value of a field of one row as the plain encoder accepts it."""
+    if value is None or column.kind in ("object", "text"):
+        return value
+    if column.kind in ("integer", "flag", "joints"):
+        return np.asarray(value).tolist() if column.shape else int(value)
+    if column.kind == "exact":
+        return exact(value) if column.shape else value
+    if column.shape == (3, 3):
+        return floats(np.ravel(value))
+    return floats(value) if column.shape else number(value)
+
+
+def _is_printed_together(column: Column) -> bool:
+    return column.kind == "rounded" and bool(column.shape) and not column.is_printed_alone
+
+
+def _printer(column: Column, row_of_goals: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return the function that prints a value of a fast topic."""
+    match column.kind:
+        case "exact":
+            return row_of_goals
+        case "rounded":
+            return _rounded_row
+        case "integer" if not column.shape:
+            return lambda value: str(int(value))
+        case "joints":
+            return lambda value: encode([int(each) for each in value])
+        case "integer" | "flag":
+            return lambda value: flags_text(value.tobytes(), value.dtype.char)
+        case _:
+            return encode
+
+
+def _rounded_row(values: Any) -> str:
+    return "null" if values is None else rounded_texts([np.asarray(values, dtype=float)])[0]
+
+
+def _exact_row() -> Callable[[Any], str]:
+    """Return ``exact_text`` for values that mostly equal those of the call before."""
+    last: bytes | None = None
+    last_text = ""
+
+    def print_row(values: Any) -> str:
+        nonlocal last, last_text
+        array = np.asarray(values, dtype=float)
+        now = array.tobytes()
+        if now != last:
+            last, last_text = now, exact_text(array)
+        return last_text
+
+    return print_row
