@@ -5,25 +5,20 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 
-# Other people's programs for the same servos, which the tests run against the simulated bus; without
-# their dependencies, of which they need none there. What cannot be had is skipped.
-CLIENTS := lerobot==0.4.4 deepdiff orderly-set cachebox tqdm deprecation
-# This one brings an old dynamixel_sdk along, so it gets a folder of its own, without that.
-ASIDE := dynamixel-controller==0.9.2
-
-.PHONY: setup loops run test lint types unit docs bench campaign failures clean
+.PHONY: setup lock loops fallbacks run test lint types unit docs bench campaign failures clean
 
 setup: $(STAMP)
 
-$(STAMP): pyproject.toml
+# The versions that are installed are in .ci/locks; `make lock` chooses them again.
+$(STAMP): pyproject.toml $(wildcard .ci/locks/*)
 	$(PY) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	$(PY) -m venv $(VENV)
-	.ci/install $(BIN) --editable '.[dev]'
-	.ci/install $(BIN) --no-deps $(CLIENTS) || echo "tests of other clients are skipped"
-	.ci/install $(BIN) --no-deps --target $(VENV)/clients $(ASIDE) || echo "as above"
-	rm -rf $(VENV)/clients/dynamixel_sdk
+	.ci/setup $(BIN)
 	.ci/offscreen
 	touch $(STAMP)
+
+lock: setup
+	.ci/lock $(BIN)
 
 # The loops are compiled once, by two processes, before many would compile them each for itself.
 loops: setup
@@ -51,6 +46,10 @@ unit: loops
 # make docs      the site, in build/docs; a link that leads nowhere inside it, or any other warning, is an error
 docs: setup
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs build/docs
+
+# make fallbacks the public fallbacks of private interfaces, which CI runs once; docs/decisions/0078
+fallbacks: loops
+	.ci/fallbacks $(BIN)
 
 # make bench     ratios to peers and limits; make campaign  100,000 cycles under faults
 bench: setup

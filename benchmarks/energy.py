@@ -26,7 +26,7 @@ from snakewalk.controller.run.factory import prepare_gait, prepare_walk
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
-from snakewalk.drivers.chain.start_up import configure
+from snakewalk.drivers.chain.start_up import ServoSettings, configure
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import ServoDrive
 
@@ -102,13 +102,17 @@ def profiles() -> Iterator[None]:
         units: JointUnits,
         joints: Iterable[int] | None = None,
         on_event: Callable[[str], None] = lambda line: None,
-    ) -> dict[int, dict[str, int]]:
+    ) -> dict[int, ServoSettings]:
         some = list(range(robot.joint_count) if joints is None else joints)
         values = configure(bus, robot, units, some, on_event)
         for joint in some:
             bus.write_verified(robot.servo_ids[joint], "Drive Mode", TIME_BASED)
             bus.write_verified(robot.servo_ids[joint], "Profile Velocity", PROFILE_MS)
-        return values
+        profile, mode = {"Profile Velocity": PROFILE_MS}, {"Drive Mode": TIME_BASED}
+        return {
+            joint: ServoSettings({**each.ram, **profile}, {**each.fingerprint, **mode})
+            for joint, each in values.items()
+        }
 
     with patch("snakewalk.drivers.chain.servo_chain.configure", with_profile):
         yield

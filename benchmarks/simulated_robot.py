@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress
+from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress, Sensors
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor, OnPaper
 from snakewalk.controller.runtime.loop import ticks
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
@@ -102,13 +102,12 @@ class SimulatedRobot:
         drive = Drive(
             link=self.link,
             clock=self.line.clock,
-            pose=lambda _: self.plant.head_pose(),
+            sensors=Sensors(lambda _: self.plant.head_pose(), lambda: self.line.busy_s),
             motion=pilot,
             log=log,
             robot=self._prepared.robot,
             run=run,
             gain=self._prepared.gain,
-            wire_busy_s=lambda: self.line.busy_s,
             friction=friction if run.walk.finds_friction else None,
             on_progress=on_progress,
         )

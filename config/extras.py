@@ -10,6 +10,7 @@ EXTRAS: Final = {
     "matplotlib": ("matplotlib", "view"),
     "mpl_toolkits": ("matplotlib", "view"),
     "plotly": ("Plotly", "view"),
+    "jinja2": ("Jinja", "view"),
     "av": ("PyAV", "view"),
     "cv2": ("OpenCV", "vision"),
     "skimage": ("scikit-image", "vision"),
@@ -18,6 +19,8 @@ EXTRAS: Final = {
     "ezc3d": ("ezc3d", "c3d"),
     "trimesh": ("trimesh", "vision"),
     "rasterio": ("Rasterio", "terrain"),
+    "laspy": ("laspy", "terrain"),
+    "lazrs": ("lazrs", "terrain"),
     "pygltflib": ("pygltflib", "vision"),
     "distributed": ("Dask", "sweep"),
     "dask": ("Dask", "sweep"),
@@ -29,7 +32,9 @@ EXTRAS: Final = {
     "rclpy": ("rclpy", "ros"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
-BASE: Final = frozenset({"numba", "scipy", "networkx", "typer", "rich", "mcap"})
+BASE: Final = frozenset(
+    {"numba", "scipy", "networkx", "typer", "rich", "mcap", "foxglove_schemas_protobuf"}
+)
 """Modules of the base that a light install of the test fixture does without (docs/start/ci.md)."""
 
 

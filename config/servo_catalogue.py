@@ -86,7 +86,7 @@ def models_by_number(folder: Path | None = None) -> Mapping[int, str]:
     if not files:
         return _shipped_by_number()
     own = [_read(path) for path in files]
-    return _shipped_by_number() | {m.model_number: m.model for m in own if m.protocol == 2}
+    return {**_shipped_by_number(), **{m.model_number: m.model for m in own if m.protocol == 2}}
 
 
 @cache
@@ -155,6 +155,6 @@ def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in own.items():
         below = merged.get(key)
-        both = isinstance(value, dict) and isinstance(below, dict)
-        merged[key] = _over(below, value) if both else value
+        is_table = isinstance(value, dict) and isinstance(below, dict)
+        merged[key] = _over(dict(below or {}), value) if is_table else value
     return merged

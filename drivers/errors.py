@@ -71,6 +71,7 @@ class FaultCause(Enum):
     TURN_COUNT_LOST = auto()
     MOVED = auto()
     EXCHANGED = auto()
+    OTHER_SETTINGS = auto()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,19 @@
 """The joint link: the interface between the controller and the joints."""
 
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.drivers.types import JointCommand, JointState
+
+
+@runtime_checkable
+class ExplainingLink(Protocol):
+    """A link that can look for the reason why a joint does not follow."""
+
+    def explain(self, joint: int) -> str | None:
+        """Return what is wrong with the goal that the joint's servo holds; None: nothing."""
+        ...
 
 
 class JointLink(Protocol):

@@ -93,15 +93,7 @@ def examine(
     readable = _readable(bus, pings, reads, noise, findings)
     reports = _reports(bus, robot, readable, findings, noise) if readable else ()
     if reports:
-        findings += [
-            servos.firmware(reports),
-            servos.return_delay(reports),
-            servos.alarms(reports),
-            servos.torque(reports),
-            servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
-            servos.heat(reports, safety.temperature_limit_c),
-            *_settings(bus, robot, reports, noise),
-        ]
+        findings += _servo_findings(bus, robot, safety, reports, noise)
         on_progress("group reads")
         fast = all(s.fast_reads for s in reports)
         port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to what was asked so far
@@ -114,6 +106,24 @@ def examine(
         on_progress("supply under load")
         findings += supply_under_load(bus, robot, safety)
     return findings
+
+
+def _servo_findings(
+    bus: DynamixelBus,
+    robot: RobotConfig,
+    safety: SafetyConfig,
+    reports: Sequence[ServoReport],
+    noise: Finding | None,
+) -> list[Finding]:
+    return [
+        servos.firmware(reports),
+        servos.return_delay(reports),
+        servos.alarms(reports),
+        servos.torque(reports),
+        servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
+        servos.heat(reports, safety.temperature_limit_c),
+        *_settings(bus, robot, reports, noise),
+    ]
 
 
 def examine_segments(

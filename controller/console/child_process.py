@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context, resource_tracker
@@ -40,7 +40,7 @@ def child_environ() -> dict[str, str]:
 
 
 def run_code(
-    code: str, *arguments: str, folder: Path | None = None
+    code: str, *arguments: str, folder: Path | None = None, timeout_s: float | None = None
 ) -> "subprocess.CompletedProcess[str]":
     """Run Python code in a child and wait; returns its exit code and output as text.
 
@@ -48,17 +48,37 @@ def run_code(
         code: the program.
         arguments: of the program.
         folder: working folder of the child; default: that of this process.
+        timeout_s: the child is killed after this time.
+
+    Raises:
+        TimeoutError: the child was killed.
 
     """
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        env=child_environ(),
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        check=False,
-    )
+    return run_program([sys.executable, "-c", code, *arguments], folder, timeout_s)
+
+
+def run_program(
+    command: Sequence[str], folder: Path | None = None, timeout_s: float | None = None
+) -> "subprocess.CompletedProcess[str]":
+    """Run a program as ``run_code`` runs Python code.
+
+    Raises:
+        TimeoutError: the program was killed.
+
+    """
+    try:
+        return subprocess.run(
+            command,
+            env=child_environ(),
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=timeout_s,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise TimeoutError(f"{command[0]} does not end") from None
 
 
 def start(target: Callable[..., object], *arguments: Any, daemon: bool = False) -> SpawnProcess:

@@ -20,7 +20,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
-from snakewalk.controller.exchange.foxglove_schema import SCHEMAS
+from snakewalk.controller.exchange.foxglove_schema import foxglove_schema
 from snakewalk.controller.exchange.imu_readings import imu_readings
 from snakewalk.controller.exchange.remaining_fields import TIME, Shown, remaining_fields
 from snakewalk.controller.exchange.ros_messages import (
@@ -101,7 +101,7 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
         def channel(topic: str) -> int:
             if topic in TYPES:
                 name = TYPES[topic]
-                schema = encode(SCHEMAS[name]).encode()
+                schema = encode(foxglove_schema(name)).encode()
             else:
                 of_log = next(table.topic for table in TABLES if table.topic.name == topic)
                 name, schema = of_log.schema_name, of_log.schema

@@ -1,120 +1,46 @@
-"""JSON schemas of Foxglove's well-known messages, as far as they are written here.
+"""JSON schemas of Foxglove's well-known messages, made from its package of published messages."""
 
-Foxglove goes by a schema's name; its fields are those of its published schemas, which a test
-compares with these (github.com/foxglove/foxglove-sdk, ``schemas/``).
-"""
-
+from functools import cache
+from importlib import import_module
 from typing import Any, Final
 
 Schema = dict[str, Any]
-_NUMBER: Final[Schema] = {"type": "number"}
-_TEXT: Final[Schema] = {"type": "string"}
 _WHOLE: Final[Schema] = {"type": "integer"}
-_TRUTH: Final[Schema] = {"type": "boolean"}
+_KINDS: Final = {"DOUBLE": "number", "FLOAT": "number", "STRING": "string", "BOOL": "boolean"}
+"""JSON types by protobuf's; the others are integers."""
 
 
-def _object(title: str, **properties: Schema) -> Schema:
+@cache
+def foxglove_schema(name: str) -> Schema:
+    """Return the schema of a message such as ``foxglove.Log``.
+
+    Foxglove's JSON has all fields but the optional ones; times are ``sec`` and ``nsec``.
+    """
+    short = name.removeprefix("foxglove.")
+    module = import_module(f"foxglove_schemas_protobuf.{short}_pb2")
+    return _message(module.DESCRIPTOR.message_types_by_name[short])
+
+
+def _message(descriptor: Any) -> Schema:
+    if descriptor.full_name in {"google.protobuf.Timestamp", "google.protobuf.Duration"}:
+        fields, title = {"sec": _WHOLE, "nsec": _WHOLE}, descriptor.name.lower()
+        return {"title": title, "type": "object", "properties": fields, "required": [*fields]}
     return {
-        "title": title,
+        "title": descriptor.full_name,
         "type": "object",
-        "properties": properties,
-        "required": list(properties),
+        "properties": {field.name: _field(field) for field in descriptor.fields},
+        "required": [field.name for field in descriptor.fields if not _is_optional(field)],
     }
 
 
-def _list(items: Schema) -> Schema:
-    return {"type": "array", "items": items}
+def _is_optional(field: Any) -> bool:
+    return field.has_presence and field.message_type is None
 
 
-_TIME: Final = _object("time", sec=_WHOLE, nsec=_WHOLE)
-_DURATION: Final = _object("duration", sec=_WHOLE, nsec=_WHOLE)
-_XYZ: Final = dict.fromkeys(("x", "y", "z"), _NUMBER)
-_VECTOR: Final = _object("foxglove.Vector3", **_XYZ)
-_POINT: Final = _object("foxglove.Point3", **_XYZ)
-_QUATERNION: Final = _object("foxglove.Quaternion", **_XYZ, w=_NUMBER)
-_COLOR: Final = _object("foxglove.Color", r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_POSE: Final = _object("foxglove.Pose", position=_VECTOR, orientation=_QUATERNION)
-_SPHERE: Final = _object("foxglove.SpherePrimitive", pose=_POSE, size=_VECTOR, color=_COLOR)
-_CUBE: Final = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR, color=_COLOR)
-_CYLINDER: Final = _object(
-    "foxglove.CylinderPrimitive",
-    pose=_POSE,
-    size=_VECTOR,
-    bottom_scale=_NUMBER,
-    top_scale=_NUMBER,
-    color=_COLOR,
-)
-_LINE: Final = _object(
-    "foxglove.LinePrimitive",
-    type=_WHOLE,
-    pose=_POSE,
-    thickness=_NUMBER,
-    scale_invariant=_TRUTH,
-    points=_list(_POINT),
-    color=_COLOR,
-    colors=_list(_COLOR),
-    indices=_list(_WHOLE),
-)
-_TRIANGLES: Final = _object(
-    "foxglove.TriangleListPrimitive",
-    pose=_POSE,
-    points=_list(_POINT),
-    color=_COLOR,
-    colors=_list(_COLOR),
-    indices=_list(_WHOLE),
-)
-_NONE: Final = _list({"type": "object"})
-"""A list that is always empty here."""
-_ENTITY: Final = _object(
-    "foxglove.SceneEntity",
-    timestamp=_TIME,
-    frame_id=_TEXT,
-    id=_TEXT,
-    lifetime=_DURATION,
-    frame_locked=_TRUTH,
-    metadata=_NONE,
-    arrows=_NONE,
-    cubes=_list(_CUBE),
-    spheres=_list(_SPHERE),
-    cylinders=_list(_CYLINDER),
-    lines=_list(_LINE),
-    triangles=_list(_TRIANGLES),
-    texts=_NONE,
-    models=_NONE,
-)
-_JOINT: Final = _object("foxglove.JointState", name=_TEXT) | {
-    "properties": {
-        "name": _TEXT,
-        "position": _NUMBER,
-        "velocity": _NUMBER,
-        "effort": _NUMBER,
-    }
-}
-"""Only the name must be there; what is not known is left out."""
-_TRANSFORM: Final = _object(
-    "foxglove.FrameTransform",
-    timestamp=_TIME,
-    parent_frame_id=_TEXT,
-    child_frame_id=_TEXT,
-    translation=_VECTOR,
-    rotation=_QUATERNION,
-)
-SCHEMAS: Final = {
-    schema["title"]: schema
-    for schema in (
-        _object("foxglove.SceneUpdate", deletions=_NONE, entities=_list(_ENTITY)),
-        _object("foxglove.FrameTransforms", transforms=_list(_TRANSFORM)),
-        _object("foxglove.JointStates", timestamp=_TIME, joints=_list(_JOINT)),
-        _object("foxglove.PoseInFrame", timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
-        _object(
-            "foxglove.Log",
-            timestamp=_TIME,
-            level=_WHOLE,
-            message=_TEXT,
-            name=_TEXT,
-            file=_TEXT,
-            line=_WHOLE,
-        ),
-    )
-}
-"""By name."""
+def _field(field: Any) -> Schema:
+    if field.message_type is not None:
+        one = _message(field.message_type)
+    else:
+        names = {getattr(field, f"CPPTYPE_{name}"): kind for name, kind in _KINDS.items()}
+        one = {"type": names.get(field.cpp_type, "integer")}
+    return {"type": "array", "items": one} if field.is_repeated else one

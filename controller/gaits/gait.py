@@ -139,6 +139,12 @@ class Gait(ABC):
 
         """
         joints = self.joints_rad(robot, np.linspace(0.0, 2.0 * np.pi, CYCLE_SAMPLES))
+        turn_rad = getattr(self.params, "turn_rad", 0.0)
+        if turn_rad and not robot.yaw_joints:
+            raise InputError(
+                f"gait {self.name}: turn_rad {turn_rad:g} needs yaw joints; robot {robot.name} has "
+                f"none (joint_axes {robot.joint_axes})"
+            )
         reach, limit = np.abs(joints).max(axis=0), np.array(robot.limit_rad)
         beyond = np.flatnonzero(reach > limit + 1e-9)
         if len(beyond):

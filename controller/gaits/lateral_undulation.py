@@ -19,7 +19,11 @@ class LateralUndulationParameters(GaitParameters):
     winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis: alpha")
     waves: float = Field(1.2, ge=0.5, le=3.0, description="on the body")
     turn_rad: float = Field(
-        0.0, ge=-2.5, le=2.5, description="bend of the axis over the body; positive turns left"
+        0.0,
+        ge=-2.5,
+        le=2.5,
+        description="bend of the axis over the body, positive to the left; "
+        "a body that goes backward turns the other way",
     )
     backward: bool = Field(False, description="tail first: the wave runs to the head")
 

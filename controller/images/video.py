@@ -149,7 +149,7 @@ def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
 def _av() -> ModuleType:
     import av  # noqa: PLC0415  an extra, for films that OpenCV does not read
 
-    return av  # type: ignore[no-any-return]
+    return av
 
 
 def _av_facts(path: Path) -> tuple[int, float] | None:

@@ -1,36 +1,51 @@
 """From a file of real ground to an elevation map in the robot's world."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.mapping.geo_raster import read_geo_raster
+from snakewalk.controller.mapping.height_range import check_heights
+from snakewalk.controller.mapping.las_file import in_metres, read_las
+from snakewalk.controller.mapping.length_units import DEGREE, unit_m
+from snakewalk.controller.mapping.number_table import read_numbers
 from snakewalk.controller.mapping.point_cloud import read_pcd, read_ply
 from snakewalk.controller.mapping.raster_file import (
-    DEGREE,
+    GEO_RASTERS,
     RASTERS,
-    UNITS_M,
     Crop,
+    Raster,
     RasterUnits,
-    read_numbers,
-    read_raster,
+    read_plain_raster,
 )
 from snakewalk.controller.terrain.elevation_map import CellHeight, ElevationMap
 
-CLOUDS: Final = (".pcd", ".ply", ".xyz")
+LASERS: Final = (".las", ".laz")
+CLOUDS: Final = (".pcd", ".ply", ".xyz", *LASERS)
 MESHES: Final = (".obj", ".stl", ".glb")
-_MOST_HEIGHT_M: Final = 20_000.0
-"""Beyond it a value is no height, but stands for none, or is in another unit (ours)."""
 _MOST_SIZE_M: Final = 100_000.0
 """Of a map in the robot's world: a run's places reach a hundredth of it (ours)."""
 ENDINGS: Final = (*RASTERS, *CLOUDS, *MESHES)
 _POINTS_A_CELL: Final = 2.0
 """Of a cloud whose spacing is not given, in the mean (ours)."""
+_STACKED_SHARE, _STACKED_RELIEF, _STACKED_POINTS = 0.2, 0.5, 3
+"""Share of the points, in cells with some of them, that lie one above the other by a share of the
+relief: beyond it a cloud is not seen from above (ours)."""
+_FEW_CELLS: Final = 10
+AXES: Final = ("z", "y", "x", "-z", "-y", "-x")
+"""Choices of the axis that points up."""
+_TURNS: Final = {
+    "z": ((0, 1, 2), (1.0, 1.0, 1.0)), "-z": ((0, 1, 2), (1.0, -1.0, -1.0)),
+    "y": ((0, 2, 1), (1.0, -1.0, 1.0)), "-y": ((0, 2, 1), (1.0, 1.0, -1.0)),
+    "x": ((1, 2, 0), (1.0, 1.0, 1.0)), "-x": ((1, 2, 0), (1.0, -1.0, -1.0)),
+}  # fmt: skip
+"""Order and signs of the axes that turn one up, without mirroring."""
 _MESH_SAMPLES: Final = 200
 """Along the longer side of a mesh whose spacing is not given (ours)."""
 
@@ -49,10 +64,20 @@ class MapOptions:
     """The same of heights; None: as ``scale``."""
     spacing_m: float | None = None
     """Between samples in the robot's world; None: as the file's, scaled."""
-    height: CellHeight = "median"
-    """Which of the points in a cell counts."""
-    up: str = "z"
-    """Axis of a mesh's or cloud's file that points up: y or z."""
+    height: CellHeight | None = None
+    """Which of the points in a cell counts; None: the median, of a cloud seen from above."""
+    up: str | None = None
+    """Axis of a mesh's or cloud's file that points up, of ``AXES``; None: z, if nothing else is
+    likely."""
+    classes: tuple[int, ...] | None = None
+    """Of the points of a laser scanner that count; None: the ground's."""
+    assumed: Assumptions = field(default_factory=Assumptions)
+    """What the file does not state, besides units."""
+
+    @property
+    def rise(self) -> float:
+        """Metres of height in the robot's world per metre of the file."""
+        return self.scale if self.vertical_scale is None else self.vertical_scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +91,8 @@ class FileMap:
     """Highest less lowest of that part, in metres of the file."""
     kind: str
     """What the file holds: raster, points or triangles."""
+    notes: tuple[str, ...] = ()
+    """What was used, changed or left out."""
 
 
 def read_elevation(file: Path, options: MapOptions) -> FileMap:
@@ -93,33 +120,58 @@ def _read(file: Path, options: MapOptions) -> FileMap:
     if ending in (*CLOUDS, *MESHES):
         return _solid(file, options)
     if ending == ".csv":
-        table = read_numbers(file)
+        notes: list[str] = []
+        table = read_numbers(file, notes)
         if table.shape[1] == 3:
-            return _of_points(file, _upright(file, table, options), None, options)
-    raster = read_raster(file, options.units, options.crop)
-    scale, rise = options.scale, _rise(options)
+            return _of_points(file, _upright(file, table, options), None, options, notes)
+    if ending in GEO_RASTERS:
+
+        def spacing_of(dx_m: float, dy_m: float) -> float:
+            least = min(dx_m, dy_m)
+            return least if options.spacing_m is None else options.spacing_m / options.scale
+
+        raster = read_geo_raster(file, options.units, options.crop, spacing_of)
+    else:
+        raster = read_plain_raster(file, options.units, options.crop)
+    return _of_raster(file, raster, options)
+
+
+def _of_raster(file: Path, raster: Raster, options: MapOptions) -> FileMap:
+    scale, rise = options.scale, options.rise
     dx_m, dy_m = raster.dx_m * scale, raster.dy_m * scale
     spacing_m = min(dx_m, dy_m) if options.spacing_m is None else options.spacing_m
     rows, columns = raster.z_m.shape
-    finite_m = raster.z_m[np.isfinite(raster.z_m)]
-    highest_m = float(np.abs(finite_m).max(initial=0.0))
-    if highest_m > _MOST_HEIGHT_M:
-        raise InputError(
-            f"{file}: holds heights of {highest_m:.3g} m: say which value is none (--no-data), or "
-            "their --unit"
-        )
+    _check_heights(file, raster.z_m, raster.per_value_m, options)
     elevation = ElevationMap.of_raster(raster.z_m * rise, dx_m, dy_m, spacing_m)
     size_m = (columns - 1) * raster.dx_m, (rows - 1) * raster.dy_m
-    return FileMap(elevation.centred(), size_m, _relief(raster.z_m), "raster")
+    return FileMap(elevation.centred(), size_m, _relief(raster.z_m), "raster", raster.notes)
+
+
+def _check_heights(file: Path, z_m: Floats, per_value_m: float, options: MapOptions) -> None:
+    try:
+        check_heights(z_m, per_value_m, options.assumed)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
 
 
 def _solid(file: Path, options: MapOptions) -> FileMap:
     """Points or triangles."""
     ending, faces = file.suffix.lower(), None
+    notes: list[str] = []
+    if ending in LASERS:
+        return _of_laser(file, options)
     if ending == ".pcd":
-        points = read_pcd(file)
+        cloud = read_pcd(file)
+        points = cloud.points
+        if cloud.image is not None and options.up is None:
+            raise InputError(
+                f"{file}: is a picture of {cloud.image[0]} by {cloud.image[1]} points, as depth "
+                "cameras give it, whose z points away from the camera and whose y points down; it "
+                "states no direction up: add --up -y (or --up z, if it was turned upright)"
+            )
+        notes += cloud.notes
     elif ending == ".xyz":
-        points = read_numbers(file)[:, :3]
+        points = read_numbers(file, notes)[:, :3]
     elif ending == ".ply":
         points, faces = read_ply(file)
     else:
@@ -128,27 +180,46 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
 
         mesh = read_mesh(file, "+x", "+z").mesh
         points, faces = mesh.vertices, mesh.faces
-    return _of_points(file, _upright(file, points, options), faces, options)
+    return _of_points(file, _upright(file, points, options), faces, options, notes)
+
+
+def _of_laser(file: Path, options: MapOptions) -> FileMap:
+    """Map of a laser scanner's points."""
+    units = options.units
+    held = read_las(file, options.classes, options.crop, units.unit)
+    points_m, notes = in_metres(file, held, units.unit, units.height_unit)
+    left = replace(options, crop=None) if held.cropped else options
+    return _of_points(file, points_m, None, left, [*held.notes, *notes])
 
 
 def _upright(file: Path, points: Floats, options: MapOptions) -> Floats:
     """Finite points (n, 3) in metres, z up."""
-    if options.units.unit == DEGREE:
-        raise InputError(f"{file}: degrees are the unit of rasters alone")
+    units = options.units
+    if units.unit == DEGREE:
+        raise InputError(f"{file}: degrees are the unit of rasters and laser scans alone")
     if points.shape[1] != 3:
         raise InputError(f"{file}: holds {points.shape[1]} numbers a point; x, y and z are needed")
-    if options.units.no_data is not None:
-        points = np.where(points == options.units.no_data, np.nan, points)
-    turned = points if options.up == "z" else points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    return np.asarray(turned * UNITS_M[options.units.unit or "m"])
+    if units.no_data is not None:
+        points = np.where(points == units.no_data, np.nan, points)
+    order, signs = _TURNS[options.up or "z"]
+    length_m = unit_m(units.unit or "m")
+    rise_m = unit_m(units.height_unit or units.unit or "m")
+    turned = points[:, order] * signs * [length_m, length_m, rise_m]
+    return np.ascontiguousarray(turned)
 
 
-def _of_points(file: Path, points_m: Floats, faces: Ints | None, options: MapOptions) -> FileMap:
+def _of_points(
+    file: Path, points_m: Floats, faces: Ints | None, options: MapOptions, notes: list[str]
+) -> FileMap:
     """Map of points, or of the triangles between them."""
     if faces is None:
-        points_m = points_m[np.isfinite(points_m).all(axis=1)]
+        finite = np.isfinite(points_m).all(axis=1)
+        if not finite.all():
+            notes.append(f"{int((~finite).sum())} points without numbers are left out")
+            points_m = points_m[finite]
     if len(points_m) == 0:
         raise InputError(f"{file}: holds no point")
+    _check_heights(file, points_m[:, 2], unit_m(_height_unit(options)), options)
     corner = points_m[:, :2].min(axis=0)
     placed = points_m - [*corner, 0.0]
     low, high = np.zeros(2), placed[:, :2].max(axis=0)
@@ -171,19 +242,54 @@ def _of_points(file: Path, points_m: Floats, faces: Ints | None, options: MapOpt
         if spacing_m <= 0.0:
             raise InputError(f"{file}: its points lie on a line, and span no ground")
         spacing_m = float(f"{spacing_m:.2g}")
-    rise = _rise(options)
+    rise = options.rise
     scaled = placed * [options.scale, options.scale, rise]
     if faces is None:
-        elevation = ElevationMap.of_points(scaled, spacing_m, options.height)
+        if options.height is None and options.up is None:
+            _check_seen_from_above(file, scaled, spacing_m)
+        elevation = ElevationMap.of_points(scaled, spacing_m, options.height or "median")
     else:
         corners = options.scale * low, options.scale * high
         elevation = ElevationMap.of_triangles(scaled, faces, *corners, spacing_m)
     relief_m = _relief(elevation.z_m) / rise
-    return FileMap(elevation.centred(), (float(size[0]), float(size[1])), relief_m, kind)
+    whole_m = float(size[0]), float(size[1])
+    return FileMap(elevation.centred(), whole_m, relief_m, kind, tuple(notes))
 
 
-def _rise(options: MapOptions) -> float:
-    return options.scale if options.vertical_scale is None else options.vertical_scale
+def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> None:
+    """Reject a cloud in which many points lie one above the other: walls, rooms, a camera's view.
+
+    Raises:
+        InputError: the question.
+
+    """
+    low = points_m[:, :2].min(axis=0)
+    place = np.rint((points_m[:, :2] - low) / spacing_m).astype(np.int64)
+    _, cell = np.unique(place, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    count = np.bincount(cell)
+    lowest, highest = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+    np.minimum.at(lowest, cell, points_m[:, 2])
+    np.maximum.at(highest, cell, points_m[:, 2])
+    relief_m = float(np.ptp(points_m[:, 2]))
+    several = count >= _STACKED_POINTS
+    if several.sum() < _FEW_CELLS or relief_m <= 0.0:
+        return
+    stacked = several & (highest - lowest > max(_STACKED_RELIEF * relief_m, spacing_m))
+    share = float(count[stacked].sum() / count[several].sum())
+    if share > _STACKED_SHARE:
+        raise InputError(
+            f"{file}: is no ground seen from above: {100.0 * share:.0f} % of its points are in "
+            "cells where they lie one above the other by more than "
+            f"{100.0 * _STACKED_RELIEF:.0f} % of the relief; add --up AXIS if another axis points "
+            "up, or --point lowest, median or highest for what counts in a cell"
+        )
+
+
+def _height_unit(options: MapOptions) -> str:
+    units = options.units
+    named = units.height_unit or units.unit or "m"
+    return "m" if named == DEGREE else named
 
 
 def _relief(z_m: Floats) -> float:

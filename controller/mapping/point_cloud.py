@@ -7,6 +7,7 @@ that of pointclouds.org, "The PCD (Point Cloud Data) file format"; ``binary_comp
 import math
 import struct
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,8 +28,20 @@ _HEADER_BYTES: Final = 4096
 """A header is searched for its last line so far (ours)."""
 
 
-def read_pcd(file: Path) -> Floats:
-    """Points (n, 3), in the file's unit, of a PCD file.
+@dataclass(frozen=True, slots=True)
+class PcdCloud:
+    """Points of a PCD file."""
+
+    points: Floats
+    """(n, 3) finite points in the file's unit."""
+    image: tuple[int, int] | None
+    """Width and height of a picture of points, as of a depth camera; None of other clouds."""
+    notes: tuple[str, ...]
+    """What was left out."""
+
+
+def read_pcd(file: Path) -> PcdCloud:
+    """Read a PCD file; its pose of the sensor (VIEWPOINT) is not used.
 
     Raises:
         InputError: it is none, is damaged, or would expand too far.
@@ -38,9 +51,18 @@ def read_pcd(file: Path) -> Floats:
     data = file.read_bytes()
     try:
         points = _pcd(file, data)
+        header, _ = _header(data)
+        width, height = int(header["WIDTH"][0]), int(header.get("HEIGHT", ["1"])[0])
+        pose = [float(word) for word in header.get("VIEWPOINT", [])]
     except (ValueError, KeyError, IndexError, struct.error, OverflowError) as error:
         raise InputError(f"{file}: is no whole PCD file: {error}") from None
-    return points[np.isfinite(points).all(axis=1)]
+    finite = np.isfinite(points).all(axis=1)
+    notes = []
+    if not finite.all():
+        notes.append(f"{int((~finite).sum())} points without numbers are left out")
+    if pose not in ([], [0, 0, 0, 1, 0, 0, 0]):
+        notes.append(f"VIEWPOINT {' '.join(f'{each:g}' for each in pose)} is not used")
+    return PcdCloud(points[finite], (width, height) if height > 1 else None, tuple(notes))
 
 
 def _pcd(file: Path, data: bytes) -> Floats:

@@ -29,6 +29,7 @@ from snakewalk.controller.kinematics.smoothstep import (
     quintic_slope,
 )
 from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.drivers.compiling import compiled
 
 DURATIONS_S = np.geomspace(0.25, 32.0, 36)
@@ -185,7 +186,7 @@ def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limi
     raise ValueError("a motion cannot be joined: it asks for more than the robot's limits")
 
 
-class Blend:
+class Blend(MotionWrapper):
     """A motion source: a target while it is joined to the joints' motion, and afterwards."""
 
     def __init__(
@@ -197,7 +198,8 @@ class Blend:
             ValueError: the target itself asks for more than ``limit``.
 
         """
-        self.target = target
+        super().__init__(target)
+        self.target, self._limit = target, limit
         self.join = plan_join(angle_rad, speed_rad_s, target, limit)
         self._t_s = 0.0
 
@@ -205,6 +207,11 @@ class Blend:
     def over(self) -> bool:
         """Whether the join is over and only the target runs."""
         return self._t_s >= self.join.duration_s
+
+    @property
+    def done(self) -> bool:
+        """Whether the join is over and the target is done."""
+        return self.over and self.target.done
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""
@@ -214,6 +221,10 @@ class Blend:
         """(J,) how fast they move now."""
         rate = self.join.source_rate(self._t_s)
         return np.asarray(rate * self.target.velocity_rad_s() + self.join.error_at(self._t_s)[1])
+
+    def pace(self) -> Pace:
+        """The robot's limits while it joins, and the target's own pace afterwards."""
+        return self.target.pace() if self.over else self._limit
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""

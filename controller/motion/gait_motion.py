@@ -5,15 +5,15 @@ from typing import Any
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.gait import Gait, Needs
+from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_cycle import GaitCycle
-from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.motion.source_switch import SourceSwitch
 from snakewalk.controller.motion.stop_profile import StopProfile
+from snakewalk.controller.motion.wrapper import MotionWrapper
 
 
-class GaitMotion:
+class GaitMotion(MotionWrapper):
     """A gait that starts from rest, whose parameters change without a step, and that can stop."""
 
     def __init__(
@@ -33,6 +33,7 @@ class GaitMotion:
         self._robot = robot
         self._cycle = GaitCycle(gait, robot, phase_rad)
         self._switch = SourceSwitch(robot, self._cycle)
+        super().__init__(self._switch)
         self._remaining_s = duration_s
         self._stop_profile = StopProfile()
         self.cycles = 0.0
@@ -52,11 +53,6 @@ class GaitMotion:
     def frequency_hz(self) -> float:
         """Cycles a second now."""
         return self._cycle.frequency_hz * self._stop_profile.rate
-
-    @property
-    def needs(self) -> Needs:
-        """Those of the gait."""
-        return self._cycle.needs
 
     @property
     def done(self) -> bool:
@@ -94,17 +90,9 @@ class GaitMotion:
         """Come to rest along a ``StopProfile``."""
         self._stop_profile.stop()
 
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._switch.goal_rad()
-
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
         return self._stop_profile.rate * self._switch.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """That of the gait, or the robot's limits while it changes."""
-        return self._switch.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
@@ -117,36 +105,15 @@ class GaitMotion:
         return self._switch.step(part_s, view)
 
 
-class GaitSequence:
+class GaitSequence(MotionWrapper):
     """Runs a ``GaitMotion`` through gaits."""
 
     def __init__(self, motion: GaitMotion, changes: Sequence[tuple[float, Gait]]) -> None:
         """Take gaits at rising times on the motion's own time; all suit its robot."""
+        super().__init__(motion)
         self.motion = motion
         self._changes = list(changes)
         self._now_s = 0.0
-
-    @property
-    def needs(self) -> Needs:
-        """Those of the gait that runs."""
-        return self.motion.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the motion is."""
-        return self.motion.done
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self.motion.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self.motion.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """That of the motion."""
-        return self.motion.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Change gait if it is time to, then go on by ``dt_s``."""

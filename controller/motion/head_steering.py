@@ -11,6 +11,7 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.motion.rate_limiter import RateLimiter
 from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.motion.wrapper import MotionWrapper
 
 LEAD_S = 0.12
 """How far the swing of the body is foreseen: the lag of the servos and of the rate limiter."""
@@ -33,7 +34,7 @@ class HeadTarget:
         return 0.0 if self.heading_rad is None else self.heading_rad
 
 
-class HeadSteering:
+class HeadSteering(MotionWrapper):
     """Another source with its first yaw joints, the neck, taken over."""
 
     def __init__(
@@ -45,7 +46,7 @@ class HeadSteering:
             InputError: the robot has no yaw joint, or lacks what the source needs.
 
         """
-        self.needs = Needs(yaw=True, pitch=source.needs.pitch, wheels=source.needs.wheels)
+        super().__init__(source)
         self.needs.check(robot, "head steering")
         self.source, self.target = source, target
         self._neck = np.array(robot.yaw_joints[:neck_joints])
@@ -61,9 +62,10 @@ class HeadSteering:
         self._swing_rad_s = 0.0
 
     @property
-    def done(self) -> bool:
-        """Whether the body's source is done."""
-        return self.source.done
+    def needs(self) -> Needs:
+        """Those of the source, and yaw joints."""
+        needs = self.wrapped.needs
+        return Needs(yaw=True, pitch=needs.pitch, wheels=needs.wheels)
 
     def goal_rad(self) -> Floats:
         """(J,) joint targets now."""

@@ -11,12 +11,13 @@ from collections.abc import Callable, Iterable
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.gait import Needs, Range, ranges
+from snakewalk.controller.gaits.gait import Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.motion.wrapper import MotionWrapper
 
 KEYS = {
     "up": "the parameter before",
@@ -32,11 +33,13 @@ KEYS = {
     "t": "torque off",
 }
 HALT_S = 0.5
+_DIRECTIONS = ("mirror", "backward", "turn_rad", "turn", "left_handed")
+"""Parameters that say which way a gait goes; another gait starts with its defaults."""
 _KEYS_MAX = 100
 """Keys and values that are carried out in a step (ours); text that is pasted is longer."""
 
 
-class Operator:
+class Operator(MotionWrapper):
     """Runs a gait, and changes it by keys."""
 
     def __init__(
@@ -59,6 +62,7 @@ class Operator:
                 shape, whatever else was pressed.
 
         """
+        super().__init__(motion)
         self.motion = motion
         self._robot, self._keys, self._on_event = robot, keys, on_event
         self._chosen = 0
@@ -69,23 +73,9 @@ class Operator:
         self._rate = 1.0
 
     @property
-    def needs(self) -> Needs:
-        """Those of the gait that runs."""
-        return self.motion.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the operator, or the gait's duration, has stopped it."""
-        return self.motion.done
-
-    @property
     def selected(self) -> str:
         """Parameter that left and right change."""
         return list(self._ranges())[self._chosen]
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self.motion.goal_rad()
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
@@ -178,6 +168,7 @@ class Operator:
         self._refuse("no other gait suits this robot")
 
     def _become(self, name: str, *, quietly: bool = False) -> bool:
+        before = self.motion.gait.params
         try:
             self.motion.become(make_gait(name))
         except InputError as error:
@@ -185,7 +176,15 @@ class Operator:
                 self._refuse(error.faults[0])
             return False
         self._chosen = 0
+        after = self.motion.gait.params
+        lost = [
+            each
+            for each in _DIRECTIONS
+            if getattr(before, each, 0) and getattr(after, each, 0) != getattr(before, each)
+        ]
         self._report(f"gait {name}")
+        if lost:
+            self._report(f"gait {name} does not keep {', '.join(lost)}")
         return True
 
     def _ranges(self) -> dict[str, Range]:

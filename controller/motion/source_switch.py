@@ -4,13 +4,13 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.blend import Blend
 from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.motion.wrapper import MotionWrapper
 
 
-class SourceSwitch:
+class SourceSwitch(MotionWrapper):
     """Begins at rest where its first source begins; ``join`` changes the source, C1."""
 
     def __init__(self, robot: RobotConfig, first: MotionSource) -> None:
@@ -19,6 +19,7 @@ class SourceSwitch:
         self._limit = Pace.limit(robot)
         start = first.goal_rad()
         self._blend = Blend(start, np.zeros(len(start)), first, self._limit)
+        super().__init__(self._blend)
 
     @property
     def source(self) -> MotionSource:
@@ -40,30 +41,8 @@ class SourceSwitch:
         """
         source.needs.check(self._robot, "this motion")
         blend = Blend(self.goal_rad(), self.velocity_rad_s(), source, self._limit)
-        self._blend = blend
+        self._blend = self.wrapped = blend
         return blend.join.duration_s
-
-    @property
-    def needs(self) -> Needs:
-        """Those of what runs now."""
-        return self.source.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether what runs now is done."""
-        return self._blend.over and self.source.done
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._blend.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._blend.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """At most the robot's limits while it joins, and the source's own pace afterwards."""
-        return self._limit if self.blending else self.source.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""

@@ -12,6 +12,7 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.motion.source_switch import SourceSwitch
 from snakewalk.controller.motion.stop_profile import StopProfile
+from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
 
@@ -75,7 +76,7 @@ class SegmentCycle:
         return self.goal_rad()
 
 
-class RepertoireMotion:
+class RepertoireMotion(MotionWrapper):
     """Asks for an action whenever a cycle ends; changes are joined C1 within the limits."""
 
     def __init__(
@@ -92,13 +93,9 @@ class RepertoireMotion:
         self.action = first
         self._cycle = SegmentCycle(repertoire.segments[first], robot)
         self._switch = SourceSwitch(robot, self._cycle)
+        super().__init__(self._switch)
         self._ends = 1
         self._stop_profile = StopProfile()
-
-    @property
-    def needs(self) -> Needs:
-        """Those of the action."""
-        return self._cycle.needs
 
     @property
     def done(self) -> bool:
@@ -113,10 +110,6 @@ class RepertoireMotion:
     def stop(self) -> None:
         """Come to rest along a ``StopProfile``."""
         self._stop_profile.stop()
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._switch.goal_rad()
 
     def velocity_rad_s(self) -> Floats:
         """(J,) how fast they move now."""
@@ -142,32 +135,3 @@ class RepertoireMotion:
             self.action, self._ends = chosen, 1
             self._cycle = SegmentCycle(self._repertoire.segments[chosen], self._robot)
             self._switch.join(self._cycle)
-
-
-class ActionsInForce:
-    """What a motion by recorded actions tells of itself: part of ``MotionSource``."""
-
-    def __init__(self, motion: RepertoireMotion) -> None:
-        self._motion = motion
-
-    @property
-    def needs(self) -> Needs:
-        """What the action in force asks of the robot."""
-        return self._motion.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the motion has come to rest."""
-        return self._motion.done
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._motion.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._motion.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """The robot's limits: actions follow each other."""
-        return self._motion.pace()

@@ -46,6 +46,21 @@ class Repertoire:
             raise InputError(f"{name}: no such action; there are {', '.join(names)}")
         return names.index(name)
 
+    def contradictions(self) -> list[str]:
+        """Return a line for each action that was not carried out in the direction of its kind."""
+        lines = []
+        for segment in self.segments:
+            speed_m_s, turn_rad_s = segment.speed_m_s, segment.turn_rad_s
+            forward = {"forward": 1, "left": 1, "right": 1, "reverse": -1}.get(segment.kind, 0)
+            left = {"left": 1, "right": -1}.get(segment.kind, 0)
+            if forward * speed_m_s < 0.0 or left * turn_rad_s < 0.0:
+                lines.append(
+                    f"action {segment.name}: the body went {speed_m_s:.2f} m/s and turned "
+                    f"{turn_rad_s:.2f} rad/s (positive: forward, left); "
+                    f"world {self.world} does not carry this action"
+                )
+        return lines
+
     def check(self, robot: RobotConfig) -> None:
         """Refuse a robot with other joints.
 

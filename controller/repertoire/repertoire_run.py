@@ -14,7 +14,8 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.kinematics.frame import Frame, body_frame
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.motion.path_progress import Decision
-from snakewalk.controller.repertoire.motion import ActionsInForce, RepertoireMotion
+from snakewalk.controller.motion.wrapper import MotionWrapper
+from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
@@ -75,7 +76,7 @@ class RepertoireRun:
         return RouteMotion(self, on_event)
 
 
-class RouteMotion(ActionsInForce):
+class RouteMotion(MotionWrapper):
     """Plays the actions and counts waypoints; comes to rest when all are reached."""
 
     missed = 0
@@ -98,7 +99,8 @@ class RouteMotion(ActionsInForce):
         self._path_m = route.pose[:, :2]
         self._on_event = on_event
         first = route.actions[0]
-        super().__init__(RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose))
+        self._motion = RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose)
+        super().__init__(self._motion)
         on_event("action", self._names[first])
 
     @property

@@ -19,7 +19,8 @@ from snakewalk.config.synthesis import curve_at
 from snakewalk.controller.kinematics.frame import body_frame
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.rotations import wrap
-from snakewalk.controller.repertoire.motion import ActionsInForce, RepertoireMotion
+from snakewalk.controller.motion.wrapper import MotionWrapper
+from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire, load_repertoire
 from snakewalk.controller.repertoire.search import plane_pose
 from snakewalk.controller.repertoire.secondary import SecondaryController
@@ -143,7 +144,13 @@ class ScheduleRun(PathlessRun):
         return plan_without_path(self.run)
 
     def remark(self) -> str | None:
-        """Return a warning if an action is much slower, faster or wider than requested."""
+        """Return a warning if the body may move much differently than requested."""
+        recorded, world = self.repertoire.world, self.world.name
+        if world != recorded:
+            return (
+                f"{self.config.file}: recorded on world {recorded}; on {world} speeds, turns and "
+                f"even directions may differ: record there, or leave --world out"
+            )
         control = self.controller()
         found = self._first_lasting(control.is_far)
         if found is None:
@@ -189,7 +196,7 @@ class PlayedAction:
     """The same of the body, over the time that the action and the join to it took."""
 
 
-class ScheduleMotion(ActionsInForce):
+class ScheduleMotion(MotionWrapper):
     """Asks the secondary controller for an action at the end of each, and comes to rest in time."""
 
     def __init__(self, prepared: ScheduleRun, on_event: OnEvent) -> None:
@@ -201,7 +208,8 @@ class ScheduleMotion(ActionsInForce):
         """So far."""
         self._requested = prepared.requested(0.0)
         first = self._controller.choose(*self._requested)
-        super().__init__(RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose))
+        self._motion = RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose)
+        super().__init__(self._motion)
         on_event("action", self._name(first))
 
     def step(self, dt_s: float, view: BodyView) -> Floats:

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from snakewalk.config.arrays import Indices
+from snakewalk.config.errors import InputError
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
 _ALIKE: Final = 0.1
@@ -36,7 +37,8 @@ class SecondaryController:
         ``patience``: cycles of one segment after which it changes, 1 or more; None: never.
 
         Raises:
-            ValueError: ``patience`` below 1, or no segment that goes forward.
+            ValueError: ``patience`` below 1.
+            InputError: no segment goes forward.
 
         """
         if patience is not None and patience < 1:
@@ -44,8 +46,6 @@ class SecondaryController:
         segments = repertoire.segments
         self._names = [segment.name for segment in segments]
         self._kinds = np.array([segment.kind for segment in segments])
-        if "forward" not in self._kinds:
-            raise ValueError("a repertoire without a forward segment")
         self._steady = np.flatnonzero(self._kinds != "brake")
         brakes = np.flatnonzero(self._kinds == "brake")
         self._brake = int(brakes[0]) if len(brakes) else None
@@ -56,6 +56,11 @@ class SecondaryController:
         turns = np.isin(self._kinds, ["left", "right"])
         self._side = np.where(turns, np.sign(self._turn_rad_s), 0.0).astype(int)
         steady_m_s = self._speed_m_s[self._steady]
+        if not (self._direction[self._steady] > 0).any():
+            raise InputError(
+                f"repertoire of {repertoire.robot} on {repertoire.world}: no action goes forward "
+                f"({self.available()}); record it on a ground with more friction across the body"
+            )
         self._slowest_m_s = float(steady_m_s[self._direction[self._steady] > 0].min())
         back_m_s = -steady_m_s[self._direction[self._steady] < 0]
         self._slowest_back_m_s = float(back_m_s.min(initial=np.inf))

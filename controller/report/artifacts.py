@@ -11,7 +11,7 @@ from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY, atomic_write
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
-from snakewalk.controller.report.page import Section, film_html, page
+from snakewalk.controller.report.page import Section, film_on_page, page
 from snakewalk.controller.run.film_look import SERVOS, film_look
 from snakewalk.controller.run.finish import Artifacts
 from snakewalk.controller.run.summary_file import write_summary
@@ -85,6 +85,7 @@ class _Drawn:
 
 def _draw(record: RunRecord, made: str = "") -> _Drawn:
     require_extra("the report needs", "matplotlib", "plotly")
+    require_extra("the report needs", "jinja2")
     from snakewalk.controller.report.curves import curves_html  # noqa: PLC0415  an extra
     from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415  an extra
 
@@ -100,9 +101,7 @@ def _write_page(
     folders: bool = False,
 ) -> Path:
     header = record.header
-    film_on_page = ""
-    if film is not None:
-        film_on_page = film_html(film, out_dir, *film_times(record))
+    shown = None if film is None else film_on_page(film, out_dir, *film_times(record))
     config = {
         "run": header.run.model_dump(mode="json"),
         "robot": header.robot.model_dump(mode="json"),
@@ -111,7 +110,7 @@ def _write_page(
     html = page(
         numbers,
         drawn.sections,
-        film=film_on_page,
+        film=shown,
         events=record.events,
         config=config,
         curves=drawn.curves,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -49,32 +50,37 @@ def film_run(
             the log holds no two poses.
 
     """
-    render_film = _renderer()
+    film = _renderer()
     header = record.header
     time_s, qpos = body_qpos(record)
     if len(time_s) < 2:
         raise InputError("the log holds no two poses: there is nothing to film")
     path.parent.mkdir(parents=True, exist_ok=True)
     plan = header.plan
-    return render_film(
+    drawn: int = film.render_film(
         header.robot,
         header.world,
         _ground(header),
         time_s,
         qpos,
         path,
-        fps=FINE_FPS if fine else FPS,
-        speed_up=speed_up(float(time_s[-1] - time_s[0])),
-        size=FINE_SIZE if fine else SIZE,
-        waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
-        waypoint_radius_m=plan.waypoint_radius_m,
-        reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
-        paths=record.paths,
-        title=header.run.name,
-        look=look,
-        fine=fine,
+        style=film.Style(
+            fps=FINE_FPS if fine else FPS,
+            speed_up=speed_up(float(time_s[-1] - time_s[0])),
+            size=FINE_SIZE if fine else SIZE,
+            title=header.run.name,
+            look=look,
+            fine=fine,
+        ),
+        marks=film.Marks(
+            waypoints_m=[(float(x), float(y)) for x, y in plan.waypoints_m],
+            waypoint_radius_m=plan.waypoint_radius_m,
+            reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
+            paths=record.paths,
+        ),
         on_frame=on_progress,
     )
+    return drawn
 
 
 def film_motion(
@@ -112,35 +118,29 @@ def film_motion(
         InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
 
     """
-    render_film = _renderer()
+    film = _renderer()
     frames, bones = motion.front_m.shape[:2]
     turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
     poses = np.concatenate([motion.front_m, turns.reshape(frames, bones, 4)], axis=2)
-    return render_film(
+    drawn: int = film.render_film(
         robot,
         world,
         ground,
         motion.time_s,
         poses.reshape(frames, -1),
         path,
-        fps=FPS,
-        speed_up=speed_up(float(motion.time_s[-1])),
-        size=SIZE,
-        waypoints_m=waypoints_m,
-        waypoint_radius_m=waypoint_radius_m,
-        reached_s=reached_s,
-        paths=paths,
-        title=title,
-        look=look,
+        style=film.Style(FPS, speed_up(float(motion.time_s[-1])), SIZE, title, look),
+        marks=film.Marks(waypoints_m, waypoint_radius_m, reached_s, paths),
         on_frame=on_progress,
     )
+    return drawn
 
 
-def _renderer() -> Callable[..., int]:
+def _renderer() -> ModuleType:
     require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+    from snakewalk.sim.rendering import film  # noqa: PLC0415  an extra
 
-    return render_film
+    return film
 
 
 def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:

@@ -24,6 +24,7 @@ from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.port.byte_port import BytePort
@@ -170,9 +171,21 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         bus: ChainBus = _bus_on_ports(robot, WallClock())
     else:
         bus = _bus_on(robot, open_port(port, robot.servo.baud))
-    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+    chain = ServoChain(
+        bus,
+        robot,
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+        fingerprint_file=_fingerprint_file(run),
+    )
     name = port_map_text((each.port, each.ids) for each in robot.ports) or port
     return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
+
+
+def _fingerprint_file(run: RunConfig) -> FingerprintFile | None:
+    """Fingerprints of the servos, next to the robot's file; None for a shipped robot."""
+    path = own_file(run.robot)
+    return None if path is None else FingerprintFile(path)
 
 
 def split(

@@ -48,7 +48,7 @@ class Deviation:
         masses_kg = np.array(robot.link_masses_kg) + self.load_kg
         if robot.stereo_head is not None:  # the robot adds it again
             masses_kg[robot.stereo_head.link] -= robot.stereo_head.mass_kg
-        return robot.with_link_masses(masses_kg)
+        return robot.with_link_masses(masses_kg.tolist())
 
     def world(self, world: WorldConfig) -> WorldConfig:
         """Return the ground that the physics has."""

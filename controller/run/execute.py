@@ -42,7 +42,14 @@ from snakewalk.controller.run.watchers import SHADOW
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import CycleObserver, Drive, OnEvent, OnProgress, Outcome
+from snakewalk.controller.runtime.drive import (
+    CycleObserver,
+    Drive,
+    OnEvent,
+    OnProgress,
+    Outcome,
+    Sensors,
+)
 from snakewalk.controller.runtime.friction_monitor import (
     FrictionMonitor,
     OnPaper,
@@ -53,6 +60,7 @@ from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.pilot import UsesFriction
 from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
+from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError
 from snakewalk.drivers.priority import raised_priority
@@ -88,7 +96,7 @@ class Finished:
     """The motion that ran, at its end."""
 
 
-def execute(  # noqa: PLR0915
+def execute(
     prepared: PreparedRun,
     folder: Path,
     port: str | None = None,
@@ -127,56 +135,91 @@ def execute(  # noqa: PLR0915
 
     """
     refuse_another_run(folder, force)
-    robot = on_ports(prepared.robot, port)
-    body_simulated = port is None or is_split(robot)
-    _check(prepared, metal=not body_simulated, shadow=shadow)
-    plan = prepared.check_plan()
-    initial_pose = prepared.initial_pose() if body_simulated else None
-    if initial_pose is None:
-        backend = metal(prepared.run, robot, port or "")
-    else:
+    run = _Execution(
+        prepared, folder, port, view, shadow, confirm, stop_requested, waypoint_commands,
+        on_progress, on_event,
+    )  # fmt: skip
+    return run.carry_out(stoppable=stoppable)
+
+
+@dataclass(frozen=True, slots=True)
+class _Execution:
+    """Arguments of ``execute``."""
+
+    prepared: PreparedRun
+    folder: Path
+    port: str | None
+    view: Watcher | None
+    shadow: bool
+    confirm: Callable[[str], bool] | None
+    stop_requested: Callable[[], str | None]
+    waypoint_commands: Callable[[], Iterable[str]] | None
+    on_progress: OnProgress
+    on_event: OnEvent
+
+    def carry_out(self, *, stoppable: bool) -> Finished:
+        """Check the plan, open backend, stop button and log, and run."""
+        prepared, port, view = self.prepared, self.port, self.view
+        robot = on_ports(prepared.robot, port)
+        body_simulated = port is None or is_split(robot)
+        _check(prepared, metal=not body_simulated, shadow=self.shadow)
+        plan = prepared.check_plan()
+        initial_pose = prepared.initial_pose() if body_simulated else None
+        backend = self._backend(robot, initial_pose)
+        evidence = pose_evidence(prepared, backend)
+        if not evidence.is_measured:
+            LOGGER.warning(
+                "pose: %s: distances and arrivals are not measured; give a pose source with --pose",
+                evidence.text,
+            )
+        log_path = self.folder / LOG
+        clear_run(self.folder)
+        LOGGER.debug(
+            "%s on %s; the plan keeps the limits; log: %s",
+            *(prepared.robot.name, backend.name, log_path),
+        )
+        torque_constant_n_m_a, winding = _motor(prepared.robot)
+        ports = None if port is None else real_ports(robot) or [port]
+        made = StopButton(prepared.run.name, ports, self.folder) if stoppable else nullcontext()
+        with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
+            if view is not None and button is not None:
+                view.on_button(button.path)
+            log.config(
+                prepared.run,
+                robot,
+                prepared.world,
+                backend=backend.name,
+                plan=plan,
+                ground=prepared.ground,
+                initial_pose=initial_pose,
+                torque_constant_n_m_a=torque_constant_n_m_a,
+                winding=winding,
+                pose_evidence=evidence,
+                port_is_pseudo_terminal=is_pseudo_terminal(ports),
+            )
+            outcome, pose, mapped, source = self._loop(robot, backend, log, button, initial_pose)
+        LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
+        record, numbers = _read_back(log_path)
+        return Finished(outcome, log_path, record, numbers, pose, mapped, source)
+
+    def _backend(self, robot: RobotConfig, initial_pose: InitialPose | None) -> Backend:
+        prepared, port = self.prepared, self.port
+        if initial_pose is None:
+            return metal(prepared.run, robot, port or "")
         make = simulated if port is None else split
-        backend = make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
-    evidence = pose_evidence(prepared, backend)
-    if not evidence.is_measured:
-        LOGGER.warning(
-            "pose: %s: distances and arrivals are not measured; give a pose source with --pose",
-            evidence.text,
-        )
-    log_path = folder / LOG
-    clear_run(folder)
-    LOGGER.debug(
-        "%s on %s; the plan keeps the limits; log: %s", prepared.robot.name, backend.name, log_path
-    )
-    torque_constant_n_m_a, winding = _motor(prepared.robot)
-    ports = None if port is None else real_ports(robot) or [port]
-    made = StopButton(prepared.run.name, ports, folder) if stoppable else nullcontext()
-    with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
-        if view is not None and button is not None:
-            view.on_button(button.path)
-        log.config(
-            prepared.run,
-            robot,
-            prepared.world,
-            backend=backend.name,
-            plan=plan,
-            ground=prepared.ground,
-            initial_pose=initial_pose,
-            torque_constant_n_m_a=torque_constant_n_m_a,
-            winding=winding,
-            pose_evidence=evidence,
-            port_is_pseudo_terminal=is_pseudo_terminal(ports),
-        )
-        safety, clock = prepared.run.safety, backend.clock
-        recovery = Recovery(
-            backend.chain,
-            policy=safety.recovery,
-            patience_s=safety.recovery_time_s,
-            overload_reboots=safety.overload_reboots,
-            confirm=confirm,
-            on_event=lambda text: warn("recovery", text),
-        )
-        backend.chain.on_event = lambda text: warn("bus", text)
+        return make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
+
+    def _loop(
+        self,
+        robot: RobotConfig,
+        backend: Backend,
+        log: RunLog,
+        button: StopButton | None,
+        initial_pose: InitialPose | None,
+    ) -> tuple[Outcome, PoseProvider, MapProvider, MotionSource]:
+        """Open pose and map, and run the loop until torque is off."""
+        prepared, view, safety = self.prepared, self.view, self.prepared.run.safety
+        clock = backend.clock
 
         def warn(kind: str, text: str) -> None:
             log.event(clock.now_s(), kind, text, "warning")
@@ -184,54 +227,62 @@ def execute(  # noqa: PLR0915
 
         def log_event(kind: str, text: str) -> None:
             log.event(clock.now_s(), kind, text)
-            on_event(kind, text)
+            self.on_event(kind, text)
 
+        backend.chain.on_event = lambda text: warn("bus", text)
         observers = ObserverWatch(view, safety.lost_observer, warn)
         shown = {} if view is None else {"on_picture": view.on_picture}
         with (
             pose_provider(prepared, backend, log_event, **shown) as pose,
-            map_provider(prepared, backend, pose.measure, folder, log_event) as mapped,
+            map_provider(prepared, backend, pose.measure, self.folder, log_event) as mapped,
         ):
             source = prepared.make_source(log_event)
             friction = _second_body(prepared, source, backend)
-            if waypoint_commands is not None:
-                source = _live(prepared, source, waypoint_commands, log_event)
+            if self.waypoint_commands is not None:
+                source = _live(prepared, source, self.waypoint_commands, log_event)
             link = SafeLink(
                 backend.chain,
                 SafetyLimits.from_config(robot, safety),
                 clock,
-                recovery,
-                observers.with_stop(stop_requested, button),
+                self._recovery(backend, warn),
+                observers.with_stop(self.stop_requested, button),
                 lambda text: warn("safety", text),
             )
-            start = initial_pose if port is None else None
-            beside = _shadow(prepared, start, log, on_event) if shadow else None
+            start = initial_pose if self.port is None else None
+            beside = _shadow(prepared, start, log, self.on_event) if self.shadow else None
             drive = Drive(
                 link=link,
                 clock=clock,
-                pose=mapped.measure,
+                sensors=Sensors(mapped.measure, backend.wire_busy_s, backend.energy),
                 motion=source,
                 log=log,
                 robot=prepared.robot,
                 run=prepared.run,
                 gain=prepared.gain,
-                wire_busy_s=backend.wire_busy_s,
-                energy=backend.energy,
                 observer=beside,
                 friction=friction,
-                on_progress=observers.with_report(on_progress),
-                on_event=on_event,
+                on_progress=observers.with_report(self.on_progress),
+                on_event=self.on_event,
             )
             with _end_told(link, log, clock):
-                with raised_priority() if port is not None else nullcontext():
+                with raised_priority() if self.port is not None else nullcontext():
                     outcome = drive.run()
                 if button is not None:
                     button.end(outcome.tripped or "it had come to its end")
                 if beside is not None:
                     beside.end(clock.now_s())
-    LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
-    record, numbers = _read_back(log_path)
-    return Finished(outcome, log_path, record, numbers, pose, mapped, source)
+        return outcome, pose, mapped, source
+
+    def _recovery(self, backend: Backend, warn: Callable[[str, str], None]) -> Recovery[Recheck]:
+        safety = self.prepared.run.safety
+        return Recovery(
+            backend.chain,
+            policy=safety.recovery,
+            patience_s=safety.recovery_time_s,
+            overload_reboots=safety.overload_reboots,
+            confirm=self.confirm,
+            on_event=lambda text: warn("recovery", text),
+        )
 
 
 def _live(

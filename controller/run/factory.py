@@ -20,6 +20,7 @@ from snakewalk.config.loader import (
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import MOTIONS, RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import find, require, unknown
 from snakewalk.controller.console.plugins import names as plugin_names
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
@@ -143,6 +144,8 @@ def prepare_job(
     beside = Path(name).parent if name.endswith(".toml") else None
     options = {key: value for key, value in changes.items() if value is not None}
     options.setdefault("track", track_beside(run.track, beside))
+    if beside is not None and (beside / run.robot).is_file():
+        options.setdefault("robot", str(beside / run.robot))
     run = checked(RunConfig, run.model_dump() | options, "command line")
     run = with_keys_of("run", run, keys)
     if run.motion == "kp" and not on_paper:
@@ -280,7 +283,11 @@ def prepare_gait(
     )
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = with_gains(body, pitch=pitch, soft=soft)
-    return GaitRun(run, body, ground, make_operator)
+    prepared = GaitRun(run, body, ground, make_operator)
+    remark = prepared.remark()
+    if remark is not None:
+        LOGGER.warning("%s", remark)
+    return prepared
 
 
 def is_gait(name: str) -> bool:

@@ -20,7 +20,7 @@ def check_supply(robot: RobotConfig) -> None:
 
     """
     for facts in robot.models_by_id.values():
-        if facts.motor is None:  # its file does not say
+        if facts.motor is None:  # its file does not state it
             continue
         low_v, high_v = facts.motor.voltage_v
         if not low_v <= robot.servo.supply_v <= high_v:

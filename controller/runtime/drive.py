@@ -132,6 +132,18 @@ class CycleObserver(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """Measurements of a run besides the joint states."""
+
+    pose: PoseSource
+    """Pose of the head for a joint state."""
+    wire_busy_s: Callable[[], float] = lambda: float("nan")
+    """Time that bytes have spent on the wire so far; NaN if it is not counted."""
+    energy: Callable[[], MotorEnergy] = MotorEnergy
+    """Energy that the motors have drawn and delivered so far."""
+
+
 class Drive:
     """Runs a motion on a link; construct, then ``run()`` once."""
 
@@ -140,21 +152,19 @@ class Drive:
         *,
         link: VettedLink,
         clock: Clock,
-        pose: PoseSource,
+        sensors: Sensors,
         motion: MotionSource,
         log: RunLog,
         robot: RobotConfig,
         run: RunConfig,
         gain: float,
-        wire_busy_s: Callable[[], float] = lambda: float("nan"),
-        energy: Callable[[], MotorEnergy] = MotorEnergy,
         observer: CycleObserver | None = None,
         friction: FrictionMonitor | None = None,
         on_progress: OnProgress = lambda progress: None,
         on_event: OnEvent = lambda kind, text: None,
     ) -> None:
         self._observer = observer
-        self._link, self._clock, self._pose = link, clock, pose
+        self._link, self._clock, self._pose = link, clock, sensors.pose
         self._motion, self._path = motion, path_progress(motion)
         self._open = motion if isinstance(motion, OpenWaypoints) else None
         self._waypoints_m = None if self._open is None else self._open.waypoints_m
@@ -166,9 +176,9 @@ class Drive:
         self._derating = Derating(run.safety, robot, self._on_derating)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
-        self._wire_busy_s = wire_busy_s
-        self._wire_s = wire_busy_s()
-        self._energy = energy
+        self._wire_busy_s = sensors.wire_busy_s
+        self._wire_s = sensors.wire_busy_s()
+        self._energy = sensors.energy
         self._alarms = 0
         self._speed_m_s = 0.0
         self._last: BodyView | None = None

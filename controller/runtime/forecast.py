@@ -111,64 +111,19 @@ def forecast(
         limit_s: when to give up.
 
     """
-    joints = pilot.goal_rad()
-    head_m = np.array(start_m[:2], dtype=float)
-    head_rad = heading_rad - mean_heading_rad(robot, joints)
-    velocity, moving_m_s = np.zeros(3), np.zeros((robot.joint_count + 1, 2))
-    slide: Slide | None = None
-    times, angles, centres, pulse_m = [0.0], [joints], [], 0.0
+    body = _PaperBody(robot, friction, ground, step_s)
+    body.begin(start_m, heading_rad, pilot.goal_rad())
+    times, angles, centres, pulse_m = [0.0], [body.joints], [], 0.0
     torques = [np.zeros(robot.joint_count)]
-    yaw = np.array([axis == "y" for axis in robot.joint_axes])
-    weight_n = robot.mean_link_mass_kg * GRAVITY_M_S2
-    share, lengths_m = link_weights(robot)[:, None], np.array(robot.link_lengths_m)
     while True:
-        view = body_in_world(robot, pose_at(head_m, head_rad), joints)
+        view = body.view()
         centres.append(view.centre_m[:2])
         if pilot.done or times[-1] >= limit_s:
             break
-        goal = pilot.step(step_s, view)
-        before, after = _in_head_frame(robot, joints), _in_head_frame(robot, goal)
-        shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
-        points, headings = before.link_m[:, :2], before.headings_rad
-        c, s = np.cos(head_rad), np.sin(head_rad)
-        turn = np.array([[c, -s], [s, c]])
-        tangential, normal = slope_load(ground, view.link_m)
-        tangential, normal = share * (tangential @ turn), share[:, 0] * normal
-        was_m_s = moving_m_s @ turn
-        try:
-            velocity = rigid_velocity(
-                points,
-                headings,
-                shape_m_s,
-                friction,
-                velocity,
-                tangential=tangential,
-                normal=normal,
-            )
-            held = True
-        except NoBalanceError:
-            velocity = inertial_velocity(
-                points, headings, shape_m_s, friction, was_m_s, step_s, velocity,
-                tangential=tangential, normal=normal,
-            )  # fmt: skip
-            held = False
-        lever = np.stack([-points[:, 1], points[:, 0]], axis=1)
-        moving = shape_m_s + velocity[:2] + velocity[2] * lever
-        force_n = (
-            friction_n(moving, headings, friction, weight_n) * normal[:, None]
-            + weight_n * tangential
-        )
-        if not held:
-            slide = _worse(slide, points, headings, friction, tangential, normal, step_s)
-            force_n -= robot.mean_link_mass_kg * share * (moving - was_m_s) / step_s
-        moving_m_s = moving @ turn.T
-        torques.append(yaw * yaw_load_n_m(points, headings, lengths_m, force_n))
-        head_m = head_m + step_s * turn @ velocity[:2]
-        head_rad += step_s * velocity[2]
-        joints = goal
+        torques.append(body.step(pilot.step(step_s, view), view))
         pulse_m += step_s * pilot.pulse_m_s
         times.append(times[-1] + step_s)
-        angles.append(joints)
+        angles.append(body.joints)
     return Forecast(
         np.array(times),
         np.array(angles),
@@ -177,8 +132,98 @@ def forecast(
         pulse_m,
         pilot.reached,
         pilot.missed,
-        slide,
+        body.slide,
     )
+
+
+class _PaperBody:
+    """A quasi-static body: friction balances the pull of the slope while it can hold the body."""
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        friction: FrictionConfig,
+        ground: HeightField | None,
+        step_s: float,
+    ) -> None:
+        self._robot, self._friction, self._ground = robot, friction, ground
+        self._step_s, self._head_m, self._head_rad = step_s, np.zeros(2), 0.0
+        self._velocity, self._moving_m_s = np.zeros(3), np.zeros((robot.joint_count + 1, 2))
+        self._yaw = np.array([axis == "y" for axis in robot.joint_axes])
+        self._weight_n = robot.mean_link_mass_kg * GRAVITY_M_S2
+        self._share = link_weights(robot)[:, None]
+        self._lengths_m = np.array(robot.link_lengths_m)
+        self.joints: Floats = np.zeros(robot.joint_count)
+        """(J,) joint angles."""
+        self.slide: Slide | None = None
+        """The steepest ground that did not hold the body."""
+
+    def begin(self, head_m: Floats, heading_rad: float, joints: Floats) -> None:
+        """Lay the body down: head link (2,), heading of its mean line, joint angles (J,)."""
+        self._head_m = np.array(head_m[:2], dtype=float)
+        self._head_rad = heading_rad - mean_heading_rad(self._robot, joints)
+        self.joints = joints
+
+    def view(self) -> BodyView:
+        """Return the body in the world."""
+        pose = pose_at(self._head_m, self._head_rad)
+        return body_in_world(self._robot, pose, self.joints)
+
+    def step(self, goal: Floats, view: BodyView) -> Floats:
+        """Move the joints to ``goal`` (J,) and the body with them; returns torques (J,), N m."""
+        step_s, weight_n, share = self._step_s, self._weight_n, self._share
+        before = _in_head_frame(self._robot, self.joints)
+        after = _in_head_frame(self._robot, goal)
+        shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
+        points, headings = before.link_m[:, :2], before.headings_rad
+        c, s = np.cos(self._head_rad), np.sin(self._head_rad)
+        turn = np.array([[c, -s], [s, c]])
+        tangential, normal = slope_load(self._ground, view.link_m)
+        tangential, normal = share * (tangential @ turn), share[:, 0] * normal
+        was_m_s = self._moving_m_s @ turn
+        held = self._balance(points, headings, shape_m_s, was_m_s, tangential, normal)
+        velocity = self._velocity
+        lever = np.stack([-points[:, 1], points[:, 0]], axis=1)
+        moving = shape_m_s + velocity[:2] + velocity[2] * lever
+        force_n = (
+            friction_n(moving, headings, self._friction, weight_n) * normal[:, None]
+            + weight_n * tangential
+        )
+        if not held:
+            self.slide = _worse(
+                self.slide, points, headings, self._friction, tangential, normal, step_s
+            )
+            force_n -= self._robot.mean_link_mass_kg * share * (moving - was_m_s) / step_s
+        self._moving_m_s = moving @ turn.T
+        torque = self._yaw * yaw_load_n_m(points, headings, self._lengths_m, force_n)
+        self._head_m = self._head_m + step_s * turn @ velocity[:2]
+        self._head_rad += step_s * velocity[2]
+        self.joints = goal
+        return np.asarray(torque)
+
+    def _balance(
+        self,
+        points: Floats,
+        headings: Floats,
+        shape_m_s: Floats,
+        was_m_s: Floats,
+        tangential: Floats,
+        normal: Floats,
+    ) -> bool:
+        """Find the rigid velocity; returns whether friction holds the body."""
+        friction = self._friction
+        try:
+            self._velocity = rigid_velocity(
+                points, headings, shape_m_s, friction, self._velocity,
+                tangential=tangential, normal=normal,
+            )  # fmt: skip
+        except NoBalanceError:
+            self._velocity = inertial_velocity(
+                points, headings, shape_m_s, friction, was_m_s, self._step_s, self._velocity,
+                tangential=tangential, normal=normal,
+            )  # fmt: skip
+            return False
+        return True
 
 
 def _in_head_frame(robot: RobotConfig, joint_rad: Floats) -> BodyView:

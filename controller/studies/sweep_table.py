@@ -31,7 +31,7 @@ def read_table(path: Path) -> list[dict[str, str]]:
     return read_csv_table(path, COLUMNS, "sweep")
 
 
-class Table(CsvTable):
+class SweepTable(CsvTable):
     """Finished points."""
 
     def __init__(self, path: Path) -> None:

@@ -161,7 +161,9 @@ def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]
     # A plane needs the diagonal neighbours. Where samples lie exactly on the radius, the quotient
     # is just below a whole number as often as not: those samples belong to the disc.
     cells = max(radius_m / ground.spacing_m, 1.5) + 1e-9
-    row, column = np.mgrid[-int(cells) : int(cells) + 1, -int(cells) : int(cells) + 1]
+    # no sample is further away than the field is wide
+    up, across = (min(int(cells), count - 1) for count in ground.z_m.shape)
+    row, column = np.mgrid[-up : up + 1, -across : across + 1]
     inside = (np.hypot(column, row) <= cells).astype(float)
     return column * ground.spacing_m, row * ground.spacing_m, inside
 

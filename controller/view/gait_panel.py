@@ -11,6 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
+from snakewalk.controller.motion.refusals import NAME_MAX
 
 _EVERY_S: Final = 0.2
 """A slider that is drawn along commands no more often (ours)."""
@@ -92,9 +93,13 @@ class GaitPanel:
         """What happens when an input is changed, by a browser and not by ``show``."""
 
         def moved(event: Any) -> None:
-            if event.client_id is not None:
-                value = event.target.value
-                self._moved.put((name, value if name == "gait" else f"{float(value):g}"))
+            if event.client_id is None:
+                return
+            value = event.target.value
+            if name == "gait":
+                self._moved.put((name, str(value)[:NAME_MAX]))
+            elif isinstance(value, int | float):
+                self._moved.put((name, f"{value:g}"))
 
         return moved
 

@@ -9,16 +9,15 @@ from collections.abc import Callable
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.path_progress import Decision
-from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.motion.source_switch import SourceSwitch
+from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.steered_gait import SteeredGait
 
 
-class Landing(OnCourse):
+class Landing(MotionWrapper, OnCourse):
     """A ``MotionSource`` with ``PathProgress``: one steered gait, and another one ashore."""
 
     pulse_m_s = 0.0
@@ -43,10 +42,11 @@ class Landing(OnCourse):
             on_ashore: told in words when the ground is met.
 
         """
-        super().__init__(swim.course)
+        OnCourse.__init__(self, swim.course)
         self._swim: SteeredGait | None = swim
         self._make_walk, self._headway, self._on_ashore = make_walk, headway, on_ashore
         self._switch = SourceSwitch(robot, swim)
+        MotionWrapper.__init__(self, self._switch)
         self._before: BodyView | None = None
         """Where the body was when the cycle began."""
         self._cycle = 0
@@ -57,31 +57,9 @@ class Landing(OnCourse):
         """Whether it has met the ground."""
         return self._swim is None
 
-    @property
-    def needs(self) -> Needs:
-        """Those of the gait that runs."""
-        return self._switch.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether every waypoint has been reached and the gait has come to rest."""
-        return self._switch.done
-
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the gait in the water begins."""
         return self.goal_rad()
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._switch.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._switch.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """The robot's limits, as of both gaits."""
-        return self._switch.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""

@@ -12,11 +12,11 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.path_progress import Decision, PathProgress
 from snakewalk.controller.motion.refusals import Refusals
-from snakewalk.controller.motion.source import MotionSource, Pace
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.walk.course import Course, OnCourse
 
 ADD: Final = "waypoint"
@@ -44,7 +44,7 @@ class MotionOnCourse(MotionSource, PathProgress, Protocol):
         ...
 
 
-class LiveCourse(OnCourse):
+class LiveCourse(MotionWrapper, OnCourse):
     """A ``MotionSource`` with ``PathProgress`` and ``OpenWaypoints``."""
 
     def __init__(
@@ -65,7 +65,8 @@ class LiveCourse(OnCourse):
             on_event: takes ("operator", text) of what was done, ("refused", text) of what was not.
 
         """
-        super().__init__(motion.course)
+        OnCourse.__init__(self, motion.course)
+        MotionWrapper.__init__(self, motion)
         self._motion, self._commands, self._check = motion, commands, check
         self._on_event = on_event
         self._refusals = Refusals(lambda why: on_event("refused", why))
@@ -82,11 +83,6 @@ class LiveCourse(OnCourse):
     def replanned(self) -> str | None:
         """Why another path was laid in the last step, if one was."""
         return self._changed or self.course.replanned
-
-    @property
-    def needs(self) -> Needs:
-        """Those of the motion."""
-        return self._motion.needs
 
     @property
     def done(self) -> bool:
@@ -106,18 +102,6 @@ class LiveCourse(OnCourse):
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the motion begins."""
         return self._motion.begin(view)
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._motion.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._motion.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """The motion's own."""
-        return self._motion.pace()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s``, and carry out what was set."""

@@ -11,14 +11,14 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.path_progress import Decision
-from snakewalk.controller.motion.source import Pace
+from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.map_planner import MapPlanner
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.pilot import Pilot
 
 
-class MapWalk(OnCourse):
+class MapWalk(MotionWrapper, OnCourse):
     """A ``MotionSource`` with ``PathProgress``: a pilot, and a map that changes under it."""
 
     def __init__(
@@ -40,16 +40,11 @@ class MapWalk(OnCourse):
             replan_m: travel of the walk between two plans of a path that ends before a waypoint.
 
         """
-        super().__init__(pilot.course)
+        OnCourse.__init__(self, pilot.course)
+        MotionWrapper.__init__(self, pilot)
         self._pilot, self._map, self._planner = pilot, ground_map, planner
         self._change_ground, self._replan_m = change_ground, replan_m
         self._pictures, self._planned_m, self._travel_m = ground_map.pictures, 0.0, 0.0
-        self.needs = pilot.needs
-
-    @property
-    def done(self) -> bool:
-        """Whether the walk is over."""
-        return self._pilot.done
 
     @property
     def pulse_m_s(self) -> float:
@@ -60,18 +55,6 @@ class MapWalk(OnCourse):
     def decision(self) -> Decision | None:
         """Made in the last step, if one was."""
         return self._pilot.decision
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._pilot.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._pilot.velocity_rad_s()
-
-    def pace(self) -> Pace:
-        """The robot's limits: what comes next is not known."""
-        return self._pilot.pace()
 
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the walk begins."""

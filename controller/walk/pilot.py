@@ -20,7 +20,13 @@ from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
-from snakewalk.controller.mechanics.rollout import PATH_STEP_M, PathTable, Rolled
+from snakewalk.controller.mechanics.rollout import (
+    Rolled,
+    TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
+    PATH_STEP_M,
+)
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.terrain.path import SplinePath
@@ -136,7 +142,7 @@ class Pilot(OnCourse):
         self._fall_back = fall_back or (lambda lost: None)
         self._pitch_rad: Floats | None = None
         self._roll = roll
-        self._table: PathTable | None = None
+        self._table: TabulatedPath | None = None
         self._table_of: tuple[SplinePath, int] | None = None
         points = chooser.track.points
         self._links = len(self._goal_rad) + 1
@@ -345,7 +351,7 @@ class Pilot(OnCourse):
         at = round(self.along_m / PATH_STEP_M)
         return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
 
-    def _path_table(self) -> PathTable:
+    def _path_table(self) -> TabulatedPath:
         """Table of the path in force, made once a path and waypoint."""
         path, course = self.path, self.course
         made_of = path, course.reached
@@ -353,7 +359,7 @@ class Pilot(OnCourse):
             whole = np.arange(0.0, path.length_m, PATH_STEP_M)
             points_m = path.position(np.append(whole, path.length_m))
             waypoint_m, passed_m = course.next_waypoint or (None, np.inf)
-            self._table = PathTable.of(points_m, waypoint_m, passed_m / PATH_STEP_M)
+            self._table = TabulatedPath.of(points_m, waypoint_m, passed_m / PATH_STEP_M)
             self._table_of = made_of
         return self._table
 

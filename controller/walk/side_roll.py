@@ -10,12 +10,11 @@ without a step in speed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.gaits.gait import Needs
@@ -28,26 +27,23 @@ from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.motion.source_switch import SourceSwitch
+from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.pilot import Pilot
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
-from snakewalk.controller.walk.steering import PathPose
+from snakewalk.controller.walk.roll_planner import (
+    FREQUENCY_HZ,
+    JOIN_S,
+    MOST_TURNS,
+    RollPlan,
+    RollPlanner,
+)
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
-ARCS_RAD = np.array([-2.4, -2.0, -1.6, 1.6, 2.0, 2.4])
-"""Bends of the whole body, of which one is chosen to roll in (ours)."""
-FREQUENCY_HZ = 1.0
-"""Turns a second (ours); joints at their limit slow it."""
-MOST_TURNS = 16
 LEAST_SPEED_M_S = 0.04
 """At which a roll has to bring the body nearer to its target (ours): the walk climbs so fast."""
 _TARGET_M = 2.5
 """Farthest target on the path."""
-_JOIN_S = 1.5
-"""What joining costs, there and back."""
-_UPHILL = 0.7
-"""Cosine between a roll and the way straight up, at least."""
-_LEAST_SLOPE = 0.07
 _UPRIGHT_RAD = 0.6
 """A body that has rolled by more does not lie as the arc is meant."""
 _DROP_M = 0.1
@@ -56,12 +52,6 @@ _EARLY_RAD = 0.3
 """Of a whole turn, left to the join."""
 _AGAIN_BODIES = 0.5
 """Travel of the walk between two rolls."""
-_TURNS_RAD = np.array([1.2, 2.4])
-"""Turns of the walk away from the arc, before it, of which one is chosen (ours)."""
-_AT_ONCE_RAD = np.array([-2.6, -2.0, -1.4, 1.4, 2.0, 2.6])
-"""Bends that the joints take at once, without a piece of track (ours)."""
-_TRIES = 6
-"""Plans that are tried on a twin, those first that are fastest on paper (ours)."""
 _SLOW = 0.3
 """Progress of the walk from which on nothing is tried on a twin (ours)."""
 _TRY_AGAIN_BODIES = 0.4
@@ -76,159 +66,9 @@ _GAIN_M, _GAIN_S = 0.03, 3.0
 """A body that has come nearer by less for so long rolls on the spot: it stops (ours)."""
 _OFF_PATH_M = 0.2
 """A body that a roll has left so far off its path goes on by another (ours)."""
-_STEPS_M = 0.05 * np.eye(2)
-"""In x and in y, to either side: what the slope under the body is taken from."""
 
 
-@dataclass(frozen=True, slots=True)
-class RollPlan:
-    """An arc to lie in, and whole turns in it."""
-
-    bend_rad: float
-    """Of the whole body, positive to the left; it rolls to the side to which it bends."""
-    piece_rad: Floats
-    """(n,) the walk's last piece of track; empty where the joints bend at once."""
-    turns: int
-    target_m: Floats
-    """(2,) that it shall come near to."""
-    speed_m_s: float
-    """At which the target comes nearer, joins and all."""
-
-    @property
-    def at_once(self) -> bool:
-        """Whether the joints bend at once, without a piece of track."""
-        return not len(self.piece_rad)
-
-    @property
-    def side(self) -> float:
-        """1 to the left, -1 to the right."""
-        return float(np.sign(self.bend_rad))
-
-
-class RollPlanner:
-    """Predicts rolls of one robot on one ground: one girth a turn, across the body's mean line."""
-
-    def __init__(
-        self,
-        robot: RobotConfig,
-        ground: HeightField,
-        safe: Callable[[Floats], bool] = lambda point_m: True,
-    ) -> None:
-        """``safe`` says whether the centre (2,) of a body may come to a place."""
-        self._robot, self._ground, self._safe = robot, ground, safe
-        self.turn_m = 2.0 * np.pi * robot.body_radius_m
-        """Way of one turn, without slip."""
-
-    def best(self, pose: PathPose, walker: PredictiveWalker, target_m: Floats) -> RollPlan | None:
-        """Return the roll that brings the body to its target fastest; None if none does."""
-        plans = list(self._plans(pose, walker, target_m))
-        return max(plans, key=lambda plan: plan.speed_m_s, default=None)
-
-    def to_go_m(self, target_m: Floats, links_m: Floats, heading_rad: float, side: float) -> Floats:
-        """Distance (k + 1,) from the target now and after each of k whole turns.
-
-        They end where the body would not roll uphill any more, or come to unsafe ground.
-
-        Args:
-            target_m: (2,)
-            links_m: (L, 2) where the links are.
-            heading_rad: of the body's mean line.
-            side: 1 to roll to the left, -1 to the right.
-
-        """
-        turn_m = side * self.turn_m * np.array([-np.sin(heading_rad), np.cos(heading_rad)])
-        uphill = np.array(
-            [self._height_m(links_m + step) - self._height_m(links_m - step) for step in _STEPS_M]
-        )
-        shifts_m = np.arange(MOST_TURNS + 1)[:, None] * turn_m
-        centres_m = links_m.mean(axis=0) + shifts_m
-        away_m = np.hypot(*(centres_m - target_m).T)
-        if uphill @ turn_m < _UPHILL * self.turn_m * np.hypot(*uphill):
-            return np.asarray(away_m[:1])
-        heights_m = np.array([self._height_m(links_m + shift) for shift in shifts_m])
-        for turns in range(MOST_TURNS):
-            rise_m = heights_m[turns + 1] - heights_m[turns]
-            if rise_m < _LEAST_SLOPE * self.turn_m or not self._safe(centres_m[turns + 1]):
-                return np.asarray(away_m[: turns + 1])
-        return np.asarray(away_m)
-
-    def tried(
-        self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, heading_rad: float
-    ) -> list[RollPlan]:
-        """Return plans that are worth a try, the fastest on paper first.
-
-        Of arcs that are laid by the track, at once or after a turn away from them, and of bends
-        that the joints take at once.
-
-        Args:
-            pose: of the body.
-            walker: of the track.
-            target_m: (2,)
-            heading_rad: of the body's mean line.
-
-        """
-        plans = self._plans(pose, walker, target_m)
-        for turn in _TURNS_RAD.tolist():
-            plans += self._plans(pose, walker, target_m, turn)
-        for bend in _AT_ONCE_RAD.tolist():
-            plans += self._plan(pose, target_m, bend, np.empty(0), pose.centre_m, heading_rad, 0.0)
-        return sorted(plans, key=lambda plan: -plan.speed_m_s)[:_TRIES]
-
-    def _plans(
-        self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, turn_rad: float = 0.0
-    ) -> list[RollPlan]:
-        """Plans of arcs by the track, after a turn to the other side."""
-        points, plans = walker.track.points, list[RollPlan]()
-        ramp = np.arange(1, points + 1) / points
-        arcs = walker.track.last_rad + ARCS_RAD[:, None] * ramp
-        if turn_rad > 0.0:
-            turns = -turn_rad * np.sign(ARCS_RAD)[:, None]
-            arcs = np.hstack([walker.track.last_rad + turns * ramp, arcs + turns])
-        rolled = walker.steering.roll_out(pose, arcs)
-        for k, bend in enumerate(ARCS_RAD.tolist()):
-            heading = float(rolled.offset_rad[k] + arcs[k, -points:].mean())
-            laid = rolled.centre_m[k], heading, float(rolled.time_s[k])
-            plans += self._plan(pose, target_m, bend, arcs[k], *laid)
-        return plans
-
-    def _plan(
-        self,
-        pose: PathPose,
-        target_m: Floats,
-        bend_rad: float,
-        piece_rad: Floats,
-        centre_m: Floats,
-        heading_rad: float,
-        laid_s: float,
-    ) -> list[RollPlan]:
-        """Return the plan to roll in an arc that lies so after ``laid_s``; none if none is nearer.
-
-        The arc's centre (2,) and heading are those of its mean line.
-        """
-        links_m = self._arc_m(centre_m, heading_rad, bend_rad)
-        to_go_m = self.to_go_m(target_m, links_m, heading_rad, float(np.sign(bend_rad)))
-        turns = int(np.argmin(to_go_m))
-        if turns == 0:
-            return []
-        gain_m = float(np.hypot(*(target_m - pose.centre_m))) - float(to_go_m[turns])
-        speed_m_s = gain_m / (laid_s + _JOIN_S + turns / FREQUENCY_HZ)
-        return [RollPlan(bend_rad, piece_rad, turns, target_m, speed_m_s)]
-
-    def _arc_m(self, centre_m: Floats, heading_rad: float, bend_rad: float) -> Floats:
-        """Centres (L, 2) of links that lie in an arc."""
-        ends = np.array(self._robot.link_ends)
-        angle = heading_rad + bend_rad * (0.5 - 0.5 * (ends[:-1] + ends[1:]) / ends[-1])
-        forward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        lengths_m = np.array(self._robot.link_lengths_m)[:, None]
-        at_m = np.cumsum(-lengths_m * forward, axis=0)  # their ends towards the tail
-        at_m += 0.5 * (lengths_m - self._robot.mean_link_length_m) * forward
-        return np.asarray(centre_m + at_m - at_m.mean(axis=0))
-
-    def _height_m(self, points_m: Floats) -> float:
-        return float(self._ground.elevation_m(points_m[:, 0], points_m[:, 1]).mean())
-
-
-class SideRolls(OnCourse):
+class SideRolls(MotionWrapper, OnCourse):
     """A ``MotionSource`` with ``PathProgress``: a pilot's walk, and rolls where they climb better.
 
     Needs a body that is round, and pitch joints that carry links.
@@ -257,11 +97,12 @@ class SideRolls(OnCourse):
             on_event: takes the kind of an event, and a line of text.
 
         """
-        super().__init__(pilot.course)
+        OnCourse.__init__(self, pilot.course)
         self._pilot, self._walker, self._robot, self._planner = pilot, walker, robot, planner
         self._climb_progress, self._pulse_m_s = climb_progress, pulse_m_s
         self._on_event = on_event
         self._switch = SourceSwitch(robot, pilot)
+        MotionWrapper.__init__(self, self._switch)
         self._plan: RollPlan | None = None
         self._rolling: _Rolling | None = None
         self._walks_until = 0.0
@@ -293,14 +134,6 @@ class SideRolls(OnCourse):
     def pulse_m_s(self) -> float:
         """How fast the shape travels along the body; 0 while it rolls or begins to walk again."""
         return 0.0 if self.rolling or self._switch.blending else self._pilot.pulse_m_s
-
-    def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
-        return self._switch.goal_rad()
-
-    def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
-        return self._switch.velocity_rad_s()
 
     def pace(self) -> Pace:
         """The robot's limits: what comes next is not known."""
@@ -388,7 +221,7 @@ class SideRolls(OnCourse):
         )
         begin_m = least_m = float(np.hypot(*(view.centre_m[:2] - plan.target_m)))
         time_s, best_m_s, turns = 0.0, 0.0, 1
-        bodies = twin.bodies(roll.move, _LAID_S + _JOIN_S + plan.turns / FREQUENCY_HZ)
+        bodies = twin.bodies(roll.move, _LAID_S + JOIN_S + plan.turns / FREQUENCY_HZ)
         try:
             for body in bodies:
                 time_s += twin.cycle_s
@@ -496,7 +329,7 @@ class _Rolling:
             return True
         if view.centre_m[2] < self._highest_m - _DROP_M:
             return True
-        if self._time_s > _JOIN_S + 1.5 * self._turns / self._hz:
+        if self._time_s > JOIN_S + 1.5 * self._turns / self._hz:
             return True
         if self._turned_rad < 2.0 * np.pi * self._turns - _EARLY_RAD:
             return False

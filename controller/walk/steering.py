@@ -13,6 +13,14 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.mechanics.rollout import (
+    Drift,
+    PlanarPose,
+    Rolled,
+    Rollout,
+    RolloutTree,
+    TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
     ALONG,
     END_OFF,
     HEAD_OFF,
@@ -20,12 +28,6 @@ from snakewalk.controller.mechanics.rollout import (
     OFF_PATH,
     PASSED,
     TIME,
-    Drift,
-    PathTable,
-    PlanarPose,
-    Rolled,
-    Rollout,
-    RolloutTree,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.drivers.compiling import compiled, readonly_array
@@ -43,7 +45,7 @@ class PathPose:
     """(2,) centre of mass."""
     aim_rad: float
     """Direction to the carrot on the path, in the world."""
-    path: PathTable
+    path: TabulatedPath
     """The path in force."""
     path_at: int
     """Index of the path's point nearest to the centre."""

@@ -98,7 +98,7 @@ class JointUnits:
         full_a = float(self.stall_current_a[joint])
         if not self.measures_current[joint]:
             full_a = abs(float(self.a_per_current[joint])) / LOAD_UNIT
-        return min(most, max(1, round(self.full_pwm[joint] * current_a / full_a)))
+        return min(most, max(1, round(float(self.full_pwm[joint]) * current_a / full_a)))
 
 
 class GoalEncoder:

@@ -1,10 +1,11 @@
-"""Liveness: whether servos still hold torque and watchdog, and no setting was lost.
+"""Liveness: whether servos hold torque, watchdog, settings and goals as they were written.
 
-A servo that has rebooted answers as before, limp and with the settings of its EEPROM. So registers
-are read again, one at a time, and compared with what was written to them.
+A servo that has rebooted replies as before, limp and with the settings of its EEPROM. Another
+program may write goals, or change a zero. So registers are read again, one at a time, and compared
+with the values that they must have.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -12,6 +13,8 @@ import numpy as np
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
+from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, register_change
+from snakewalk.drivers.chain.goal_check import GoalCheck
 from snakewalk.drivers.chain.start_up import (
     IDENTITY,
     RAM_SETTINGS,
@@ -23,12 +26,15 @@ from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED
 
 SLOW_EVERY = 16
-"""Cycles from one reading of voltages and temperatures to the next (ours); torque and watchdog are
-checked as often, in other cycles."""
+"""Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
+_GOALS_AT, _TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT = 2, 5, 8, 10, 13
+_SHAPING_AT, _FINGERPRINT_AT = (3, 11), (6, 9, 14)
+"""Cycles of a round in which registers are read, one each: a cycle never has two more reads than
+its own, so that the wire budget of every cycle is the same."""
 
 
 class LivenessCheck:
-    """Whether torque is still on, the watchdogs are armed, and no setting was lost.
+    """Whether servos hold torque, watchdog, settings and goals as they were written.
 
     One group read of one register at a time. Servos that do not reply are not judged; the check is
     made again in the next cycle that has time for it.
@@ -39,45 +45,56 @@ class LivenessCheck:
         bus: ChainBus,
         robot: RobotConfig,
         configured: Mapping[int, Mapping[str, int]],
+        fingerprints: Mapping[int, Fingerprint],
         watchdog_ticks: int,
+        goals: GoalCheck,
         *,
         fast: bool,
+        rad_per_position: Callable[[int], float],
     ) -> None:
         """Prepare the reads.
 
         Args:
-            bus: where the servos are.
-            robot: whose they are.
+            bus: the servos' bus.
+            robot: their robot.
             configured: values of RAM registers as they were set, by joint.
+            fingerprints: values of EEPROM registers at the start, by joint.
             watchdog_ticks: Bus Watchdog(98) as it was armed.
+            goals: reads the goals back.
             fast: begin with fast sync reads.
+            rad_per_position: returns the unit of a joint's position.
 
         """
-        self._robot = robot
+        self._bus, self._robot, self._goals = bus, robot, goals
+        self._rad_per_position = rad_per_position
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
         self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
         self._watchdog = read("Bus Watchdog", dict.fromkeys(joints, watchdog_ticks))
 
-        def kept(registers: Iterable[str]) -> "list[RegisterCheck]":
-            held = {
-                register: {j: v[register] for j, v in sorted(configured.items()) if register in v}
+        def checks(
+            registers: Iterable[str], values: Mapping[int, Mapping[str, int]]
+        ) -> "list[RegisterCheck]":
+            by_register = {
+                register: {j: v[register] for j, v in sorted(values.items()) if register in v}
                 for register in registers
             }
-            return [read(register, expected) for register, expected in held.items() if expected]
+            return [read(name, expected) for name, expected in by_register.items() if expected]
 
-        (self._identity,) = kept([IDENTITY])
-        self._settings = kept(RAM_SETTINGS)
-        self._shaping = kept(SHAPING_SETTINGS)
+        (self._identity,) = checks([IDENTITY], configured)
+        self._settings = checks(RAM_SETTINGS, configured)
+        self._shaping = checks(SHAPING_SETTINGS, configured)
+        self._fingerprint = checks(FINGERPRINT, fingerprints)
         self._missed: list[RegisterCheck] = []
         """Not all servos replied to these; the oldest first."""
 
     def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
 
-        In a round of ``SLOW_EVERY`` cycles: torque, watchdog, identity, one of the settings, and
-        two of those that shape the motion. In between, where the cycle ``has_time``, one to which
-        not all servos have replied.
+        In a round of ``SLOW_EVERY`` cycles: goals, torque, watchdog, identity, one of the settings,
+        two of those that shape the motion, and three of the fingerprint. In between, if the cycle
+        ``has_time``: the goals again if they differed, else a check to which not all servos have
+        replied.
 
         Raises:
             BusError: a servo is not as it was set.
@@ -86,17 +103,21 @@ class LivenessCheck:
         """
         rounds, place = divmod(cycle, SLOW_EVERY)
         check = None
-        if place == SLOW_EVERY // 3:
+        if place == _TORQUE_AT:
             check = self._torque
-        elif place == 2 * SLOW_EVERY // 3:
+        elif place == _WATCHDOG_AT:
             check = self._watchdog
-        elif place == SLOW_EVERY // 2:
+        elif place == _IDENTITY_AT:
             check = self._identity
-        elif place == SLOW_EVERY - 3:
+        elif place == _SETTINGS_AT:
             check = self._settings[rounds % len(self._settings)]
-        elif place in (3, SLOW_EVERY - 5):
-            turn = 2 * rounds + (place > SLOW_EVERY // 2)
-            check = self._shaping[turn % len(self._shaping)]
+        elif place in _SHAPING_AT:
+            check = _in_turn(self._shaping, rounds, _SHAPING_AT, place)
+        elif place in _FINGERPRINT_AT:
+            check = _in_turn(self._fingerprint, rounds, _FINGERPRINT_AT, place)
+        elif place == _GOALS_AT or (has_time and self._goals.is_due):
+            self._goals.check(self._explain)
+            return self._goals.cycle
         if check is None and has_time and self._missed:
             check = self._missed[0]
         if check is None:
@@ -117,16 +138,54 @@ class LivenessCheck:
             other = identity_fault(self._robot, joint, value)
             if other is not None:
                 raise BusError(other)
+        names = ", ".join(map(self._robot.joint_name, differing))
+        raise BusError(f"{names}: {self._difference(check, joint, value)}")
+
+    def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
+        """What the value of a register means that is not as expected."""
+        name, expected = check.register.name, check.expected[joint]
         if check is self._torque:
-            what = "torque is off: has it rebooted?"
-        elif check is self._watchdog and value == WATCHDOG_TRIPPED:
-            what = "its bus watchdog has stopped it"
-        else:
-            what = (
-                f"{check.register.name} is {value}, not {check.expected[joint]}: has it rebooted, "
-                "or does another program write to it?"
+            return "torque is off: has it rebooted?"
+        if check is self._watchdog and value == WATCHDOG_TRIPPED:
+            return "its bus watchdog has stopped it"
+        if check in self._fingerprint:
+            change = register_change(name, expected, value, self._rad_per_position(joint))
+            return f"{change}: does another program write to it?"
+        return (
+            f"{name} is {value}, not {expected}: has it rebooted, or does another program write "
+            "to it?"
+        )
+
+    def _explain(self, joint: int) -> str | None:
+        """Why a joint's servo may refuse goals: a register that is not as expected, or None.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        checks = [
+            check
+            for check in (self._watchdog, self._torque, *self._settings, *self._fingerprint)
+            if joint in check.expected
+        ]
+        try:
+            values = self._bus.read_each(
+                self._robot.servo_ids[joint], [check.register.name for check in checks]
             )
-        raise BusError(f"{', '.join(map(self._robot.joint_name, differing))}: {what}")
+        except BusError:
+            return None
+        for check in checks:
+            value = values[check.register.name]
+            if value != check.expected[joint]:
+                return self._difference(check, joint, value)
+        return None
+
+
+def _in_turn(
+    checks: Sequence["RegisterCheck"], rounds: int, places: tuple[int, ...], place: int
+) -> "RegisterCheck":
+    """The check whose turn it is, if one of them is made at each of the places of a round."""
+    return checks[(len(places) * rounds + places.index(place)) % len(checks)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.chain.fingerprint import Fingerprint, fingerprint_faults
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import IDENTITY, Inspection, identity_fault, inspect
 from snakewalk.drivers.errors import ChainFault, FaultCause
@@ -60,9 +61,10 @@ def recheck(
     units: JointUnits,
     before: Inspection | None,
     configured: Mapping[int, Mapping[str, int]],
+    fingerprints: Mapping[int, Fingerprint],
     believed_rad: Floats,
 ) -> Recheck:
-    """Compare model, firmware, alarm, torque, RAM settings and position with what they were.
+    """Compare model, firmware, alarm, torque, settings and position with what they were.
 
     Args:
         bus: where the servos are.
@@ -70,6 +72,7 @@ def recheck(
         units: of its joints.
         before: as found at the start; None: nothing to compare with.
         configured: values of RAM registers as they were set, by joint.
+        fingerprints: values of EEPROM registers at the start, by joint.
         believed_rad: (J,) where the joints were when their readings could last be believed.
 
     Raises:
@@ -102,6 +105,11 @@ def recheck(
         elif not abs(moved[joint]) <= MOVED_RAD:
             text = f"{name}: moved by {moved[joint]:+.2f} rad since it was last seen"
             faults.append(ChainFault(FaultCause.MOVED, text))
+        unit_rad, before_it = float(units.rad_per_position[joint]), fingerprints.get(joint, {})
+        faults += [
+            ChainFault(FaultCause.OTHER_SETTINGS, line)
+            for line in fingerprint_faults(robot, joint, before_it, servo.registers, unit_rad)
+        ]
     reset = []
     for joint, servo in enumerate(now.servos):
         values = configured.get(joint, {})

@@ -1,7 +1,7 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.alarm_reader import AlarmReader
+from snakewalk.drivers.chain.fingerprint import Fingerprint
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
+from snakewalk.drivers.chain.goal_check import GoalCheck
 from snakewalk.drivers.chain.identified_read import IdentifiedRead, check_stillness
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
@@ -20,6 +23,7 @@ from snakewalk.drivers.chain.lost_replies import LostReplies
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
     Inspection,
+    ServoSettings,
     check_pose,
     configure,
     inspect,
@@ -28,7 +32,7 @@ from snakewalk.drivers.chain.start_up import (
 from snakewalk.drivers.chain.temperature_sensors import TemperatureSensors
 from snakewalk.drivers.chain.torque_off import TorqueOff
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import BusError, ChainError
+from snakewalk.drivers.errors import BusError, ChainError, DriverError
 from snakewalk.drivers.protocol.registers import (
     WATCHDOG_TICKS_MAX,
     WATCHDOG_UNIT_S,
@@ -60,6 +64,7 @@ class ServoChain:
         *,
         watchdog_s: float = 0.2,
         rate_hz: float | None = None,
+        fingerprint_file: FingerprintFile | None = None,
     ) -> None:
         """Prepare; nothing is sent before ``enable``.
 
@@ -68,6 +73,7 @@ class ServoChain:
             robot: ids, limits, gains.
             watchdog_s: after so long without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
+            fingerprint_file: compared with the servos at each ``enable``; None: not compared.
 
         Raises:
             ControlTableError: a model lacks a register or a unit that the cycle needs, or has it
@@ -91,9 +97,10 @@ class ServoChain:
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
         self._watchdog_s = self._watchdog_ticks * WATCHDOG_UNIT_S
-        self._configured: dict[int, dict[str, int]] = {}
+        self._configured: dict[int, Mapping[str, int]] = {}
+        self._fingerprints: dict[int, Fingerprint] = {}
         self._liveness: LivenessCheck | None = None
-        self._rate_hz = rate_hz
+        self._rate_hz, self._file = rate_hz, fingerprint_file
         self._goals = GoalEncoder(self._units)
         self._readings = Readings(tables, self._units)
         self._prepare_reads(fast=True)
@@ -133,7 +140,9 @@ class ServoChain:
         """Check and set up all servos, goal = present, torque on, watchdog armed.
 
         Raises:
-            ChainError: the servos are not the robot's, have an alarm, or stand beyond a limit.
+            ChainError: the servos are not the robot's, have an alarm, stand beyond a limit, or
+                are not as in the fingerprint file.
+            ConfigError: the fingerprint file is broken.
             BudgetError: the wire cannot carry the rate with the reads that the firmwares have.
             BusError: a servo does not do what an instruction asks; torque is off again then.
             PortError: the port is gone.
@@ -153,7 +162,12 @@ class ServoChain:
                 f"{self.robot.servo_models[blind[0]]}: measures no current: safety "
                 "watches its output instead, as a share of the stall current"
             )
-        self._configured = configure(self._bus, self.robot, self._units, None, self.on_event)
+        self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
+        if self._file is not None:
+            found = {self.robot.servo_ids[j]: each for j, each in self._fingerprints.items()}
+            unit_rad = float(self._units.rad_per_position[0])
+            for line in self._file.check(self.robot, found, unit_rad):
+                self.on_event(line)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
 
@@ -168,8 +182,10 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        known, settings = self.inspection, self._configured
-        return recheck(self._bus, self.robot, self._units, known, settings, believed_rad)
+        return recheck(
+            *(self._bus, self.robot, self._units, self.inspection),
+            *(self._configured, self._fingerprints, believed_rad),
+        )
 
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
@@ -187,9 +203,13 @@ class ServoChain:
         """
         if found.faults:
             raise ChainError([str(fault) for fault in found.faults])
-        again = configure(self._bus, self.robot, self._units, found.reset, self.on_event)
-        self._configured.update(again)
+        self._note(configure(self._bus, self.robot, self._units, found.reset, self.on_event))
         return self._begin(found.position_rad)
+
+    def _note(self, settings: Mapping[int, ServoSettings]) -> None:
+        """Keep the settings of servos that have just been set up."""
+        self._configured |= {joint: each.ram for joint, each in settings.items()}
+        self._fingerprints |= {joint: each.fingerprint for joint, each in settings.items()}
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
@@ -252,13 +272,15 @@ class ServoChain:
                 f"{self.robot.joint_name(joint)}: Goal Position is {held[joint]:.0f} after "
                 f"{goals[joint]} was written to all"
             )
+        ticks = self._watchdog_ticks
+        bus.sync_write(ids, "Bus Watchdog", ticks)  # before torque, which is never on without it
+        self._expect("Bus Watchdog", [ticks] * len(ids))
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
-        ticks = self._watchdog_ticks
-        bus.sync_write(ids, "Bus Watchdog", ticks)
-        self._expect("Bus Watchdog", [ticks] * len(ids))
         self._liveness = LivenessCheck(
-            bus, self.robot, self._configured, ticks, fast=self._fast_reads
+            *(bus, self.robot, self._configured, self._fingerprints, ticks, self._goal_check),
+            fast=self._fast_reads,
+            rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
         )
         self._armed = True
         state = self.read()
@@ -367,10 +389,18 @@ class ServoChain:
         self._send_goals(command.goal_rad)
         self._sent_at_s = self._clock.now_s()
 
+    def explain(self, joint: int) -> str | None:
+        """Return what is wrong with the goal that a joint's servo holds; None: nothing."""
+        try:
+            return self._goal_check.explain(joint)
+        except DriverError:
+            return None
+
     def _prepare_reads(self, *, fast: bool) -> None:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
+        self._goal_check = GoalCheck(bus, self.robot, fast=fast)
         self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 
@@ -396,6 +426,7 @@ class ServoChain:
     def _send_goals(self, goal_rad: Floats) -> Int32s:
         goals = self._goals.encode(goal_rad)
         self._cycle.write_goals(goals)
+        self._goal_check.note_write(goals)
         self._goal_rad = goal_rad
         return goals
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import PingReply
+from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause
 from snakewalk.drivers.protocol.control_table import model_numbers
@@ -44,7 +45,7 @@ _REPORTED = (
     *("Firmware Version", "Hardware Error Status", "Return Delay Time", "Operating Mode"),
     *("Torque Enable", "Present Temperature", "Present Input Voltage"),
 )
-_COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position")
+_COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position", *FINGERPRINT)
 """Read along, for whoever compares a servo with what it was."""
 _STARTUP = "Startup Configuration"
 """A firmware before 45 has none."""
@@ -224,13 +225,23 @@ def chain_settings(
     )
 
 
+@dataclass(frozen=True, slots=True)
+class ServoSettings:
+    """Registers of one servo as a chain has set it up."""
+
+    ram: Mapping[str, int]
+    """Registers that a reboot or another program would change."""
+    fingerprint: Fingerprint
+    """Registers of its EEPROM."""
+
+
 def configure(
     bus: ChainBus,
     robot: RobotConfig,
     units: JointUnits,
     joints: Iterable[int] | None = None,
     on_event: Callable[[str], None] = lambda line: None,
-) -> dict[int, dict[str, int]]:
+) -> dict[int, ServoSettings]:
     """Torque off, then every setting that the chain relies on, each read back.
 
     Args:
@@ -242,7 +253,7 @@ def configure(
             is unusual and stays.
 
     Returns:
-        Values of the RAM registers that a reboot or another program would change, by joint.
+        The settings of each joint's servo.
 
     Raises:
         ChainError: a setting of the robot is beyond what a servo allows.
@@ -277,7 +288,7 @@ def _configure_joint(
     joint: int,
     found: dict[str, int],
     on_event: Callable[[str], None],
-) -> dict[str, int]:
+) -> ServoSettings:
     name, pwm_limit = robot.joint_name(joint), found["PWM Limit"]
     full = int(units.full_pwm[joint])
     if pwm_limit == 0:
@@ -303,7 +314,8 @@ def _configure_joint(
         on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
     set_here = {setting.register for setting in settings}
     kept = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY)
-    return {each: values[each] for each in kept if each in set_here and each in values}
+    ram = {each: values[each] for each in kept if each in set_here and each in values}
+    return ServoSettings(ram, fingerprint_of(values))
 
 
 def identity(joint: int) -> int:

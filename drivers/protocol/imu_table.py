@@ -141,7 +141,7 @@ def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Flo
     if imu.gyro_range_dps is None or imu.acceleration_range_g is None:
         vector = rotations().from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")
         vector[vector == 0.0] = -0.0  # not all bytes 0: those mean that there is none yet
-        return _counts(rate_rad_s / GYRO_RAD_S) + vector.tobytes()
+        return _counts(rate_rad_s / GYRO_RAD_S) + bytes(vector.tobytes())
     force = force_m_s2 * (COUNTS / (imu.acceleration_range_g * GRAVITY_M_S2))
     return _counts(force) + _counts(rate_rad_s * (COUNTS / np.deg2rad(imu.gyro_range_dps)))
 

@@ -46,6 +46,8 @@ class FollowingError:
         self._rules = np.vstack([limits.following_limit_rad, limits.following_effort_a, output])
         self._memory = np.zeros((2, joints))
         self._since_s, self._idle_s = self._memory
+        self.joint = -1
+        """Joint of the newest reason to stop."""
         self.reset()
 
     def reset(self) -> None:
@@ -63,6 +65,7 @@ class FollowingError:
         )
         if joint < 0:
             return None
+        self.joint = joint
         if self._idle_s[joint] >= IDLE_TIME_S:
             return self._idle_fault(state, goal_rad, joint)
         for_s = state.time_s - self._since_s[joint]

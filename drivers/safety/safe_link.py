@@ -11,7 +11,7 @@ from typing import Any
 
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
-from snakewalk.drivers.link import JointLink
+from snakewalk.drivers.link import ExplainingLink, JointLink
 from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.measured_step import MeasuredSteps
@@ -289,12 +289,21 @@ class SafeLink:
         self._check(state, self._memory, self._limits_at_start)
         return state
 
+    def _following_fault(self, state: JointState, memory: SafetyMemory) -> str | None:
+        """Why to stop because a joint does not follow, with the reason that its servo shows."""
+        fault = self._following.update(state, memory.goal_rad)
+        if fault is None or not isinstance(self._link, ExplainingLink):
+            return fault
+        joint = self._following.joint
+        reason = self._link.explain(joint)
+        return fault if reason is None else f"{self._limits.joint_names[joint]}: {reason}"
+
     def _check(
         self, state: JointState, memory: SafetyMemory, limits: SafetyLimits | None = None
     ) -> None:
         now_s = self._clock.now_s()
         fault, self._memory = check_state(state, memory, limits or self._limits, now_s)
-        fault = self._stop() or fault or self._following.update(state, memory.goal_rad)
+        fault = self._stop() or fault or self._following_fault(state, memory)
         if fault is not None:
             self._trip(fault)
 

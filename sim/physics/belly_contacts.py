@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
-from snakewalk.sim.physics.addresses import copy_words
+from snakewalk.sim.physics.addresses import call, copy_words
 from snakewalk.sim.physics.layout import StepLayout
 from snakewalk.sim.physics.mechanics import GROUND, Mechanics
-from snakewalk.sim.physics.tangent_planes import PLANES, TangentPlanes
+from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES, TangentPlanes
 
 _ROWS = readonly_array(dimensions=2, layout="C")
 _WORD = 8
@@ -148,7 +148,8 @@ def write_contacts(
     axes: Floats,
     plane_m: Floats,
     plane_quat: Floats,
-    tangent: bool,
+    turn: int,
+    plane_axes: Floats,
     held: NDArray[np.int64],
 ) -> int:
     """Write all contacts of now one behind the other; their number, -1 for MuJoCo's own way.
@@ -165,8 +166,10 @@ def write_contacts(
         place_m: (geoms, 3) centres.
         axes: (geoms, 9) rows of their matrices.
         plane_m: (geoms, 3) points of the planes.
-        plane_quat: (geoms, 4) how they lie, if ``tangent``; else that is in ``axes``.
-        tangent: whether they were just laid.
+        plane_quat: (geoms, 4) how they lie, if they were just laid; else that is in ``axes``.
+        turn: address of ``mju_quat2Mat`` if they were just laid, else 0. Its last bits differ
+            between versions of MuJoCo.
+        plane_axes: (9,) overwritten.
         held: (C,) whose constants stand at each place of the list already, from the step before;
             -1 for none.
 
@@ -178,9 +181,11 @@ def write_contacts(
         plane, belly = geoms[c, 0], geoms[c, 1]
         along, radius, margin = shapes_m[c, 0], shapes_m[c, 1], shapes_m[c, 2]
         n0, n1, n2 = axes[plane, 2], axes[plane, 5], axes[plane, 8]
-        if tangent:
-            w, i, j, k = plane_quat[plane]
-            n0, n1, n2 = 2.0 * (i * k + w * j), 2.0 * (j * k - w * i), w * w - i * i - j * j + k * k
+        if turn:
+            if plane_m[plane, 2] <= AWAY_M:
+                continue
+            call(turn, plane_axes.ctypes.data, plane_quat.ctypes.data + plane * 4 * _WORD)
+            n0, n1, n2 = plane_axes[2], plane_axes[5], plane_axes[8]
         x = place_m[belly, 0] + axes[belly, 2] * along
         y = place_m[belly, 1] + axes[belly, 5] * along
         z = place_m[belly, 2] + axes[belly, 8] * along

@@ -12,6 +12,7 @@ without friction.
 """
 
 import math
+import re
 from xml.sax.saxutils import quoteattr
 
 import mujoco
@@ -33,6 +34,8 @@ between them is a fifth of the radius deep."""
 CONTACT_TIME_S = 0.015
 """Of the contact spring; MuJoCo wants at least two steps. Sinks 0.03 mm under the body's weight."""
 
+_NO_SAME_FRAME = 0
+"""``mjSAMEFRAME_NONE``; MuJoCo 3.2.0 has no name for it in Python."""
 GEAR_IMPEDANCE = "0.999 0.999"
 """Of what friction in the gears holds: a joint that it holds creeps at a thousandth of its free
 acceleration times the step."""
@@ -48,34 +51,26 @@ def build_model(
 
     Body ``1 + i`` is link i, joint ``1 + j`` is joint j (joint 0 is free), body ``1`` the head.
     """
-    spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, step_s))
-    if ground is not None:
-        _add_planes(spec)
-    return finish(spec.compile(), ground)
+    text = mjcf(robot, world, ground, step_s, planes=True)
+    return finish(mujoco.MjModel.from_xml_string(text), ground)
 
 
-def _add_planes(spec: mujoco.MjSpec) -> None:
-    """Let tangent planes bear bellies and feet in place of the height field."""
-    field = spec.geom("ground")
-    field.contype = field.conaffinity = 0
-    for ball in [geom for geom in spec.geoms if geom.name.startswith(("belly", "foot"))]:
+def _planes(bodies: str, soft: str) -> tuple[str, str]:
+    """Tangent planes for bellies and feet on a height field: their geoms and pairs."""
+    geoms = pairs = ""
+    for name, rest in re.findall(r'<geom name="((?:belly|foot)[^"]*)"([^>]*)/>', bodies):
+        foot = re.search(r'condim="(\d)".*friction="(\S*)', rest)
+        condim, friction = foot.groups() if foot else ("1", "1")
         for k in range(PLANES):
-            plane = spec.worldbody.add_geom(
-                name=f"plane{k}_{ball.name}",
-                type=mujoco.mjtGeom.mjGEOM_PLANE,
-                size=[1.0, 1.0, 1.0],
-                pos=[0.0, 0.0, AWAY_M],
-                contype=0,
-                conaffinity=0,
+            geoms += (
+                f'<geom name="plane{k}_{name}" type="plane" size="1 1 1" pos="0 0 {AWAY_M!r}" '
+                'contype="0" conaffinity="0"/>'
             )
-            spec.add_pair(
-                geomname1=plane.name,
-                geomname2=ball.name,
-                condim=ball.condim,
-                solref=ball.solref,
-                solimp=ball.solimp,
-                friction=[ball.friction[0], ball.friction[0], 0.0, 0.0, 0.0],
+            pairs += (
+                f'<pair geom1="plane{k}_{name}" geom2="{name}" condim="{condim}" {soft} '
+                f'friction="{friction} {friction} 0 0 0"/>'
             )
+    return geoms, pairs
 
 
 def straight_part_m(length_m: float, radius_m: float) -> float:
@@ -137,7 +132,7 @@ def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
     """
     borne = [k for k in range(1, model.nbody) if not _is_between_axes(model, k)]
     model.body_invweight0[1:] = model.body_invweight0[borne].mean(axis=0)
-    model.geom_sameframe[model.geom_bodyid == 0] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    model.geom_sameframe[model.geom_bodyid == 0] = _NO_SAME_FRAME
     if ground is not None:
         low, span = _levels(ground)
         model.hfield_data[:] = ((ground.z_m - low) / span).astype(np.float32).ravel()
@@ -156,17 +151,28 @@ def mjcf(
     world: WorldConfig,
     ground: HeightField | None,
     step_s: float,
+    *,
+    planes: bool = False,
 ) -> str:
-    """Write the model as MJCF text (a height field's samples are filled in by ``finish``)."""
+    """Write the model as MJCF text; ``finish`` fills in the samples of a height field.
+
+    With ``planes``, tangent planes carry bellies and feet in place of a height field.
+    """
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
     held = f'solreffriction="{2.0 * step_s} 1" solimpfriction="{GEAR_IMPEDANCE} 0.001"'
-    asset, floor = _ground(world, ground)
+    by_planes = planes and ground is not None
+    asset, floor = _ground(world, ground, touches=not by_planes)
     options, obstacle = obstacle_mjcf(world)
     if robot.limbs:
         options = ' cone="elliptic" impratio="10"'  # as an obstacle's: for friction that holds
     overlapping = "".join(
         f'<exclude body1="link{i}" body2="link{j}"/>' for i, j in overlapping_links(robot)
     )
+    head = (
+        f"{_link(robot, 0, balls=ground is not None)}"
+        f"{_links_behind(robot, balls=ground is not None)}{_limbs(robot, 0)}"
+    )
+    plane_geoms, pairs = _planes(head, soft) if by_planes else ("", "")
     return f"""<mujoco model={quoteattr(robot.name)}>
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{step_s!r}" gravity="0 0 {-GRAVITY_M_S2!r}" integrator="Euler" solver="Newton"
@@ -177,18 +183,17 @@ def mjcf(
     <geom condim="1" {soft}/>
   </default>
   <worldbody>
-    {floor}{obstacle}
+    {floor}{obstacle}{plane_geoms}
     <body name="link0"><freejoint name="head"/>
-      {_link(robot, 0, balls=ground is not None)}
-      {_links_behind(robot, balls=ground is not None)}{_limbs(robot, 0)}
+      {head}
     </body>
   </worldbody>
-  <contact>{overlapping}</contact>
+  <contact>{pairs}{overlapping}</contact>
 </mujoco>"""
 
 
-def _ground(world: WorldConfig, ground: HeightField | None) -> tuple[str, str]:
-    masks = 'name="ground" contype="1" conaffinity="2"'
+def _ground(world: WorldConfig, ground: HeightField | None, *, touches: bool) -> tuple[str, str]:
+    masks = f'name="ground" contype="{int(touches)}" conaffinity="{2 * touches}"'
     if ground is None:
         on = world.ground
         size = on.size_m if isinstance(on, FlatGround | WaterGround) else 10.0

@@ -215,4 +215,4 @@ def _steps_by_parts(layout: StepLayout) -> bool:
         pairs = ((whole.qpos, parts.qpos), (whole.qvel, parts.qvel))
         if any(one.tobytes() != other.tobytes() for one, other in pairs):
             return False
-    return whole.efc_force.tobytes() == parts.efc_force.tobytes()
+    return bool(whole.efc_force.tobytes() == parts.efc_force.tobytes())

@@ -214,9 +214,10 @@ class MujocoPlant:
         """Potential (zero at z = 0) and kinetic energy, rotors included."""
         m, d = self.mechanics.model, self._data
         self._update_kinematics()
-        mujoco.mj_energyPos(m, d)
-        mujoco.mj_energyVel(m, d)
-        return float(d.energy[0]), float(d.energy[1])
+        moved = np.empty(m.nv)  # mj_energyVel of MuJoCo 3.2 gives 0
+        mujoco.mj_mulM(m, d, moved, d.qvel)
+        potential_j = -float(m.body_mass[1:] @ (d.xipos[1:] @ m.opt.gravity))
+        return potential_j, 0.5 * float(moved @ d.qvel)
 
     @property
     def momentum(self) -> tuple[Floats, Floats]:

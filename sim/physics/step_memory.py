@@ -28,14 +28,14 @@ from snakewalk.sim.physics.step_state import (
 from snakewalk.sim.physics.tangent_planes import PLANES
 
 FUNCTIONS = (
-    *("mj_kinematics", "mj_step1", "mj_step2"),
+    *("mj_kinematics", "mj_step1", "mj_step2", "mju_quat2Mat"),
     *("mj_checkPos", "mj_checkVel", "mj_comPos", "mj_makeM", "mj_factorM", "mj_collision"),
     *("mj_makeConstraint", "mj_projectConstraint", "mj_fwdVelocity", "mj_addContact"),
 )
 """C functions that the steps call. Without the search for islands, which a chain is one of, those
 after ``WHOLE`` are the parts of ``mj_step1`` for a chain without actuators, sensors and cameras, in
 their order, with ``mj_kinematics`` before ``mj_comPos``; the last one adds a contact."""
-WHOLE = 3
+WHOLE = 4
 POINTERS = ("model", "data", "time", "ncon", "contact", "efc_force", "parena")
 """Addresses of MuJoCo's structures and of fields of ``mjData``."""
 CONTACT = ("size", "dist", "place", "normal", "geom", "row", "hessian_begin", "hessian_end")
@@ -49,7 +49,15 @@ LINKS = ("velocity", "spin", "wrench", "depth", "before", "load", "mass_kg", "wa
 MODEL = ("body_parentid", "geom_bodyid", "contact_role", "geom_pos", "geom_quat")
 GROUND = ("geom_xpos", "geom_xmat", "ball_geoms", "ball_m", "z_m", "planes")
 GEARS = ("gears", "dof_frictionloss", "qfrc_bias", "qfrc_constraint")
-BELLIES = ("belly_words", "belly_geoms", "belly_shapes_m", "reach_m2", "belly_work", "held")
+BELLIES = (
+    "belly_words",
+    "belly_geoms",
+    "belly_shapes_m",
+    "reach_m2",
+    "belly_work",
+    "held",
+    "plane_axes",
+)
 ARRAYS = (*(*STATE, *LINKS, *MODEL, *GROUND, *GEARS, *BELLIES, *Motors._fields, "totals", "work"),)
 CONSTANTS = ("along", "across", "back", "radius_m", "step_s", "x0_m", "y0_m", "spacing_m")
 

@@ -139,5 +139,5 @@ class Contacts(NamedTuple):
 
     reals: Floats
     integers: NDArray[np.int32]
-    count: int
+    count: int  # type: ignore[assignment]
     at: ContactFields

@@ -82,12 +82,13 @@ def _bellies_at(m: Any) -> tuple[Any, ...]:
         reals_at(m.belly_work_at, (3, bodies)),
         reals_at(m.geom_xmat_at, (m.count_geoms, 9)),
         carray(pointer(m.held_at), (contacts,), np.int64),
+        reals_at(m.plane_axes_at, (9,)),
     )
 
 
 def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, ...]) -> int:
     """Write the contacts of the bellies; return their number, -1 if MuJoCo has to find them."""
-    words, geoms, shapes_m, reach_m2, work, axes, held = bellies
+    words, geoms, shapes_m, reach_m2, work, axes, held, plane_axes = bellies
     places, balls, _, _, _, _, plane_m, plane_quat = ground
     if links_near(xipos, reach_m2, work):
         return -1
@@ -101,7 +102,8 @@ def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tupl
     reals = reals_at(list_at, (words.size,))
     fields = contact_fields_at(m)
     at = fields.dist, fields.place, fields.normal, m.contact_hessian_begin, m.contact_hessian_end
-    laid = plane_m if tangent else places, plane_quat, tangent
+    turn = m.mju_quat2Mat_at if tangent else 0
+    laid = plane_m if tangent else places, plane_quat, turn, plane_axes
     count = write_contacts(reals, at, words, geoms, shapes_m, places, axes, *laid, held)
     ncon[0] = max(count, 0)
     carray(pointer(m.parena_at), (1,), np.int64)[0] = max(count, 0) * m.contact_size
@@ -204,7 +206,7 @@ class CompiledSteps:
             **{"belly_words": bellies.words, "belly_geoms": bellies.geoms},
             **{"belly_shapes_m": bellies.shapes_m, "reach_m2": bellies.reach_m2},
             **{"belly_work": np.zeros((3, m.nbody))},
-            **{"held": np.zeros(len(bellies.words), np.int64)},
+            **{"held": np.zeros(len(bellies.words), np.int64), "plane_axes": np.zeros(9)},
         }
         self._memory = np.zeros(1, STEP_MEMORY)
         fields = {**layout.fields(m, d), **addresses(self._arrays), **_sizes(mechanics, bellies)}

@@ -1,6 +1,7 @@
 """Recorded poses as a film: a chase camera, ground, waypoints, paths, trails and a scale."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -30,6 +31,37 @@ DISTANCE_LENGTHS = 1.2
 """Of the camera from a body that keeps its place, in lengths of the body."""
 
 
+@dataclass(frozen=True, slots=True)
+class Style:
+    """How a film is drawn."""
+
+    fps: int = 25
+    """Frames a second of film."""
+    speed_up: float = 1.0
+    """Seconds of run a second of film."""
+    size: tuple[int, int] = (960, 540)
+    """Even width and height, pixels."""
+    title: str = ""
+    """Shown in the caption."""
+    look: SkinLook | None = None
+    """The body's skin; None is a capsule a link."""
+    fine: bool = False
+    """Smooth edges, at three times the cost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """What is drawn on the ground."""
+
+    waypoints_m: Sequence[tuple[float, float]] = ()
+    """Drawn as rings."""
+    waypoint_radius_m: float = 0.3
+    reached_s: Sequence[float] = ()
+    """When the first, second, ... of them turn green."""
+    paths: Sequence[tuple[float, Floats]] = ()
+    """Each the time from when it is in force and (P, 2) points; drawn as dots."""
+
+
 def render_film(
     robot: RobotConfig,
     world: WorldConfig,
@@ -38,16 +70,8 @@ def render_film(
     qpos: ArrayLike,
     path: Path,
     *,
-    fps: int = 25,
-    speed_up: float = 1.0,
-    size: tuple[int, int] = (960, 540),
-    waypoints_m: Sequence[tuple[float, float]] = (),
-    waypoint_radius_m: float = 0.3,
-    reached_s: Sequence[float] = (),
-    paths: Sequence[tuple[float, Floats]] = (),
-    title: str = "",
-    look: SkinLook | None = None,
-    fine: bool = False,
+    style: Style = Style(),
+    marks: Marks = Marks(),
     on_frame: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write an MP4 (H.264 where PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,).
@@ -59,17 +83,9 @@ def render_film(
         time_s: increasing, s.
         qpos: ``MujocoPlant.qpos`` at these times; of a free look, (T, 7 L).
         path: of the film; its folder exists.
-        fps: frames a second of film.
-        speed_up: seconds of run a second of film.
-        size: even width and height, pixels.
-        waypoints_m: drawn as rings.
-        waypoint_radius_m: of these rings.
-        reached_s: when the first, second, ... of them turn green.
-        paths: each the time from when on it is in force and (P, 2) points; drawn as dots.
-        title: shown in the caption.
-        look: the body's skin; None is a capsule a link.
-        fine: smooth edges, at three times the cost.
-        on_frame: told (frames done, of) after each.
+        style: how it is drawn.
+        marks: what is drawn on the ground.
+        on_frame: called with (frames done, of) after each.
 
     Returns:
         Number of frames.
@@ -80,6 +96,35 @@ def render_film(
 
     """
     times, poses = np.asarray(time_s, float), np.asarray(qpos, float)
+    _check(times, poses, style.size)
+    stage = _Stage(robot, world, ground, style, marks)
+    shots = poses_at(
+        *(times, poses, np.arange(times[0], times[-1], style.speed_up / style.fps), stage.bodies)
+    )
+    shot_s = times[0] + np.arange(len(shots)) * style.speed_up / style.fps
+    camera, centre = _camera(
+        *(stage.model, stage.data, shots, style.fps, stage.length_m, stage.spine)
+    )
+    centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
+    trail = make_trail(marks.paths, times, poses, centre_m, ground)
+    scene = stage.scene(trail.most)
+    with (
+        Offscreen(stage.model, *style.size) as screen,
+        MovieFile(path, style.fps, style.size) as film,
+    ):
+        for k, shot in enumerate(shots):
+            now = float(shot_s[k])
+            stage.pose(scene, shot, camera[k], now)
+            trail.add(scene, now)
+            add_axes(scene, _corner(camera[k]), _scale_m(robot.length_m), ground)
+            caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip()
+            film.add(screen.draw(scene, caption))
+            if on_frame is not None:
+                on_frame(k + 1, len(shots))
+    return len(shots)
+
+
+def _check(times: Floats, poses: Floats, size: tuple[int, int]) -> None:
     faults = []
     if poses.ndim != 2 or len(poses) < 2 or times.shape != poses.shape[:1]:
         faults.append(f"film: needs two poses or more, each with its time; has {len(times)}")
@@ -87,48 +132,62 @@ def render_film(
         faults.append(f"film: width and height must be even, not {size[0]} x {size[1]}")
     if faults:
         raise InputError(faults)
-    bodies = len(look.rest_m) if look is not None and look.free else 1
-    shots = poses_at(times, poses, np.arange(times[0], times[-1], speed_up / fps), bodies)
-    model = dressed_model(
-        robot, world, ground, waypoints_m, waypoint_radius_m, look=look, fine=fine
-    )
-    data = mujoco.MjData(model)
-    spine = slice(1, 1 + (bodies if bodies > 1 else robot.link_count))
-    legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
-    camera, centre = _camera(model, data, shots, fps, robot.length_m + legs_m, spine)
-    shot_s = times[0] + np.arange(len(shots)) * speed_up / fps
-    centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
-    trail = make_trail(paths, times, poses, centre_m, ground)
-    room = model.ngeom + model.nbody + 11 + AXES_GEOMS + trail.most
-    scene = mujoco.MjvScene(model, maxgeom=room)
-    scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-    scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
-    view, option = mujoco.MjvCamera(), mujoco.MjvOption()
-    reached, scale_m = 0, _scale_m(robot.length_m)
-    with Offscreen(model, *size) as screen, MovieFile(path, fps, size) as film:
-        for k, shot in enumerate(shots):
-            now = float(shot_s[k])
-            while reached < len(reached_s) and reached_s[reached] <= now:
-                mark_reached(model, reached)
-                reached += 1
-            data.qpos[:] = shot
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            mujoco.mj_camlight(model, data)
-            view.lookat[:], view.azimuth = camera[k, :3], camera[k, 3]
-            view.distance, view.elevation = camera[k, 4], -33.0
-            mujoco.mjv_updateScene(
-                model, data, option, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene
-            )
-            add_shade(
-                scene, np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3]), robot, ground
-            )
-            trail.add(scene, now)
-            add_axes(scene, _corner(camera[k]), scale_m, ground)
-            film.add(screen.draw(scene, f"{title}  {now:6.1f} s   {speed_up:g}x".strip()))
-            if on_frame is not None:
-                on_frame(k + 1, len(shots))
-    return len(shots)
+
+
+class _Stage:
+    """The dressed model, and the scene of one pose of it after the other."""
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None,
+        style: Style,
+        marks: Marks,
+    ) -> None:
+        look = style.look
+        self._robot, self._ground, self._reached_s = robot, ground, marks.reached_s
+        self.bodies = len(look.rest_m) if look is not None and look.free else 1
+        self.spine = slice(1, 1 + (self.bodies if self.bodies > 1 else robot.link_count))
+        legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
+        self.length_m = robot.length_m + legs_m
+        """To show: the spine and, beside it, a leg."""
+        self.model = dressed_model(
+            *(robot, world, ground, marks.waypoints_m, marks.waypoint_radius_m),
+            look=look,
+            fine=style.fine,
+        )
+        self.data = mujoco.MjData(self.model)
+        self._view, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
+        self._reached = 0
+
+    def scene(self, trail: int) -> mujoco.MjvScene:
+        """Return a scene with room for the model and ``trail`` geoms more."""
+        room = self.model.ngeom + self.model.nbody + 11 + AXES_GEOMS + trail
+        scene = mujoco.MjvScene(self.model, maxgeom=room)
+        scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        return scene
+
+    def pose(self, scene: mujoco.MjvScene, shot: Floats, camera: Floats, now_s: float) -> None:
+        """Draw a pose into a scene as a camera shows it; waypoints reached by now are green."""
+        model, data, view = self.model, self.data, self._view
+        while self._reached < len(self._reached_s) and self._reached_s[self._reached] <= now_s:
+            mark_reached(model, self._reached)
+            self._reached += 1
+        data.qpos[:] = shot
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_camlight(model, data)
+        view.lookat[:], view.azimuth = camera[:3], camera[3]
+        view.distance, view.elevation = camera[4], -33.0
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, data, self._option, None, view, every, scene)
+        spine = self.spine
+        add_shade(
+            *(scene, np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])),
+            *(self._robot, self._ground),
+        )
 
 
 def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Floats:

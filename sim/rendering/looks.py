@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image, Ints
+from snakewalk.config.errors import InputError
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
@@ -84,7 +85,16 @@ def dressed_model(
 
     ``look`` is the skin; None is a capsule a link. ``fine`` smooths edges: three times the work of
     a software renderer.
+
+    Raises:
+        InputError: the installed MuJoCo cannot edit models.
+
     """
+    if not hasattr(mujoco.MjSpec, "geom"):
+        raise InputError(
+            f"films and drawn views need MuJoCo 3.3 or newer, and {mujoco.__version__} is "
+            "installed; install it with pip install 'mujoco>=3.3'"
+        )
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
     if look is not None and look.free:
         _replace_robot(spec, len(look.rest_m))

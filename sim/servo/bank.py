@@ -95,8 +95,9 @@ class ServoBank:
         clashing: bool = False,
     ) -> None:
         self.ids = tuple(ids)
-        several = model if isinstance(model, Sequence) and not isinstance(model, str) else None
-        models = [model] * len(self.ids) if several is None else several
+        models: Sequence[Model] = (
+            [model] * len(self.ids) if isinstance(model, str | ServoModel) else model
+        )
         by_name = {each.layout.model: each for each in map(registers_of, _different(models))}
         self._of_row = [by_name[load_control_table(each).model] for each in models]
         kinds = list(by_name.values())

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.servo_model import TABLE_BYTES
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
     CURRENT_POSITION_MODE,
@@ -19,7 +20,7 @@ from snakewalk.drivers.protocol.registers import (
     WATCHDOG_TRIPPED,
 )
 from snakewalk.sim.plant import Mounting, Plant
-from snakewalk.sim.servo.bank import TABLE_BYTES, ServoBank
+from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
 from snakewalk.sim.servo.event_queue import EventQueue

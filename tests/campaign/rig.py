@@ -20,7 +20,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import IDENTITY
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
-from snakewalk.drivers.protocol.registers import ServoUnits
+from snakewalk.drivers.protocol.registers import REVERSE, ServoUnits
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Policy, Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
@@ -153,7 +153,8 @@ class ChangeWatch:
         found: set[Change] = set()
         exchanged = []
         for joint in np.flatnonzero(bank["Torque Enable"][rows] == 1).tolist():
-            expected = {**self._chain._configured.get(joint, {})}
+            expected = dict(self._chain._configured.get(joint, {}))
+            expected |= self._chain._fingerprints.get(joint, {})
             expected["Bus Watchdog"] = self._chain._watchdog_ticks
             row = rows[joint]
             other = {name for name, each in expected.items() if int(bank[name][row]) != each}
@@ -263,8 +264,11 @@ class Rig:
             self._sin("not_held", ~state.valid & ~held)
 
     def _here_rad(self) -> np.ndarray:
-        """(J,) where the servo of each joint is."""
-        return self._joints(self.line.firmware.plant.position_rad)
+        """(J,) where the servo of each joint is, by its own zero and direction."""
+        bank = self.line.bank
+        direction = np.where(bank["Drive Mode"] & REVERSE, -1.0, 1.0)
+        zero_rad = bank["Homing Offset"] * TICK_RAD
+        return self._joints(direction * self.line.firmware.plant.position_rad + zero_rad)
 
     def _overhear(self, time_s: float, from_host: bool, data: bytes) -> None:
         self._was_rad.append((time_s, self._here_rad()))

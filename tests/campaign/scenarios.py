@@ -19,6 +19,10 @@ WRITES = {
     "goal PWM": ("Goal PWM", (0, 200)),
     "goal current": ("Goal Current", (0, 40)),
     "watchdog": ("Bus Watchdog", (0,)),
+    "zero": ("Homing Offset", (100, 300)),
+    "direction": ("Drive Mode", (1,)),
+    "shutdown": ("Shutdown", (0,)),
+    "limits": ("Min Position Limit", (100, 1000)),
 }
 """Registers that another program changes while the chain moves, and values that it may write."""
 CHANGES = ("exchange", *WRITES)

@@ -1,6 +1,7 @@
 """Files, modules and classes that the pages name exist."""
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ ANY = "|".join(FOLDERS)
 PATH = re.compile(rf"(?<![\w/.-])(?:{ANY})/[\w/.-]*\w")
 DOTTED = re.compile(rf"(?<![\w/.])(?:snakewalk\.)?(?:{ANY})(?:\.\w+)+")
 CLASS = re.compile(r"\b[A-Z][a-z]+[A-Z]\w+\b")
+STANDARD = {f"{name}.py" for name in sys.stdlib_module_names}
+"""Modules of Python itself."""
 
 
 def quoted(page: Path) -> str:
@@ -45,7 +48,7 @@ def test_files_and_modules_exist(page: Path) -> None:
     wrong = {path for path in PATH.findall(text) if not (ROOT / path).exists()}
     files = (".toml", ".md", ".csv", ".npz", ".py")
     modules = {file.name for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")}
-    wrong |= set(re.findall(r"(?<![\w/.-])\w+\.py\b", text)) - modules
+    wrong |= set(re.findall(r"(?<![\w/.-])\w+\.py\b", text)) - modules - STANDARD
     wrong |= {
         name for name in DOTTED.findall(text) if not name.endswith(files) and not is_defined(name)
     }

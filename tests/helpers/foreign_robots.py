@@ -5,6 +5,7 @@ None is a copy. What each has that a reader may stumble over is in its docstring
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 _BALL = '<inertia ixx="{0}" ixy="0" ixz="0" iyy="{0}" iyz="0" izz="{0}"/>'
 
@@ -78,12 +79,13 @@ def rounded_quarter_turns(count: int = 15) -> str:
     """RSNAKE: ``rpy="1.57 0 0"`` in every joint, and centres of mass at the joints."""
     text = _link("dummy_root") + _joint("root_fixed", "dummy_root", "module_0", "fixed", "0 0 0.05")
     shape = _mesh("link") + _cylinder(0.145, 0.05, "0.118 0 0", "0 1.57 0")
+    limit = _LIMIT.replace('effort="7"', 'effort="16"')
     for k in range(count):
         text += _link(f"module_{k}", "1.07", shape, inertia="0.0104")
         if k:
             text += _joint(
                 f"module_{k - 1}_to_{k}", f"module_{k - 1}", f"module_{k}", "revolute",
-                "0.145 0 0", "1.57 0 0", _Z + _LIMIT,
+                "0.145 0 0", "1.57 0 0", _Z + limit,
             )  # fmt: skip
     return f'<robot name="r">\n{text}</robot>\n'
 
@@ -289,22 +291,33 @@ def wheeled_mjcf(links: int = 9, *, mesh: bool = False) -> str:
     )
 
 
-CLASSES: dict[str, tuple[str, Callable[[], str], str, tuple[str, ...]]] = {
-    "REU": (".urdf", modules_of_three_links, "p" * 15, ()),
-    "RSNAKE": (".urdf", rounded_quarter_turns, "", ()),
-    "SEA": (".urdf", modules_with_collars, "", ()),
-    "seven joints": (".urdf", standing_on_world, "", ()),
-    "three joints": (
-        ".urdf", lambda: standing_on_world(3, bare_tail=True), "", ("link4.mass_kg=1",),
+class Model(NamedTuple):
+    """A class of published models, and the options with which it is imported and run."""
+
+    suffix: str
+    make: Callable[[], str]
+    axes: str
+    """Of the robot; "" for alternating ones."""
+    assumed: tuple[str, ...] = ()
+    scale: float = 1.0
+    servo: str = "XM430-W350"
+
+
+CLASSES = {
+    "REU": Model(".urdf", modules_of_three_links, ""),
+    "RSNAKE": Model(".urdf", rounded_quarter_turns, "", (), 0.8, "XM540-W270"),
+    "SEA": Model(".urdf", modules_with_collars, ""),
+    "seven joints": Model(".urdf", standing_on_world, ""),
+    "three joints": Model(
+        ".urdf", lambda: standing_on_world(3, bare_tail=True), "", ("link4.mass_kg=1",)
     ),
-    "wheeled Gazebo snake": (".urdf", wheeled_urdf, "y" * 8, ()),
-    "arm of threes": (".urdf", arm_of_threes, "ypp" * 4, ()),
-    "o14": (".xml", modules_without_meshes, "", ()),
-    "o20": (".xml", lambda: modules_without_meshes(20), "", ()),
-    "o40": (".xml", lambda: modules_without_meshes(40), "", ()),
-    "cars": (".xml", wheeled_mjcf, "y" * 8, ()),
-    "cars of meshes": (
-        ".xml", lambda: wheeled_mjcf(mesh=True), "y" * 8, ("module.mass_kg=0.15",),
+    "wheeled Gazebo snake": Model(".urdf", wheeled_urdf, "y" * 8),
+    "arm of threes": Model(".urdf", arm_of_threes, "ypp" * 4, servo="XM540-W270"),
+    "o14": Model(".xml", modules_without_meshes, ""),
+    "o20": Model(".xml", lambda: modules_without_meshes(20), ""),
+    "o40": Model(".xml", lambda: modules_without_meshes(40), "", servo="XM540-W270"),
+    "cars": Model(".xml", wheeled_mjcf, "y" * 8, scale=0.4),
+    "cars of meshes": Model(
+        ".xml", lambda: wheeled_mjcf(mesh=True), "y" * 8, ("module.mass_kg=0.15",)
     ),
-}  # fmt: skip
-"""Name: suffix, text, axes ("" for alternating ones), what has to be assumed."""
+}

@@ -8,6 +8,8 @@ HAND_OVER_S = 1e-3
 """Real time that the operating system is given to hand bytes over, at each look."""
 LOOK_S = 2.5e-4
 """Simulated time between two looks."""
+_TRIES = 300
+"""Looks for bytes that were sent: a busy machine hands them over late, a flush never."""
 
 
 class ServedClock(SimClock):
@@ -16,6 +18,33 @@ class ServedClock(SimClock):
     def __init__(self) -> None:
         super().__init__()
         self.servers: list[PtyServer] = []
+        self._outstanding = 0
+
+    def serve(self, server: PtyServer) -> None:
+        """Let a server run, too, and count what it receives."""
+        if server in self.servers:
+            return
+        self.servers.append(server)
+        receive = server._receive
+
+        def counted() -> bytes:
+            received = receive()
+            self._outstanding -= len(received)
+            return received
+
+        server._receive = counted  # type: ignore[method-assign]
+
+    def on_sent(self, count: int) -> None:
+        """Expect as many bytes at the servers."""
+        self._outstanding = max(self._outstanding, 0) + count
+
+    def deliver(self) -> None:
+        """Wait, in real time, until the servers have what was sent; simulated time stops."""
+        for _ in range(_TRIES):
+            if self._outstanding <= 0:
+                return
+            self.look(HAND_OVER_S)
+        self._outstanding = 0
 
     def look(self, wait_s: float) -> None:
         """Let all servers look once; the first waits for so much real time."""
@@ -25,8 +54,7 @@ class ServedClock(SimClock):
 
     def sleep_until_s(self, time_s: float) -> None:
         """Let the server look as often as it does while idle, first at what has been sent."""
-        if self.now_s() < time_s:
-            self.look(HAND_OVER_S)
+        self.deliver()
         while self.now_s() < time_s:
             self.advance(min(IDLE_S, time_s - self.now_s()))
             self.look(0.0)
@@ -39,8 +67,12 @@ class PtyPort(SerialPort):
         super().__init__(server.path, baud, clock)
         self.descriptor = None  # compiled code would wait for real time
         self._served = clock
-        if server not in clock.servers:
-            clock.servers.append(server)
+        clock.serve(server)
+
+    def write(self, data: bytes) -> None:
+        """As ``BytePort`` says."""
+        super().write(data)
+        self._served.on_sent(len(data))
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """As ``BytePort`` says."""

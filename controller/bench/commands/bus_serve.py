@@ -214,8 +214,8 @@ def _simulated(
         player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
         spec = ChainSpec(spec.ids, (line.servos.facts.model,) * len(spec.ids))
-        old = partial(Decoder1, line.servos.facts)
-        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), old, None
+        decoder1 = partial(Decoder1, line.servos.facts)
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), decoder1, None
     spec = ChainSpec(line.bank.ids, line.bank.models)
     models = dict(zip(line.bank.ids, line.bank.facts, strict=True))
     decoder = partial(Decoder, line.bank.facts[0], models)

@@ -24,7 +24,7 @@ def sniff(
     ],
     baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="model, or its file, of servos that no ping has identified")
+        str, typer.Option(help="model, or its file, of servos that no ping has shown")
     ] = "XM430-W350",
     through: Annotated[
         bool, typer.Option("--through", help="stand between a client and the device")

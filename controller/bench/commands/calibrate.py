@@ -29,6 +29,18 @@ if TYPE_CHECKING:
     from snakewalk.controller.bench.homing_offset import HomingOffset
 
 
+Sweep = Annotated[
+    bool, typer.Option("--sweep/--no-sweep", help="look for the ends of each joint's range")
+]
+ToEeprom = Annotated[
+    bool,
+    typer.Option(
+        "--homing-offset",
+        help="zeros into the servos' EEPROM, Homing Offset(20), after a question, not the file",
+    ),
+]
+
+
 @command("calibrate", group=BUS, examples=("calibrate --robot alternating16 -o my-robot.toml",))
 def calibrate(
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
@@ -42,16 +54,8 @@ def calibrate(
     port: Port = None,
     baud: Annotated[int | None, typer.Option(help="default: as the robot says")] = None,
     current: Annotated[float, typer.Option(help="A, the most that a servo may use")] = 0.3,
-    sweep: Annotated[
-        bool, typer.Option("--sweep/--no-sweep", help="look for the ends of each joint's range")
-    ] = True,
-    homing_offset: Annotated[
-        bool,
-        typer.Option(
-            "--homing-offset",
-            help="zeros into the servos' EEPROM, Homing Offset(20), after a question, not the file",
-        ),
-    ] = False,
+    sweep: Sweep = True,
+    homing_offset: ToEeprom = False,
     yes: Annotated[
         bool, typer.Option("--yes", "-y", help="with --homing-offset: write without asking")
     ] = False,

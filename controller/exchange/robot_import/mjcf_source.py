@@ -43,10 +43,11 @@ def prepare_mjcf(root: LineElement, path: Path, assumed: Assumptions) -> ModelSo
     _include(root, path)
     check_parts(path, root)
     for compiler in root.iter("compiler"):
+        assert isinstance(compiler, LineElement)
         if compiler.get("coordinate") == "global":
             raise InputError(
                 f"{path}: {compiler.where}: states global coordinates, as MuJoCo 1 had; load and "
-                "save it with MuJoCo 2.3.3 or older"  # type: ignore[attr-defined]
+                "save it with MuJoCo 2.3.3 or older"
             )
     source.actuated = frozenset(
         name
@@ -55,11 +56,6 @@ def prepare_mjcf(root: LineElement, path: Path, assumed: Assumptions) -> ModelSo
         for name in [actuator.get("joint") or actuator.get("jointinparent")]
         if name
     )
-    for actuators in root.findall("actuator"):
-        for actuator in actuators:
-            span = numbers(actuator.get("forcerange"), 2)
-            if span is not None and actuator.get("joint"):
-                source.effort_n_m[str(actuator.get("joint"))] = min(-span[0], span[1])
     _drop_unread(source)
     defaults = _Defaults.of(root)
     _resolve_meshes(source, path, defaults, assumed)
@@ -183,11 +179,11 @@ def _resolve_meshes(
                     geom.attrib.update(type="sphere", size=_MARK_M)
     replaced = 0
     for parent, geom, childclass in list(_geoms(root)):
-        name = defaults.value(geom, "mesh", childclass)
-        if name not in missing or defaults.value(geom, "type", childclass) not in (None, "mesh"):
+        absent = defaults.value(geom, "mesh", childclass)
+        if absent not in missing or defaults.value(geom, "type", childclass) not in (None, "mesh"):
             continue
         replaced += 1
-        _replace(parent, geom, defaults.value(geom, "mass", childclass), name or "", assumed)
+        _replace(parent, geom, defaults.value(geom, "mass", childclass), absent or "", assumed)
     files = ", ".join(sorted(set(missing.values()))[:3])
     source.notes.append(
         f"{replaced} shapes are left out, their mass is kept: missing mesh files: {files}"
@@ -211,7 +207,8 @@ def _replace(
             likely=0.1,
         )  # fmt: skip
         mass = repr(value)
-    kept = {key: geom.attrib[key] for key in ("name", "pos", "friction") if key in geom.attrib}
+    keys = ("name", "pos", "friction")
+    kept: dict[str, str] = {key: geom.attrib[key] for key in keys if key in geom.attrib}
     geom.attrib.clear()
     geom.attrib.update(kept, type="sphere", size=_MARK_M, mass=mass)
 

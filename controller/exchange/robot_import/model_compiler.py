@@ -1,8 +1,6 @@
 """From a model's file to MuJoCo's model: expand xacro, prepare, compile within limits."""
 
 import shutil
-import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +9,7 @@ from typing import Final
 import mujoco
 
 from snakewalk.config.errors import Assumptions, InputError
-from snakewalk.controller.console.child_process import child_environ, run_code
+from snakewalk.controller.console.child_process import run_code, run_program
 from snakewalk.controller.exchange.robot_import.mjcf_source import prepare_mjcf
 from snakewalk.controller.exchange.robot_import.model_source import (
     LineElement,
@@ -103,22 +101,19 @@ def _expanded(path: Path) -> str:
         InputError: there is none, or it cannot expand the file.
 
     """
-    if find_spec("xacro") is not None:
-        limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
-        command = [sys.executable, "-c", _XACRO, "xacro", str(path), *limits]
-    elif (program := shutil.which("xacro")) is not None:
-        command = [program, str(path)]
-    else:
-        raise InputError(
-            f"{path}: is xacro, which needs the program xacro: pip install xacro, or write its "
-            f"URDF elsewhere: xacro {path.name} > FILE.urdf"
-        )
+    wait_s = 6.0 * _MOST_CPU_S
     try:
-        ended = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False,
-            timeout=6.0 * _MOST_CPU_S, env=child_environ(),
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
+        if find_spec("xacro") is not None:
+            limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
+            ended = run_code(_XACRO, "xacro", str(path), *limits, timeout_s=wait_s)
+        elif (program := shutil.which("xacro")) is not None:
+            ended = run_program([program, str(path)], timeout_s=wait_s)
+        else:
+            raise InputError(
+                f"{path}: is xacro, which needs the program xacro: pip install xacro, or write its "
+                f"URDF elsewhere: xacro {path.name} > FILE.urdf"
+            )
+    except TimeoutError:
         raise InputError(f"{path}: xacro does not end") from None
     if ended.returncode or not ended.stdout.strip():
         lines = [line for line in ended.stderr.splitlines() if line.strip()]

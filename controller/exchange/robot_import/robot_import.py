@@ -18,6 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import Assumptions, ConfigError, InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_catalogue import described_model
 from snakewalk.controller.exchange.robot_import.body_tree import (
     BodyTree,
     Hinge,
@@ -38,7 +39,6 @@ from snakewalk.controller.exchange.robot_import.model_compiler import load_model
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
-from snakewalk.sim.servo.motor import MOTORS
 
 _MOST_RAD: Final = 3.05
 """Half range of a joint that may turn for ever: a servo in position mode knows one turn."""
@@ -251,19 +251,20 @@ def _plan_limits(
     keys: dict[str, object] = {}
     efforts = [value for name, value in source.effort_n_m.items() if name in joints]
     speeds = [value for name, value in source.speed_rad_s.items() if name in joints]
+    held_n_m = math.inf
+    facts = described_model(servo_model, None)
+    if facts is not None and facts.motor is not None:
+        held_n_m = round(_HELD_SHARE * facts.motor.stall_torque_n_m, 3)
+        keys["torque_limit_n_m"] = held_n_m
     low, high = _TORQUE_N_M
     if efforts and low <= min(efforts) <= high:
-        torque_n_m, words = min(efforts), ""
-        if servo_model in MOTORS:
-            most_n_m = round(_HELD_SHARE * MOTORS[servo_model].stall_torque_n_m, 3)
-            if most_n_m < torque_n_m:
-                torque_n_m, words = most_n_m, f"; a {servo_model} holds {most_n_m:g}"
-        keys["torque_limit_n_m"] = torque_n_m
+        keys["torque_limit_n_m"] = min(*efforts, held_n_m)
+        words = f"; a {servo_model} holds {held_n_m:g}" if held_n_m < min(efforts) else ""
         notes.append(f"torque of a plan: the model states {min(efforts):g} N m{words}")
     elif efforts:
         notes.append(
-            f"torque of a plan: the model states {min(efforts):g} N m, which is no servo's: left "
-            "out"
+            f"torque of a plan: the model states {min(efforts):g} N m, which is no servo's; a "
+            f"{servo_model} holds {held_n_m:g}"
         )
     low, high = _SPEED_RAD_S
     if speeds and low <= min(speeds) <= high:
@@ -290,7 +291,7 @@ def _joints(
         notes.append(
             f"without a range in the model, {_MOST_RAD:g} rad both ways: {', '.join(endless)}"
         )
-    tables = []
+    tables: list[dict[str, object]] = []
     for hinge, yaw in zip(tree.hinges, directions.yaws, strict=True):
         zero = float(model.qpos0[model.jnt_qposadr[hinge.joint]])
         low, high = (float(v) - zero for v in model.jnt_range[hinge.joint])

@@ -74,10 +74,11 @@ def _drop_repeated(source: ModelSource) -> None:
     repeated: dict[str, list[str]] = {}
     for parent in list(source.root.iter()):
         for tag in _ONCE.get(parent.tag, ()):
-            first, *others = children(parent, tag) or [None]
+            found = children(parent, tag)
+            if len(found) < 2:
+                continue
+            first, *others = found
             for other in others:
-                assert other is not None
-                assert first is not None
                 parent.remove(other)
                 differs = " with other values" if other.attrib != first.attrib else ""
                 repeated.setdefault(f"{parent.tag} {{}} repeat <{tag}>", []).append(
@@ -155,9 +156,9 @@ def _first_link(source: ModelSource, path: Path) -> str:
         raise InputError(f"{path}: link world holds {held}; one robot is read at a time")
     root.remove(holding[0])
     root.remove(next(link for link in root.findall("link") if link.get("name") == here))
-    held, kind = _end(holding[0], "child"), holding[0].get("type")
+    name_held, kind = _end(holding[0], "child"), holding[0].get("type")
     source.notes.append(
-        f"link world is dropped: it holds {held} by the {kind} joint {holding[0].get('name')}"
+        f"link world is dropped: it holds {name_held} by the {kind} joint {holding[0].get('name')}"
     )
     return str(held)
 

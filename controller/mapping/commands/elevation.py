@@ -3,25 +3,25 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.options import Assume, Force, Json, console, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
 )
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
-from snakewalk.controller.mapping.raster_file import DEGREE, UNITS_M, RasterUnits
+from snakewalk.controller.mapping.raster_file import RasterUnits
 from snakewalk.controller.mapping.world_file import MapWorld, map_beside
-from snakewalk.controller.terrain.elevation_map import CELL_HEIGHTS
 
 if TYPE_CHECKING:
-    from snakewalk.controller.mapping.world_file import MapWorld
+    from snakewalk.controller.mapping.elevation_file import FileMap
+    from snakewalk.controller.terrain.elevation_map import CellHeight
 
 WorldOut = Annotated[Path, typer.Option("--out", "-o", help="the world's file (.toml)")]
 Spacing = Annotated[
@@ -35,6 +35,49 @@ Picture = Annotated[
 ]
 _LEAST, _MOST = 1e-6, 1e6
 """Of lengths, m, and of factors: what is beyond is in another unit (ours)."""
+_UNITS = ("m", "cm", "mm", "km", "ft", "us-ft")
+_POINTS = ("lowest", "median", "highest")
+_AXES = ("z", "y", "x", "-z", "-y", "-x")
+ElevationFile = Annotated[
+    Path,
+    typer.Argument(
+        help="GeoTIFF, ASCII grid, LAS, LAZ, PCD, PLY, XYZ, OBJ, STL, GLB, PNG, CSV or NPZ"
+    ),
+]
+Scale = Annotated[float, typer.Option(help="metres in the robot's world per metre")]
+VerticalScale = Annotated[
+    float | None, typer.Option(help="the same of heights; default: as --scale")
+]
+CropText = Annotated[
+    str | None, typer.Option(help="X0,Y0,X1,Y1: metres of the file from its south-west corner")
+]
+Unit = Annotated[
+    str | None,
+    typer.Option(help=f"of the file's lengths: {', '.join(_UNITS)}, deg; default: as it states"),
+]
+HeightUnit = Annotated[
+    str | None,
+    typer.Option(help="of its heights; default: as it states, else as its lengths where metres"),
+]
+Cell = Annotated[
+    float | None, typer.Option(help="between samples of a PNG, CSV or NPZ, in the unit")
+]
+HeightStep = Annotated[
+    float | None, typer.Option(help="height of one step of the file's values, in the unit")
+]
+NoData = Annotated[float | None, typer.Option(help="value of cells that hold nothing")]
+PointOf = Annotated[
+    str | None,
+    typer.Option(help="which point of a cell counts: lowest, median, highest; default: median"),
+]
+Up = Annotated[
+    str | None,
+    typer.Option(help="axis of a mesh or cloud that points up: z, y, x, -z, -y, -x; default: z"),
+]
+Classes = Annotated[
+    str | None,
+    typer.Option(help="classes of LAS points, such as 2,9; default: ground, else all but noise"),
+]
 
 
 @command(
@@ -46,90 +89,98 @@ _LEAST, _MOST = 1e-6, 1e6
     ),
 )
 def elevation(
-    file: Annotated[
-        Path,
-        typer.Argument(help="GeoTIFF, ASCII grid, PCD, PLY, XYZ, OBJ, STL, GLB, PNG, CSV or NPZ"),
-    ],
+    file: ElevationFile,
     out: WorldOut,
-    scale: Annotated[float, typer.Option(help="metres in the robot's world per metre")] = 1.0,
-    vertical_scale: Annotated[
-        float | None, typer.Option(help="the same of heights; default: as --scale")
-    ] = None,
+    scale: Scale = 1.0,
+    vertical_scale: VerticalScale = None,
     spacing: Spacing = None,
-    crop: Annotated[
-        str | None,
-        typer.Option(help="X0,Y0,X1,Y1: metres of the file from its south-west corner"),
-    ] = None,
-    unit: Annotated[
-        str | None,
-        typer.Option(
-            help="of the file's lengths: m, cm, mm, km, ft, deg; default: as it says, or m"
-        ),
-    ] = None,
-    cell: Annotated[
-        float | None, typer.Option(help="between samples of a PNG, CSV or NPZ, in the unit")
-    ] = None,
-    height_step: Annotated[
-        float | None, typer.Option(help="height of one step of the file's values, in the unit")
-    ] = None,
-    no_data: Annotated[float | None, typer.Option(help="value of cells that hold nothing")] = None,
-    point: Annotated[
-        str, typer.Option(help="which point of a cell counts: lowest, median, highest")
-    ] = "median",
-    up: Annotated[str, typer.Option(help="axis of a mesh or cloud that points up: z or y")] = "z",
+    crop: CropText = None,
+    unit: Unit = None,
+    height_unit: HeightUnit = None,
+    cell: Cell = None,
+    height_step: HeightStep = None,
+    no_data: NoData = None,
+    point: PointOf = None,
+    up: Up = None,
+    classes: Classes = None,
+    assume: Assume = None,
     fill: Fill = 0.0,
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a world that `plan` and `run` take of a file of real ground; its holes stay known."""
-    positive = {
-        "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
-        "--cell": cell, "--height-step": height_step,
-    }  # fmt: skip
-    faults = not_positive(positive)
+    """Make a world for `plan` and `run` from a file of real ground; its holes stay known."""
+    faults = not_positive(
+        {
+            "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
+            "--cell": cell, "--height-step": height_step,
+        }
+    )  # fmt: skip
     check_fill(fill, faults)
-    known = {"--unit": (unit, (*UNITS_M, DEGREE)), "--point": (point, CELL_HEIGHTS)}
-    known["--up"] = (up, ("z", "y"))
-    faults += [
-        f"{option} {value}: is none of {', '.join(choices)}"
-        for option, (value, choices) in known.items()
-        if value is not None and value not in choices
-    ]
+    chosen = {"--unit": (unit, (*_UNITS, "deg")), "--height-unit": (height_unit, _UNITS)}
+    chosen |= {"--point": (point, _POINTS), "--up": (up, _AXES)}
+    faults += _not_chosen(chosen)
     corners = None if crop is None else _corners(crop, faults)
+    kinds = None if classes is None else _numbers_of(classes, faults)
     if faults:
         raise InputError(faults)
+    assumed = Assumptions(assume or ())
     check_world_files(out, picture, [file], force)
-    units = RasterUnits(unit, cell, height_step, no_data)
-    options = MapOptions(
-        units, corners, scale, vertical_scale, spacing,
-        next(name for name in CELL_HEIGHTS if name == point), up,
-    )  # fmt: skip
+    units = RasterUnits(unit, cell, height_step, no_data, height_unit)
+    which = cast("CellHeight | None", point)
+    options = MapOptions(units, corners, scale, vertical_scale, spacing, which, up, kinds, assumed)
     read = read_elevation(file, options)
+    assumed.check_used("keys: lowest_m, highest_m")
     world = MapWorld.of(out, read.elevation.height_field(fill))
+    notes = [*read.notes, *assumed.lines]
+    world.write(_head(file, read, options, crop, world.ground.spacing_m, fill, notes))
+    finish(world, _facts(read, options, notes), picture, as_json=as_json)
+
+
+def _head(
+    file: Path, read: "FileMap", options: "MapOptions", crop: str | None, spacing_m: float,
+    fill: float, notes: list[str],
+) -> list[str]:  # fmt: skip
+    """Comment at the head of the world's file."""
     wide, deep = read.size_m
-    rise = scale if vertical_scale is None else vertical_scale
-    world.write(
-        [
-            f"From {file.name}, {read.kind}: {wide:.5g} m by {deep:.5g} m,",
-            f"{read.relief_m:.4g} m of relief, at a scale of {scale:g}, heights at {rise:g};",
-            f"samples {world.ground.spacing_m:g} m apart.",
-            *([f"Of the file from its south-west corner: {crop} m."] if crop else []),
-            *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
-        ]
-    )
-    finish(
-        world,
-        {
-            "kind": read.kind,
-            "file_size_m": [round(wide, 3), round(deep, 3)],
-            "file_relief_m": round(read.relief_m, 3),
-            "scale": scale,
-            "vertical_scale": rise,
-        },
-        picture,
-        as_json=as_json,
-    )
+    return [
+        f"From {file.name}, {read.kind}: {wide:.5g} m by {deep:.5g} m,",
+        f"{read.relief_m:.4g} m of relief, at a scale of {options.scale:g}, heights at "
+        f"{options.rise:g};",
+        f"samples {spacing_m:g} m apart.",
+        *([f"Of the file from its south-west corner: {crop} m."] if crop else []),
+        *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
+        *(f"- {note}" for note in notes),
+    ]
+
+
+def _facts(read: "FileMap", options: "MapOptions", notes: list[str]) -> dict[str, object]:
+    wide, deep = read.size_m
+    return {
+        "kind": read.kind,
+        "file_size_m": [round(wide, 3), round(deep, 3)],
+        "file_relief_m": round(read.relief_m, 3),
+        "scale": options.scale,
+        "vertical_scale": options.rise,
+        "notes": notes,
+    }
+
+
+def _not_chosen(options: Mapping[str, tuple[str | None, Sequence[str]]]) -> list[str]:
+    """Faults of options whose value is none of their choices."""
+    return [
+        f"{option} {value}: is none of {', '.join(choices)}"
+        for option, (value, choices) in options.items()
+        if value is not None and value not in choices
+    ]
+
+
+def _numbers_of(classes: str, faults: list[str]) -> tuple[int, ...]:
+    words = classes.split(",")
+    if not all(word.strip().isdecimal() and int(word) < 256 for word in words):
+        faults.append(f"--classes {classes}: expected numbers from 0 to 255, such as 2,9")
+        return ()
+    return tuple(int(word) for word in words)
 
 
 def check_world_files(
@@ -179,7 +230,11 @@ def finish(
         with atomic_write(picture) as part:
             draw_terrain_map(world.relief, part, world.config.name)
         facts = facts | {"picture": str(picture)}
+    notes = facts.pop("notes", []) if not as_json else []
     show(world.facts() | facts, as_json)
+    assert isinstance(notes, list)
+    for note in notes:
+        console.print(f"- {note}", markup=False)
 
 
 def _corners(crop: str, faults: list[str]) -> tuple[float, float, float, float] | None:

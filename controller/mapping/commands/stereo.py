@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -21,11 +21,31 @@ from snakewalk.controller.mapping.commands.elevation import (
     finish,
     not_positive,
 )
-from snakewalk.controller.mapping.raster_file import UNITS_M
 from snakewalk.controller.mapping.world_file import MapWorld
 
 if TYPE_CHECKING:
     from snakewalk.config.arrays import Image
+    from snakewalk.controller.mapping.stereo_ground import StereoGround
+
+_UNITS_M: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048}
+Left = Annotated[Path, typer.Argument(help="picture of the left camera")]
+Right = Annotated[Path, typer.Argument(help="picture of the right camera, of the same moment")]
+Calibration = Annotated[
+    Path, typer.Option(help="of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a calib.txt")
+]
+Unit = Annotated[str, typer.Option(help="of the calibration's T: m, cm, mm")]
+Height = Annotated[
+    float | None, typer.Option(help="m of the left camera above the ground; default: fitted")
+]
+Tilt = Annotated[float | None, typer.Option(help="degrees of its axis, downwards; default: fitted")]
+Roll = Annotated[float, typer.Option(help="degrees about its axis, the right side down")]
+Disparities = Annotated[int, typer.Option(min=16, max=2048, help="px, the largest that is tried")]
+SampleSpacing = Annotated[float, typer.Option(help="m between samples in the robot's world")]
+Error = Annotated[float, typer.Option(help="m: points whose expected error is larger are left out")]
+Far = Annotated[
+    float | None, typer.Option(help="m ahead, at most; default: as far as --error allows")
+]
+Scale = Annotated[float, typer.Option(help="metres in the robot's world per metre")]
 
 
 @command(
@@ -36,32 +56,19 @@ if TYPE_CHECKING:
     ),
 )
 def stereo(
-    left: Annotated[Path, typer.Argument(help="picture of the left camera")],
-    right: Annotated[Path, typer.Argument(help="picture of the right camera, of the same moment")],
-    calibration: Annotated[
-        Path,
-        typer.Option(help="of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a calib.txt"),
-    ],
+    left: Left,
+    right: Right,
+    calibration: Calibration,
     out: WorldOut,
-    unit: Annotated[str, typer.Option(help="of the calibration's T: m, cm, mm")] = "m",
-    height: Annotated[
-        float | None, typer.Option(help="m of the left camera above the ground; default: fitted")
-    ] = None,
-    tilt: Annotated[
-        float | None, typer.Option(help="degrees of its axis, downwards; default: fitted")
-    ] = None,
-    roll: Annotated[float, typer.Option(help="degrees about its axis, the right side down")] = 0.0,
-    disparities: Annotated[
-        int, typer.Option(min=16, max=2048, help="px, the largest that is tried")
-    ] = 128,
-    spacing: Annotated[float, typer.Option(help="m between samples in the robot's world")] = 0.03,
-    error: Annotated[
-        float, typer.Option(help="m: points whose expected error is larger are left out")
-    ] = 0.03,
-    far: Annotated[
-        float | None, typer.Option(help="m ahead, at most; default: as far as --error allows")
-    ] = None,
-    scale: Annotated[float, typer.Option(help="metres in the robot's world per metre")] = 1.0,
+    unit: Unit = "m",
+    height: Height = None,
+    tilt: Tilt = None,
+    roll: Roll = 0.0,
+    disparities: Disparities = 128,
+    spacing: SampleSpacing = 0.03,
+    error: Error = 0.03,
+    far: Far = None,
+    scale: Scale = 1.0,
     fill: Fill = 0.0,
     picture: Picture = None,
     force: Force = False,
@@ -81,26 +88,17 @@ def stereo(
         stereo_ground,
     )
 
-    positive = {
-        "--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale,
-    }  # fmt: skip
-    faults = not_positive(positive)
+    faults = not_positive(
+        {"--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale}
+    )
     check_fill(fill, faults)
-    faults += [
-        f"{option} {angle:g}: must be within 90 degrees"
-        for option, angle in (("--tilt", tilt or 0.0), ("--roll", roll))
-        if not -90.0 < angle <= 90.0
-    ]
-    if (height is None) != (tilt is None):
-        faults.append("--height and --tilt belong together; without both the ground is fitted")
-    elif height is None and roll != 0.0:
-        faults.append("--roll belongs to --height and --tilt")
-    if unit not in UNITS_M:
-        faults.append(f"--unit {unit}: is none of {', '.join(UNITS_M)}")
+    faults += _stand_faults(height, tilt, roll)
+    if unit not in _UNITS_M:
+        faults.append(f"--unit {unit}: is none of {', '.join(_UNITS_M)}")
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
-    pair = rectify(read_calibration(calibration, UNITS_M[unit]), _picture(left), _picture(right))
+    pair = rectify(read_calibration(calibration, _UNITS_M[unit]), _picture(left), _picture(right))
     stand = None
     if height is not None and tilt is not None:
         stand = CameraStand(height, math.radians(tilt), math.radians(roll))
@@ -109,37 +107,58 @@ def stereo(
     )
     seen = made.elevation
     placed = replace(
-        seen,
-        z_m=scale * seen.z_m,
-        spacing_m=spacing,
-        x0_m=scale * seen.x0_m,
+        seen, z_m=scale * seen.z_m, spacing_m=spacing, x0_m=scale * seen.x0_m,
         y0_m=scale * seen.y0_m,
-    )
+    )  # fmt: skip
     world = MapWorld.of(out, placed.height_field(fill))
-    degrees = math.degrees(made.stand.tilt_rad), math.degrees(made.stand.roll_rad)
-    how = "fitted to the points" if made.fitted else "given"
     world.write(
         [
             f"From {left.name} and {right.name}, at a scale of {scale:g}; samples {spacing:g} m",
             "apart. (0, 0) is below the left camera, x is where it looked.",
-            f"The camera stood {made.stand.height_m:.3f} m above the ground, tilted down by",
-            f"{degrees[0]:.1f} degrees and rolled by {degrees[1]:.1f}, {how}.",
+            *_stand_words(made),
             *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         ]
     )
-    finish(
-        world,
-        {
-            "camera": how,
-            "camera_height_m": round(made.stand.height_m, 4),
-            "camera_tilt_deg": round(degrees[0], 2),
-            "camera_roll_deg": round(degrees[1], 2),
-            "matched_share": round(made.told_share, 4),
-            "mapped_share": round(made.used_share, 4),
-        },
-        picture,
-        as_json=as_json,
-    )
+    finish(world, _facts(made), picture, as_json=as_json)
+
+
+def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list[str]:
+    """Faults of the options that say how the camera stands."""
+    faults = [
+        f"{option} {angle:g}: must be within 90 degrees"
+        for option, angle in (("--tilt", tilt or 0.0), ("--roll", roll))
+        if not -90.0 < angle <= 90.0
+    ]
+    if (height is None) != (tilt is None):
+        faults.append("--height and --tilt belong together; without both the ground is fitted")
+    elif height is None and roll != 0.0:
+        faults.append("--roll belongs to --height and --tilt")
+    return faults
+
+
+def _stand_words(made: "StereoGround") -> list[str]:
+    stand = made.stand
+    return [
+        f"The camera stood {stand.height_m:.3f} m above the ground, tilted down by",
+        f"{math.degrees(stand.tilt_rad):.1f} degrees and rolled by "
+        f"{math.degrees(stand.roll_rad):.1f}, {_how(made)}.",
+    ]
+
+
+def _how(made: "StereoGround") -> str:
+    return "fitted to the points" if made.fitted else "given"
+
+
+def _facts(made: "StereoGround") -> dict[str, object]:
+    stand = made.stand
+    return {
+        "camera": _how(made),
+        "camera_height_m": round(stand.height_m, 4),
+        "camera_tilt_deg": round(math.degrees(stand.tilt_rad), 2),
+        "camera_roll_deg": round(math.degrees(stand.roll_rad), 2),
+        "matched_share": round(made.told_share, 4),
+        "mapped_share": round(made.used_share, 4),
+    }
 
 
 def _picture(file: Path) -> "Image":

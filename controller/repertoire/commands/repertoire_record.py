@@ -9,6 +9,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, GivenRobot, Json
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
@@ -59,6 +60,8 @@ def record(
 
         repertoire = recording.record(body, ground, on_progress=on_progress)
         bar.update(float(len(recording.ACTIONS)), description="recorded")
+    for line in repertoire.contradictions():
+        LOGGER.warning("%s", line)
     with atomic_write(file) as part:
         repertoire.save(part)
     if picture is not None:

@@ -37,6 +37,30 @@ from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer
 _WEEK_S = 604_800.0
 
 
+Domain = Annotated[
+    int | None,
+    typer.Option(
+        min=0, max=232, help="default: ROS_DOMAIN_ID of the environment", show_default=False
+    ),
+]
+Network = Annotated[
+    bool,
+    typer.Option(
+        "--network",
+        help="seen by other machines; default: as ROS_AUTOMATIC_DISCOVERY_RANGE says, else by "
+        "this one only",
+    ),
+]
+Timeout = Annotated[
+    float,
+    typer.Option(help="s: joints on their way hold when no joint goals come; inf: they go on"),
+]
+FirstGait = Annotated[
+    str | None,
+    typer.Option(help="gait to begin with; default: hold", autocompletion=completion.GAITS),
+]
+
+
 @command(
     "ros",
     group=JOB,
@@ -50,30 +74,12 @@ def ros(
     robot: Robot = None,
     world: World = None,
     port: RunPort = None,
-    gait: Annotated[
-        str | None,
-        typer.Option(help="gait to begin with; default: hold", autocompletion=completion.GAITS),
-    ] = None,
+    gait: FirstGait = None,
     param: Param = None,
-    domain: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=232, help="default: ROS_DOMAIN_ID of the environment", show_default=False
-        ),
-    ] = None,
+    domain: Domain = None,
     namespace: Annotated[str, typer.Option(help="of all topics and services")] = "",
-    network: Annotated[
-        bool,
-        typer.Option(
-            "--network",
-            help="seen by other machines; default: as ROS_AUTOMATIC_DISCOVERY_RANGE says, else by "
-            "this one only",
-        ),
-    ] = False,
-    timeout: Annotated[
-        float,
-        typer.Option(help="s: joints on their way hold when no joint goals come; inf: they go on"),
-    ] = 1.0,
+    network: Network = False,
+    timeout: Timeout = 1.0,
     seconds: Annotated[
         float, typer.Option(help="then torque goes off", show_default="a week")
     ] = _WEEK_S,

@@ -25,6 +25,7 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.summary import path_relief, path_warnings
 
 
@@ -84,6 +85,16 @@ def plan(
         run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
         track=track,
     )  # fmt: skip
+    found, warnings = _facts(prepared)
+    if as_json:
+        found["warnings"] = warnings
+    show(found, as_json)
+    for line in () if as_json else warnings:
+        console.print(f"warning: {line}")
+
+
+def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
+    """Return the figures of a run on paper, and its warnings."""
     ahead = prepared.forecast()
     found: dict[str, object] = {
         "run": prepared.run.name,
@@ -109,24 +120,29 @@ def plan(
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
-    warnings = prepared.warnings
+    warnings = list(prepared.warnings)
     if prepared.ground_ahead is not None:
-        relief = path_relief(prepared.planner, prepared.path)
-        found["slope_median_deg"] = _deg(relief.median_slope_rad)
-        found["slope_max_deg"] = _deg(relief.max_slope_rad)
-        found["world_slope_median_deg"] = _deg(relief.world_median_slope_rad)
-        found["under_body_slope_median_deg"] = _deg(relief.median_footprint_slope_rad)
-        found["under_body_slope_max_deg"] = _deg(relief.max_footprint_slope_rad)
-        found["up_slope_max_deg"] = _deg(relief.max_up_slope_rad)
-        found["side_slope_max_deg"] = _deg(relief.max_side_slope_rad)
-        found["climb_m"] = round(relief.climb_m, 3)
-        found["safe_nodes"] = f"{relief.safe_node_share:.0%}"
-        warnings += path_warnings(prepared.planner, relief, prepared.run.waypoints_m)
-    if as_json:
-        found["warnings"] = warnings
-    show(found, as_json)
-    for line in () if as_json else warnings:
-        console.print(f"warning: {line}")
+        facts, more = _ground_facts(prepared)
+        found |= facts
+        warnings += more
+    return found, warnings
+
+
+def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
+    """Return slopes of the ground along the path, and warnings about them."""
+    relief = path_relief(prepared.planner, prepared.path)
+    facts: dict[str, object] = {
+        "slope_median_deg": _deg(relief.median_slope_rad),
+        "slope_max_deg": _deg(relief.max_slope_rad),
+        "world_slope_median_deg": _deg(relief.world_median_slope_rad),
+        "under_body_slope_median_deg": _deg(relief.median_footprint_slope_rad),
+        "under_body_slope_max_deg": _deg(relief.max_footprint_slope_rad),
+        "up_slope_max_deg": _deg(relief.max_up_slope_rad),
+        "side_slope_max_deg": _deg(relief.max_side_slope_rad),
+        "climb_m": round(relief.climb_m, 3),
+        "safe_nodes": f"{relief.safe_node_share:.0%}",
+    }
+    return facts, list(path_warnings(prepared.planner, relief, prepared.run.waypoints_m))
 
 
 def _deg(angle_rad: float) -> float:

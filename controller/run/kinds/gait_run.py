@@ -18,6 +18,8 @@ from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 
+_LEAST_GRIP = 1.2
+"""Friction across over along (ours): at 1 an undulation goes backward, at 1.25 slowly forward."""
 MakeOperator = Callable[[GaitMotion, RobotConfig, OnEvent], MotionSource]
 """Puts a live operator between a gait and the servos."""
 
@@ -55,6 +57,22 @@ class GaitRun(PathlessRun):
         for gait in (self.gait, *(gait for _, gait in self.changes)):
             gait.check(self.robot)
         return plan_without_path(self.run)
+
+    def remark(self) -> str | None:
+        """Return a warning if a gait may go the other way on this ground."""
+        if self.world.ground.kind == "water":
+            return None
+        friction = self.world.friction
+        for gait in (self.gait, *(gait for _, gait in self.changes)):
+            backward = getattr(gait.params, "backward", False)
+            along = friction.backward if backward else friction.along
+            if gait.needs.wheels and friction.across < _LEAST_GRIP * along:
+                return (
+                    f"world {self.world.name}: friction is {friction.across:g} across the body and "
+                    f"{along:g} along it; gait {gait.name} needs more across, and may go the other "
+                    "way; use another --world or another gait"
+                )
+        return None
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
         """Return a fresh motion: gait, live operator and head steering, as configured."""

@@ -29,9 +29,10 @@ from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.map_walk import MapWalk
 from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
+from snakewalk.controller.walk.roll_planner import RollPlanner
 from snakewalk.controller.walk.serpenoid import Serpenoid
 from snakewalk.controller.walk.shape_filters import MADE, passes_all, shape_filters
-from snakewalk.controller.walk.side_roll import RollPlanner, SideRolls
+from snakewalk.controller.walk.side_roll import SideRolls
 from snakewalk.controller.walk.steering import Steering
 from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker

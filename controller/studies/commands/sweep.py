@@ -19,7 +19,7 @@ from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.studies.sweep_measure import measure
 from snakewalk.controller.studies.sweep_points import plan_sweep
-from snakewalk.controller.studies.sweep_table import Table as Sweep
+from snakewalk.controller.studies.sweep_table import SweepTable as Sweep
 from snakewalk.controller.studies.sweep_table import digest, read_table
 
 _HEADS = {

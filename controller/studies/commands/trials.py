@@ -1,6 +1,7 @@
 """``snakewalk trials``: runs over seeds, motions, robots, worlds and steepnesses."""
 
 import json
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import asdict
 from itertools import product
@@ -57,6 +58,33 @@ _HEADS = {
 _TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
 
 
+Over = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="values that a key of the run, robot or world takes, e.g. "
+        "run.cycle_hz=25,50; given again: every combination",
+        metavar="KEY=V1,V2",
+    ),
+]
+StartSpread = Annotated[
+    float, typer.Option(min=0.0, max=1.0, help="of the start in x and y, m; 0: not moved")
+]
+Relief = Annotated[
+    list[float] | None,
+    typer.Option(min=0.0, max=5.0, help="factor on the ground's heights; may be given again"),
+]
+
+
+TrialsPicture = Annotated[
+    Path | None,
+    typer.Option(help="draw what was complete and why not (.png, .svg, .pdf)"),
+]
+TrialsOut = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", help="CSV of all runs; what it holds is not run again"),
+]
+
+
 @command(
     "trials",
     group=JOB,
@@ -73,9 +101,7 @@ def trials(
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 20,
     first_seed: FirstSeed = 0,
-    start_spread: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="of the start in x and y, m; 0: not moved")
-    ] = 0.04,
+    start_spread: StartSpread = 0.04,
     motion: Annotated[
         list[str] | None,
         typer.Option(help="may be given again; default: all", autocompletion=completion.MOTIONS),
@@ -86,18 +112,8 @@ def trials(
             help="may be given again; default: the run's", autocompletion=completion.ROBOTS
         ),
     ] = None,
-    relief: Annotated[
-        list[float] | None,
-        typer.Option(min=0.0, max=5.0, help="factor on the ground's heights; may be given again"),
-    ] = None,
-    over: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="values that a key of the run, robot or world takes, e.g. "
-            "run.cycle_hz=25,50; given again: every combination",
-            metavar="KEY=V1,V2",
-        ),
-    ] = None,
+    relief: Relief = None,
+    over: Over = None,
     compliance: Annotated[
         list[str] | None,
         typer.Option(help="on, off: joints yield to current; may be given again"),
@@ -111,14 +127,8 @@ def trials(
     ] = None,
     track: TrackFile = None,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="CSV of all runs; what it holds is not run again"),
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(help="draw what was complete and why not (.png, .svg, .pdf)"),
-    ] = None,
+    out: TrialsOut = None,
+    picture: TrialsPicture = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -130,27 +140,10 @@ def trials(
     check_picture(picture)
     refuse_to_overwrite([picture], force)
     refuse_to_overwrite([out], force=True)  # a table grows
-
     require_extra("trials need", "mujoco")
-    motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     overs = [study.parse_over(text) for text in over or ()]
-    keys, axes = [key for key, _ in overs], [values for _, values in overs]
-    _check_keys(keys)
-    for word in compliance or ():
-        if word not in {"on", "off"}:
-            raise InputError(f"--compliance {word}: expected on or off")
-    moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs or [DEFAULT_RUN]}
-    cases = [
-        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c, w)
-        for run in runs or [DEFAULT_RUN]
-        for r in (robot if robot else (None,))
-        for w in (world if world else (None,))
-        for k in (relief if relief else (1.0,))
-        for m in moved_by[run]
-        for c in ([word == "on" for word in compliance] if compliance else (None,))
-        for values in product(*axes)
-    ]
-    cases = list(dict.fromkeys(cases))  # what is given twice is run once
+    _check_keys([key for key, _ in overs])
+    cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, overs)
     if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
         raise InputError(f"--track {track}: is of walks, and none is tried")
     if seconds is not None and not any(case.is_gait for case in cases):
@@ -158,6 +151,65 @@ def trials(
     changes = {"track": track, "seconds": seconds}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
+    found = _run(planned, cases, changes, start_spread, workers, out)
+    summaries = study.table(found, cases)
+    if picture is not None:
+        from snakewalk.controller.studies.plots.trials import draw_trials  # noqa: PLC0415  --picture: an extra
+
+        draw_trials(summaries, picture)
+    rows = [asdict(one) for one in summaries]
+    if as_json:
+        settings = {"seeds": list(seen), "start_spread_m": start_spread}
+        print(json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in found]}))
+    else:
+        _print(rows, [key for key, values in overs if len(values) > 1])
+    if all(trial.cause == "refused" for trial in found):
+        raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _cases(
+    runs: list[str],
+    motion: list[str] | None,
+    robot: list[str] | None,
+    world: list[str] | None,
+    relief: list[float] | None,
+    compliance: list[str] | None,
+    overs: Sequence[tuple[str, Sequence[Any]]],
+) -> list[study.Case]:
+    """Return every combination of the options' values, each once.
+
+    Raises:
+        InputError: a value of ``--compliance`` is neither on nor off.
+
+    """
+    for word in compliance or ():
+        if word not in {"on", "off"}:
+            raise InputError(f"--compliance {word}: expected on or off")
+    motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
+    moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs}
+    keys, axes = [key for key, _ in overs], [values for _, values in overs]
+    cases = [
+        study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c, w)
+        for run in runs
+        for r in (robot if robot else (None,))
+        for w in (world if world else (None,))
+        for k in (relief if relief else (1.0,))
+        for m in moved_by[run]
+        for c in ([word == "on" for word in compliance] if compliance else (None,))
+        for values in product(*axes)
+    ]
+    return list(dict.fromkeys(cases))
+
+
+def _run(
+    planned: list[tuple[study.Case, int]],
+    cases: list[study.Case],
+    changes: dict[str, Any],
+    start_spread: float,
+    workers: int,
+    out: Path | None,
+) -> list[study.Trial]:
+    """Run the trials that the table ``out`` does not hold, and return all."""
     table = None
     if out is not None:
         configs = {case: study.config_digest(case, changes) for case in cases}
@@ -174,19 +226,7 @@ def trials(
             LOGGER.debug("%s", trial)
             if table:
                 table.add(trial)
-    summaries = study.table(found, cases)
-    if picture is not None:
-        from snakewalk.controller.studies.plots.trials import draw_trials  # noqa: PLC0415
-
-        draw_trials(summaries, picture)
-    rows = [asdict(one) for one in summaries]
-    if as_json:
-        settings = {"seeds": list(seen), "start_spread_m": start_spread}
-        print(json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in found]}))
-    else:
-        _print(rows, [key for key, values in overs if len(values) > 1])
-    if all(trial.cause == "refused" for trial in found):
-        raise InputError(f"no run was possible: {study.reasons(found)}")
+    return found
 
 
 def _check_keys(keys: list[str]) -> None:

@@ -53,6 +53,11 @@ MOST_S: Final = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
 LEAST_S: Final = 4.0
 """Less tells too little (ours)."""
+_DELAY_STEP_S: Final = 0.005
+"""Delay of the goals whose effect is simulated (ours)."""
+_USUAL_DELAY_S: Final = 0.005
+"""Standard deviation of the delay between a host's read and its write: a simulated host needs no
+time, one with a port computes for some milliseconds in between (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,20 +290,22 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
     )
 
 
-def answers(goals: Goals, deviation: Deviation) -> Floats:
-    """Return currents in A and angles in rad (2, T, J) that a shadow answers."""
-    return answers_and_links(goals, deviation)[0]
+def answers(goals: Goals, deviation: Deviation, delay_s: float = 0.0) -> Floats:
+    """Return currents in A and angles in rad (2, T, J) of a shadow; goals come ``delay_s`` late."""
+    return answers_and_links(goals, deviation, delay_s)[0]
 
 
-def answers_and_links(goals: Goals, deviation: Deviation) -> tuple[Floats, Floats]:
-    """Return what a shadow answers, as ``answers``, and where its links (T, L, 3) are then, m."""
+def answers_and_links(
+    goals: Goals, deviation: Deviation, delay_s: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Return the answers of a shadow, as ``answers``, and where its links (T, L, 3) are then, m."""
     ground = build_ground(goals.world)
     shadow = Shadow(goals.run, goals.robot, goals.world, ground, goals.initial_pose, deviation)
     rows, joints = goals.sent_rad.shape
     out = np.empty((2, rows, joints))
     links_m = np.empty((rows, goals.robot.link_count, 3))
     for k, (due_s, sent_rad) in enumerate(zip(goals.since_start_s, goals.sent_rad, strict=True)):
-        state = shadow.step(float(due_s), sent_rad)
+        state = shadow.step(float(due_s), sent_rad, delay_s)
         out[0, k], out[1, k] = state.current_a, state.position_rad
         links_m[k] = body_in_world(goals.robot, shadow.head_pose(), state.position_rad).link_m
     return out, links_m
@@ -337,7 +344,7 @@ class Signatures:
     ) -> None:
         self._goals = goals
         self._constants = constants = Constants(goals.robot)
-        count = len(constants.step)
+        count = len(constants.step) + 1
         self._plain = features(goals, answers(goals, NO_DEVIATION))
         work = partial(_answer, goals)
         columns: dict[int, Floats] = {}
@@ -345,9 +352,12 @@ class Signatures:
         todo = range(count)
         done = ((k, work(k)) for k in todo) if workers <= 1 else each(work, todo, workers=workers)
         for k, answer in done:
-            columns[k] = (features(goals, answer) - self._plain) / constants.step[k]
+            columns[k] = features(goals, answer) - self._plain
             on_progress(len(columns), count)
-        self._effects = np.stack([columns[k] for k in todo], axis=1)
+        # the delay of the host's goals is the last one; it is never a cause
+        steps = np.append(constants.step, _DELAY_STEP_S)
+        self._effects = np.stack([columns[k] for k in todo], axis=1) / steps
+        self._healthy = np.append(constants.healthy, _USUAL_DELAY_S)
 
     def diagnose(self, measured: Floats) -> Diagnosis:
         """Say what differs, of measured currents and angles (2, T, J)."""
@@ -380,7 +390,7 @@ class Signatures:
         spare = max(effects.shape[0] - effects.shape[1], 1)
         left = [rest - effects @ np.linalg.lstsq(effects, rest)[0] for rest in rests]
         noise = max(_LEAST_NOISE, min(float(one @ one) / spare for one in left))
-        return _Likelihood(effects, self._constants.healthy, _CORRELATED * noise)
+        return _Likelihood(effects, self._healthy, _CORRELATED * noise)
 
     def _linear(
         self, likely: "_Likelihood", apart: Floats, parts: list[int]
@@ -486,8 +496,10 @@ class _Likelihood:
 
 
 def _answer(goals: Goals, constant: int) -> Floats:
-    """Answers with one constant changed by its step; a function of its own for a process."""
+    """Answers with one constant, or the delay, changed by its step; for a process of its own."""
     constants = Constants(goals.robot)
     vector = np.zeros(len(constants.step))
+    if constant == len(vector):
+        return answers(goals, NO_DEVIATION, _DELAY_STEP_S)
     vector[constant] = constants.step[constant]
     return answers(goals, constants.deviation(vector))

@@ -52,9 +52,14 @@ class Shadow:
         self._lay_down(pose)
         self._start_s = self._clock.now_s()
 
-    def step(self, since_start_s: float, sent_rad: Floats) -> JointState:
-        """Read at a time since the start, as the other chain was read, then send its goals (J,)."""
+    def step(self, since_start_s: float, sent_rad: Floats, delay_s: float = 0.0) -> JointState:
+        """Read at a time since the start, as the other chain was read, then send its goals (J,).
+
+        ``delay_s``: how long the host computes in between.
+        """
         self._clock.sleep_until_s(self._start_s + since_start_s)
         state = self._chain.read()
+        if delay_s > 0.0:
+            self._clock.sleep_until_s(self._clock.now_s() + delay_s)
         self._chain.write(JointCommand(self._clock.now_s(), sent_rad))
         return state

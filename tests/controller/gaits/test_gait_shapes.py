@@ -135,3 +135,11 @@ def test_the_compound_serpenoid_holds_sidewinding_as_a_member() -> None:
         },
     )
     np.testing.assert_allclose(family.joints_rad(robot, PHASES), joints, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["rectilinear", "thunniform-dolphin"])
+def test_a_turn_without_yaw_joints_is_rejected(name: str) -> None:
+    robot = RobotConfig(name="planar", joint_axes="pppppp")
+    make_gait(name).check(robot)
+    with pytest.raises(InputError, match=r"turn_rad 0\.3 needs yaw joints; robot planar has none"):
+        make_gait(name, {"turn_rad": 0.3}).check(robot)

@@ -124,7 +124,9 @@ def test_units_of_rasters(tmp_path: Path) -> None:
     assert wide == pytest.approx(40 * 78.847, rel=1e-4)
     assert deep == pytest.approx(29 * 111.13, rel=1e-4)
     geotiff(file, HILL[::-1].astype("float32"), crs="EPSG:2263")  # US survey feet
-    read = read_elevation(file, MapOptions(scale=10.0))
+    with pytest.raises(InputError, match=r"cells are in us-ft, .* add --height-unit us-ft"):
+        read_elevation(file, MapOptions(scale=10.0))
+    read = read_elevation(file, MapOptions(RasterUnits(height_unit="us-ft"), scale=10.0))
     assert read.size_m[0] == pytest.approx(4.0 * 1200 / 3937)
     assert read.relief_m == pytest.approx(np.ptp(HILL) * 1200 / 3937, rel=1e-6)
     geotiff(file, HILL[::-1].astype("float32"))
@@ -175,7 +177,7 @@ def test_a_reference_back_in_compressed_points_repeats_bytes(tmp_path: Path) -> 
     head = pcd(np.zeros((count, 3)), "binary_compressed").split(b"compressed\n")[0]
     file = tmp_path / "a.pcd"
     file.write_bytes(head + b"compressed\n" + struct.pack("<II", len(packed), 12 * count) + packed)
-    np.testing.assert_array_equal(read_pcd(file), np.ones((count, 3)))
+    np.testing.assert_array_equal(read_pcd(file).points, np.ones((count, 3)))
 
 
 def bad_png(folder: Path) -> bytes:
@@ -194,7 +196,7 @@ FAULTS = {
     "none.asc": (b"ncols 3\nnrows x\n", "cannot be read as AAIGrid"),
     "none.png": (b"no", "is no PNG"),
     "big.png": (bad_png(Path()), "would expand to"),
-    "text.csv": (b"a,b\nc,d\n", "2 of its cells are no numbers, such as 'c'"),
+    "text.csv": (b"a,b\nc,d\n", "line 2, column 1: 'c' is no number"),
     "ragged.csv": (b"1,2\n1\n", "all need as many"),
     "empty.csv": (b"", "holds no numbers"),
     "bytes.csv": (b"\xff\xfe\x00", "is no text"),
@@ -251,7 +253,7 @@ def test_real_points_of_a_hillside(shared_data: Path) -> None:
     folder = shared_data / "aerial-terrain"
     if not folder.is_dir():
         pytest.skip("no aerial terrain beside this clone")
-    points, ground = (read_pcd(folder / f"samp11-utm{end}.pcd") for end in ("", "-ground"))
+    points, ground = (read_pcd(folder / f"samp11-utm{end}.pcd").points for end in ("", "-ground"))
     assert (len(points), len(ground)) == (38010, 21786)
     assert np.ptp(points, axis=0) == pytest.approx([134, 303, 109], abs=1)
     read = read_elevation(folder / "samp11-utm-ground.pcd", MapOptions(scale=0.03, spacing_m=0.08))

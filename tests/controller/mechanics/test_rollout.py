@@ -9,17 +9,19 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import LinkConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.retarget import Retarget
-from snakewalk.controller.mechanics import rigid_motion
+from snakewalk.controller.mechanics import rigid_motion, rollout_kernel
 from snakewalk.controller.mechanics import rollout as rollout_module
 from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
 from snakewalk.controller.mechanics.rollout import (
-    PATH_STEP_M,
     STEP_SEGMENTS,
     Drift,
-    PathTable,
     PlanarPose,
     Rolled,
     Rollout,
+    TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
+    PATH_STEP_M,
     _sine_cosine,
 )
 from tests.helpers.uneven import spelt_out
@@ -27,7 +29,7 @@ from tests.helpers.uneven import spelt_out
 SNAKE = FrictionConfig(along=0.1, across=0.7)
 ROBOT = load_robot("yaw16")
 LINK_KG = ROBOT.mean_link_mass_kg
-STRAIGHT = PathTable.of(np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
+STRAIGHT = TabulatedPath.of(np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
 START = PlanarPose(np.zeros(2), 0.0)
 
 
@@ -62,7 +64,7 @@ def test_a_waypoint_that_is_passed_is_as_far_as_the_body_came_near() -> None:
     line = np.arange(0.0, 6.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0])
     tree_of = rollout().begin
     for at_m, passed in ((0.2, True), (3.0, False)):
-        path = PathTable.of(line, np.array([at_m, 0.5]), at_m / PATH_STEP_M)
+        path = TabulatedPath.of(line, np.array([at_m, 0.5]), at_m / PATH_STEP_M)
         tree = tree_of(sine(0, 102), 101.0, START, path, 0, 25.0, Drift())
         made = tree.roll(sine(102, 60)[None])
         assert float(made.along_m[0]) > 0.25
@@ -92,7 +94,7 @@ def test_sines_and_cosines_have_the_same_bits_many_at_a_time_as_alone() -> None:
 def test_the_loops_as_they_are_written_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     pieces = np.stack([sine(102, 12), sine(102, 12) + 0.02 * np.arange(12)])
     compiled = roll(rollout(plane(0.2, 0.1)), pieces)
-    for module in (rollout_module, rigid_motion):
+    for module in (rollout_module, rollout_kernel, rigid_motion):
         for name, each in vars(module).items():
             if hasattr(each, "py_func"):
                 monkeypatch.setattr(module, name, each.py_func)
@@ -215,7 +217,7 @@ def test_joints_at_their_speed_limit_take_longer() -> None:
 
 def test_a_path_goes_on_straight_beyond_its_end() -> None:
     bent = np.stack([np.cos(np.linspace(0, 1, 101)), np.sin(np.linspace(0, 1, 101))], axis=1)
-    table = PathTable.of(bent).points_m
+    table = TabulatedPath.of(bent).points_m
     assert table.flags.c_contiguous
     steps = np.diff(table[100:], axis=0)
     np.testing.assert_allclose(np.hypot(*steps.T), PATH_STEP_M)

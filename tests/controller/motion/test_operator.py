@@ -93,6 +93,19 @@ def test_other_gaits_mirror_defaults_halt_and_stop() -> None:
     assert hands.said[-1] == "stop"
 
 
+def test_another_gait_reports_which_directions_it_does_not_keep() -> None:
+    hands = Hands("yaw16", "lateral-undulation")
+    hands.press("backward=1", "turn_rad=0.5", "gait=concertina", seconds=0.02)
+    assert hands.said[-2:] == [
+        "gait concertina",
+        "gait concertina does not keep backward, turn_rad",
+    ]
+    hands.press("gait=lateral-undulation", seconds=0.02)
+    assert hands.said[-1] == "gait lateral-undulation"
+    hands.press("m", "d", seconds=0.02)
+    assert hands.said[-1] == "gait lateral-undulation does not keep mirror"
+
+
 def test_on_a_yaw_robot_only_gaits_of_yaw_come_round() -> None:
     hands = Hands("yaw16", "lateral-undulation")
     seen = set()

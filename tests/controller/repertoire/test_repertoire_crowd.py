@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
@@ -163,6 +164,19 @@ def test_a_repertoire_without_a_direction_never_goes_the_other_way(repertoire: R
     control = SecondaryController(replace(repertoire, segments=tuple(straight)))
     assert control.missing(0.5, 0.05) == "goes forward and turns left"
     assert control.missing(0.5, 0.0) == ""
+
+
+def test_an_action_that_went_the_other_way_when_recorded_is_reported(
+    repertoire: Repertoire,
+) -> None:
+    assert not repertoire.contradictions()
+    wrong = {"reverse": "forward", "left-gentle": "right"}
+    segments = tuple(replace(s, kind=wrong.get(s.name, s.kind)) for s in repertoire.segments)
+    lines = replace(repertoire, segments=segments).contradictions()
+    assert [line.split(":")[0] for line in lines] == ["action left-gentle", "action reverse"]
+    back = tuple(s for s in repertoire.segments if s.kind in {"reverse", "rest"})
+    with pytest.raises(InputError, match="no action goes forward"):
+        SecondaryController(replace(repertoire, segments=back))
 
 
 def test_a_speed_or_turn_that_differs_much_is_far(repertoire: Repertoire) -> None:

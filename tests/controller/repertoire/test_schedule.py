@@ -153,3 +153,12 @@ def test_a_body_that_goes_backward_comes_to_rest_without_going_forward(
     along_m = finished.record.pose.head_m[:, 0]
     assert along_m[-1] < along_m[0] - 0.8
     assert along_m[-1] - along_m.min() < 0.1
+
+
+def test_actions_on_a_ground_other_than_the_recorded_one_are_reported(
+    file: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    prepare_schedule(file, ScheduleConfig(speed_m_s=0.6), world="isotropic")
+    assert "recorded on world flat; on isotropic speeds, turns and even directions may" in (
+        caplog.text
+    )

@@ -78,8 +78,9 @@ def test_a_waypoint_is_green_from_when_the_log_has_it_reached(
 
     film.render_film(
         record.header.robot, record.header.world, None, time_s[:100], qpos[:100],
-        tmp_path / "film.mp4", fps=10, size=(32, 32), waypoints_m=[(5.0, 5.0), (6.0, 6.0)],
-        reached_s=[0.31, 0.32], on_frame=on_frame,
+        tmp_path / "film.mp4", style=film.Style(fps=10, size=(32, 32)),
+        marks=film.Marks(waypoints_m=[(5.0, 5.0), (6.0, 6.0)], reached_s=[0.31, 0.32]),
+        on_frame=on_frame,
     )  # fmt: skip
     assert marked == [(0, 4), (1, 4)]
 

@@ -24,7 +24,7 @@ from snakewalk.controller.report import page as page_module
 from snakewalk.controller.report.artifacts import build_report
 from snakewalk.controller.report.curves import curves_html
 from snakewalk.controller.report.film import film_times
-from snakewalk.controller.report.page import page
+from snakewalk.controller.report.page import Section, film_on_page, page
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Event, RunRecord
 
@@ -105,9 +105,24 @@ def test_a_summary_that_is_known_is_not_computed_again(record: RunRecord, tmp_pa
     assert '"run": "as known"' in (tmp_path / "summary.json").read_text(encoding="utf-8")
 
 
-def test_what_the_log_says_is_text_not_markup(record: RunRecord) -> None:
+def _film(folder: Path) -> Path:
+    """Make a film whose name is markup."""
+    film = folder / "' onload='x.webm"
+    film.write_bytes(b"")
+    return film
+
+
+def test_what_the_log_says_is_text_not_markup(record: RunRecord, tmp_path: Path) -> None:
     evil = [Event(1.0, "info' onload='x", "<b>", "<script>alert(1)</script>")]
-    html = page(summary(record), [], film="", events=evil, config={"run": "</pre><script>"})
+    names = replace(summary(record), run="<script>alert(2)", robot="' onload='x")
+    html = page(
+        *(names, [Section("<script>alert(3)", "' onload='x", "data:,' onload='x")]),
+        film=film_on_page(_film(tmp_path), tmp_path),
+        events=evil,
+        config={"run": "</pre><script>"},
+        links=["' onload='x"],
+        made="<script>alert(4)",
+    )
     parsed(html)
     assert "<script>alert" not in html
     assert "</pre><script>" not in html
@@ -118,15 +133,15 @@ def test_film_inside_or_beside(make: Make, tmp_path: Path, monkeypatch: pytest.M
     film = tmp_path / "out" / "my film.mp4"
     film.parent.mkdir()
     film.write_bytes(b"\0" * 1000)
-    small = page_module.film_html(film, tmp_path / "out")
-    assert re.search(r"src='data:video/mp4;base64,A{20}", small)
+    small = film_on_page(film, tmp_path / "out").source
+    assert re.match(r"data:video/mp4;base64,A{20}", small)
     monkeypatch.setattr(page_module, "INLINE_BYTES", 999)
-    assert "src='my%20film.mp4'" in page_module.film_html(film, tmp_path / "out")
-    assert "src='../out/my%20film.mp4'" in page_module.film_html(film, tmp_path / "other")
+    assert film_on_page(film, tmp_path / "out").source == "my%20film.mp4"
+    assert film_on_page(film, tmp_path / "other").source == "../out/my%20film.mp4"
     with pytest.raises(InputError, match="no such film"):
-        page_module.film_html(tmp_path / "gone.mp4", tmp_path)
+        film_on_page(tmp_path / "gone.mp4", tmp_path)
     with pytest.raises(InputError, match=r"\.mp4, \.webm"):
-        page_module.film_html(tmp_path / "film.avi", tmp_path)
+        film_on_page(tmp_path / "film.avi", tmp_path)
 
 
 def unpacked(html: str, name: str) -> str:
@@ -236,7 +251,7 @@ def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None
 
 
 def test_the_foot_says_what_made_the_page(record: RunRecord) -> None:
-    html = page(summary(record), [], film="", events=[], config={}, made="Made by <me>")
+    html = page(summary(record), [], film=None, events=[], config={}, made="Made by <me>")
     assert "Made by &lt;me&gt;" in html
 
 

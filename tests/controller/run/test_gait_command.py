@@ -252,3 +252,25 @@ def test_a_key_and_a_pads_button_switch_torque_off(
 def test_the_main_job_sends_gaits_to_their_own_command() -> None:
     with pytest.raises(InputError, match="snakewalk gait run"):
         prepare_walk("flat-square", motion="gait", gait={"name": "rolling"})
+
+
+@pytest.mark.parametrize(
+    ("world", "parameters", "keys", "warns"),
+    [
+        ("isotropic", {}, {}, True),
+        ("flat", {}, {}, False),
+        ("pool", {}, {}, False),
+        # scales resist sliding backward: forward the belly grips, backward it does not
+        ("flat", {}, {"world.friction.back": 0.7}, False),
+        ("flat", {"backward": True}, {"world.friction.back": 0.7}, True),
+    ],
+)
+def test_a_ground_on_which_a_gait_may_go_the_other_way_is_reported(
+    world: str,
+    parameters: dict[str, object],
+    keys: dict[str, object],
+    warns: bool,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    prepare_gait("lateral-undulation", world=world, parameters=parameters, keys=keys)
+    assert ("may go the other way" in caplog.text) is warns

@@ -11,11 +11,11 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from snakewalk.controller.cli.watchers import Watchers
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_gait
 from snakewalk.controller.run.observer_watch import ObserverWatch
 from snakewalk.controller.run.watcher import WatcherProcess
+from snakewalk.controller.run.watchers import Watchers
 from snakewalk.controller.runlog.row_line import WatcherEnd
 from snakewalk.controller.runtime.drive import Progress
 

@@ -13,7 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.studies.plots.sweep import draw_sweep
 from snakewalk.controller.studies.sweep_measure import Measurement
 from snakewalk.controller.studies.sweep_points import Point
-from snakewalk.controller.studies.sweep_table import COLUMNS, Table, digest, read_table
+from snakewalk.controller.studies.sweep_table import COLUMNS, SweepTable, digest, read_table
 
 POINTS = [
     Point("lateral-undulation", "yaw16", "flat", n, 0, 10.0, {"waves": 1.0 + 0.1 * n})
@@ -30,7 +30,7 @@ def row(forward_bl: float) -> Measurement:
 def test_a_sweep_in_which_no_body_moved_has_a_picture(tmp_path: Path) -> None:
     """Costs of transport that are unknown have no place on a logarithmic scale: a traceback."""
     table, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
-    with Table(table) as rows:
+    with SweepTable(table) as rows:
         rows.add(POINTS[0], replace(row(0.0), cost_of_transport=nan))
     draw_sweep(read_table(table), picture)
     assert picture.read_bytes().startswith(b"\x89PNG")
@@ -46,7 +46,7 @@ def test_cut_off_anywhere_it_goes_on_where_it_was(
     tmp_path_factory: pytest.TempPathFactory, finished: int, torn: int
 ) -> None:
     path = tmp_path_factory.mktemp("sweep") / "sweep.csv"
-    with Table(path) as table:
+    with SweepTable(path) as table:
         for k in range(finished):
             table.add(POINTS[k], row(0.1 * k))
     assert path.exists() == (finished > 0), "no table without rows"
@@ -55,7 +55,7 @@ def test_cut_off_anywhere_it_goes_on_where_it_was(
     kept = path.read_bytes().count(b"\n") - 1
     if kept < 0:  # not even the heads are whole
         path.unlink()
-    again = Table(path)
+    again = SweepTable(path)
     missing = again.missing(POINTS)
     assert [p.number for p in missing] == list(range(max(kept, 0), 6))
     with again:
@@ -67,21 +67,21 @@ def test_cut_off_anywhere_it_goes_on_where_it_was(
 
 
 def test_other_seeds_are_other_points(tmp_path: Path) -> None:
-    with Table(tmp_path / "t.csv") as table:
+    with SweepTable(tmp_path / "t.csv") as table:
         table.add(POINTS[0], row(0.1))
     other = Point("lateral-undulation", "yaw16", "flat", 0, 1, 10.0)
-    assert Table(tmp_path / "t.csv").missing([POINTS[0], other]) == [other]
+    assert SweepTable(tmp_path / "t.csv").missing([POINTS[0], other]) == [other]
 
 
 def test_other_replaced_values_are_other_points_and_a_row_of_their_own(tmp_path: Path) -> None:
     table = tmp_path / "t.csv"
     keys = (("world.friction.across", 0.4), ("run.seed", 3))
     other = replace(POINTS[0], keys=keys)
-    with Table(table) as rows:
+    with SweepTable(table) as rows:
         rows.add(POINTS[0], row(0.1))
         rows.add(other, row(0.2))
-    assert Table(table).missing([POINTS[0], other]) == []
-    assert Table(table).missing([replace(other, keys=keys[:1])]) != []
+    assert SweepTable(table).missing([POINTS[0], other]) == []
+    assert SweepTable(table).missing([replace(other, keys=keys[:1])]) != []
     told = [one.keys for one in digest(read_table(table))]
     assert told == ["", "world.friction.across=0.4 run.seed=3"]
 
@@ -90,13 +90,13 @@ def test_another_file_is_not_touched(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
     path.write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match="no table"):
-        Table(path)
+        SweepTable(path)
     assert path.read_text() == "a,b\n1,2\n"
 
 
 def test_digest_takes_the_defaults_and_the_best(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
-    with Table(path) as table:
+    with SweepTable(path) as table:
         for point in POINTS:
             table.add(point, row(0.3 - 0.1 * abs(point.number - 3)))
         tripped = Point("lateral-undulation", "yaw16", "flat", 6, 0, 10.0)

@@ -394,6 +394,20 @@ def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() ->
     server.stop()
 
 
+def test_what_a_browser_of_somebody_else_sets_is_no_command_or_a_short_one() -> None:
+    server, _ = open_page("127.0.0.1", 0)
+    panel = GaitPanel(server, server.gui.add_tab_group(), load_robot("alternating16"))
+    panel.show("sidewinding", make_gait("sidewinding").params.model_dump())
+    for value in ("0.5", None, [[[]]], {"a": 1}, "x" * 2_000_000):
+        moved_by_a_browser(panel, "frequency_hz", value)
+    assert panel.commands(1.0) == []
+    moved_by_a_browser(panel, "gait", "x" * 2_000_000)
+    assert panel.commands(2.0) == ["gait=" + "x" * 100]
+    moved_by_a_browser(panel, "frequency_hz", float("nan"))
+    assert panel.commands(3.0) == ["frequency_hz=nan"]  # which the run rejects
+    server.stop()
+
+
 IN_A_BROWSER = pytest.mark.skipif(
     CHROMIUM is None, reason="there is no Chromium to open the page with"
 )

@@ -9,15 +9,17 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.run import WalkConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rollout import (
+    Drift,
+    PlanarPose,
+    Rolled,
+    Rollout,
+    TabulatedPath,
+)
+from snakewalk.controller.mechanics.rollout_kernel import (
     END_OFF,
     OFF_PATH,
     PATH_STEP_M,
     TIME,
-    Drift,
-    PathTable,
-    PlanarPose,
-    Rolled,
-    Rollout,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker, _roughness
@@ -28,7 +30,7 @@ POINTS = 100
 PLACE = np.linspace(0.0, 2.0 * np.pi, POINTS)
 ROBOT = load_robot("yaw16")
 ROLLOUT = Rollout(ROBOT, FrictionConfig(along=0.1, across=0.7), None, POINTS)
-STRAIGHT = PathTable.of(np.arange(0.0, 5.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
+STRAIGHT = TabulatedPath.of(np.arange(0.0, 5.0, PATH_STEP_M)[:, None] * np.array([1.0, 0.0]))
 
 
 def walker(seed: int, shapes: int = 60, **walk: object) -> PredictiveWalker:

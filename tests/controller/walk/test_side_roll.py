@@ -10,7 +10,8 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import LinkConfig, RobotConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, pose_at
 from snakewalk.controller.run.factory import prepare_walk
-from snakewalk.controller.walk.side_roll import MOST_TURNS, RollPlan, RollPlanner, SideRolls
+from snakewalk.controller.walk.roll_planner import MOST_TURNS, RollPlan, RollPlanner
+from snakewalk.controller.walk.side_roll import SideRolls
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 from snakewalk.drivers.attitude import rotation_by
 

@@ -5,14 +5,14 @@ import numpy as np
 from snakewalk.config.loader import load_robot
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.mechanics.rollout import PathTable
+from snakewalk.controller.mechanics.rollout import TabulatedPath
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 from snakewalk.drivers.types import BodyPose
 
 ROBOT = load_robot("yaw16")
 DT_S = 0.02
-STRAIGHT = PathTable.of(np.column_stack([np.arange(0.0, 2.0, 0.01), np.zeros(200)]))
+STRAIGHT = TabulatedPath.of(np.column_stack([np.arange(0.0, 2.0, 0.01), np.zeros(200)]))
 
 
 def body(x_m: float, bend_rad: float = 0.0) -> BodyView:

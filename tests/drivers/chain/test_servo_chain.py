@@ -89,7 +89,7 @@ def test_start_up_keeps_its_order_for_every_servo(line: Recorder, chain: ServoCh
         armed = [k for k in at(line, 98, servo_id) if writes[k][2] != b"\x00"]
         settings = [k for a in (9, 11, 48, 52, 84) for k in at(line, a, servo_id)]
         assert settings
-        assert max(settings) < goal < torque_on[0] < min(armed)
+        assert max(settings) < goal < min(armed) < torque_on[0]
 
 
 def test_goal_is_the_present_pose_when_torque_comes_on(line: Recorder, chain: ServoChain) -> None:
@@ -367,7 +367,8 @@ def test_a_check_whose_reply_is_lost_is_made_again_in_the_next_cycle_with_time(
     for _ in range(lost):
         chain.read()
     if lost == 2:
-        chain.read()  # the turn of another register
+        chain.read()  # the turns of two other registers
+        chain.read()
     with pytest.raises(BusError, match="Position I Gain is 77, not"):
         chain.read()
 

@@ -266,6 +266,8 @@ def test_without_an_operator_confirm_means_no() -> None:
         (lambda r: r.alter("Hardware Error Status", 0, 4), "joint 1 (ID 1): alarm: overheating"),
         (lambda r: r.alter("ID", 3, 44), "no answer from servo 4"),
         (lambda r: r.limp("Homing Offset", 0, 400), "joint 1 (ID 1): moved by +0.6"),
+        (lambda r: r.limp("Drive Mode", 0, 1), "joint 1 (ID 1): Drive Mode is 1, was 0"),
+        (lambda r: r.limp("Homing Offset", 0, 100), "joint 1 (ID 1): Homing Offset is 100"),
         (lambda r: r.limp("Homing Offset", 1, 4096), "joint 2 (ID 2): off by +1 turns"),
     ],
 )

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from packaging.version import Version
 from pytest_mock import MockerFixture
 
 from snakewalk.config.heightfield import HeightField
@@ -19,7 +20,10 @@ from tests.helpers.physics import FLAT, ROBOT, Floats
 from tests.helpers.uneven import UNEVEN
 
 _FOUND = step_layout()
-assert isinstance(_FOUND, StepLayout)
+if not isinstance(_FOUND, StepLayout) or not _FOUND.has_parts:
+    if Version(mujoco.__version__) >= Version("3.17"):
+        raise AssertionError(f"MuJoCo {mujoco.__version__} is not stepped by parts: {_FOUND}")
+    pytest.skip("this MuJoCo is not stepped by parts", allow_module_level=True)
 LAYOUT: StepLayout = _FOUND
 RNG = np.random.default_rng(5)
 HILLS = HeightField(0.02 * RNG.normal(size=(81, 81)), 0.05, -2.0, -2.0)

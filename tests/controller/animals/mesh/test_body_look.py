@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world
+from snakewalk.controller.animals.mesh.body_look import skin_look
 from snakewalk.controller.animals.mesh.body_motion import from_poses, robot_skin
 from snakewalk.controller.animals.mesh.body_skin import body_skin
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
-from snakewalk.controller.run.film_look import check_look, skin_look
+from snakewalk.controller.run.film_look import check_look
 from snakewalk.sim.rendering.looks import dressed_model
 
 

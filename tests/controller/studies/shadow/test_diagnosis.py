@@ -100,3 +100,15 @@ def test_a_load_comes_on_top_of_a_head_with_cameras() -> None:
     np.testing.assert_allclose(
         heavier.link_masses_kg, np.array(robot.link_masses_kg) + load_kg, atol=1e-12
     )
+
+
+def test_a_host_that_computes_for_some_milliseconds_is_no_cause(
+    goals: Goals, signatures: Signatures
+) -> None:
+    """On a port the goals are sent later after the read than by a simulated host."""
+    late = signatures.diagnose(answers(goals, Deviation(), 0.004))
+    assert late.named is None, late.text(goals.robot)
+    weak = Deviation(torque=at(JOINTS, 2, 0.6, 1.0))
+    named = signatures.diagnose(answers(goals, weak, 0.004)).named
+    assert named is not None
+    assert (named.cause, named.at) == ("weaker servo", 2)

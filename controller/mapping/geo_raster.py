@@ -1,0 +1,335 @@
+"""GeoTIFF and ASCII grid: heights with the units, scale and missing cells that the file states.
+
+Large files are read in strips: of heights that a map's sample stands for, the median is taken.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.heightfield import MOST_SAMPLES
+from snakewalk.controller.mapping.length_units import (
+    DEGREE,
+    degree_cell_m,
+    ground_lengths,
+    named_unit,
+    unit_m,
+    unit_name,
+    vertical_unit,
+)
+from snakewalk.controller.mapping.raster_file import (
+    Crop,
+    Raster,
+    RasterUnits,
+    raster_window,
+)
+
+MOST_STRIPPED_CELLS: Final = 1_000_000_000
+"""Of a raster that is read in strips (ours)."""
+_MOST_PLAIN: Final = 4 * MOST_SAMPLES
+"""Cells that are read at once: a finer spacing than two cells makes too many samples of more."""
+_STRIP_CELLS: Final = 2_000_000
+"""Read at once (ours)."""
+_COARSER: Final = 2.0
+"""Spacing of a map over a raster's from which strips are read (ours)."""
+_CACHE_BYTES: Final = 64_000_000
+"""Of GDAL's blocks (ours)."""
+_DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
+"""Largest cell that may be one of degrees: a minute, 1.8 km (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Cells:
+    """Size of a raster's cells, and what states it."""
+
+    dx_m: float
+    dy_m: float
+    height_unit: str
+    notes: list[str]
+
+
+def read_geo_raster(
+    file: Path,
+    units: RasterUnits,
+    crop: Crop | None,
+    spacing_of: Callable[[float, float], float] | None = None,
+) -> Raster:
+    """Read a GeoTIFF or an ASCII grid, or the part of it within a crop.
+
+    Args:
+        file: ends in .tif, .tiff or .asc.
+        units: what the user states.
+        crop: of the file.
+        spacing_of: function of a cell's width and depth in metres that returns the spacing of the
+            map in metres of the file; a raster with a finer one is reduced to it while it is read.
+
+    Raises:
+        InputError: it cannot be read, or does not state what matters.
+        OSError: the file cannot be opened.
+
+    """
+    require_extra("GeoTIFF and ASCII grid need", "rasterio")
+    import rasterio  # noqa: PLC0415  an extra
+    from rasterio.errors import RasterioError  # noqa: PLC0415
+
+    driver = "AAIGrid" if file.suffix.lower() == ".asc" else "GTiff"
+    with file.open("rb"):  # a fault of the system is reported as such
+        pass
+    try:
+        with (
+            rasterio.Env(GTIFF_REPORT_COMPD_CS=True, GDAL_CACHEMAX=_CACHE_BYTES),
+            rasterio.open(file.absolute(), driver=driver) as opened,
+        ):
+            return _read(file, opened, units, crop, spacing_of)
+    except (RasterioError, ValueError) as error:
+        raise InputError(f"{file}: cannot be read as {driver}: {error}") from None
+
+
+def _read(
+    file: Path,
+    opened: Any,
+    units: RasterUnits,
+    crop: Crop | None,
+    spacing_of: Callable[[float, float], float] | None,
+) -> Raster:
+    if opened.count != 1 and opened.dtypes[0] == "uint8":
+        raise InputError(f"{file}: is a picture of {opened.count} bands, and holds no heights")
+    turn = opened.transform
+    if not (math.isclose(turn.b, 0.0) and math.isclose(turn.d, 0.0)):
+        raise InputError(f"{file}: its rows do not run west to east: warp it north up")
+    if units.cell is None and turn.is_identity and opened.crs is None:
+        raise InputError(f"{file}: says no size of its cells: --cell, between two samples")
+    unit = units.unit or _horizontal_unit(file, opened)
+    dx, dy = (abs(turn.a), abs(turn.e)) if units.cell is None else (units.cell,) * 2
+    everything = slice(0, opened.height), slice(0, opened.width)
+    whole = _cells(file, opened, unit, (dx, dy), everything)
+    rows, columns = raster_window(
+        file, opened.shape, whole.dx_m, whole.dy_m, crop, turn.e < 0.0, MOST_STRIPPED_CELLS
+    )
+    here = _cells(file, opened, unit, (dx, dy), (rows, columns)) if crop else whole
+    height_unit, notes = _height_unit(file, opened, units, unit)
+    notes = [*here.notes, *notes]
+    if opened.count > 1:
+        notes.append(f"band 1 of {opened.count} is read")
+    scale, offset, words = _band_scale(opened, units)
+    notes += words
+    per_unit = scale * unit_m(height_unit)
+    spacing_m = 0.0 if spacing_of is None else spacing_of(here.dx_m, here.dy_m)
+    strips = _Strips(opened, rows, columns, units.no_data)
+    if spacing_m >= _COARSER * max(here.dx_m, here.dy_m):
+        z, absent = strips.reduced(here.dx_m, here.dy_m, spacing_m)
+        notes.append(
+            f"{strips.cells} cells are reduced to {z.size} medians, {spacing_m:.4g} m apart"
+        )
+        dx_m, dy_m = spacing_m, spacing_m
+    else:
+        if strips.cells > _MOST_PLAIN:
+            raise InputError(
+                f"{file}: {columns.stop - columns.start} by {rows.stop - rows.start} cells are "
+                f"over {_MOST_PLAIN}: give a --spacing of {_COARSER:g} cells or more, or --crop a "
+                f"part of its {opened.width * whole.dx_m:.6g} m by "
+                f"{opened.height * whole.dy_m:.6g} m"
+            )
+        z, absent = strips.plain()
+        dx_m, dy_m = here.dx_m, here.dy_m
+    z = (z * per_unit) + offset * unit_m(height_unit)
+    if absent:
+        notes.append(f"{absent} cells hold no height")
+    upright = z[::-1] if turn.e < 0.0 else z
+    return Raster(np.ascontiguousarray(upright), dx_m, dy_m, tuple(notes), per_unit)
+
+
+class _Strips:
+    """Reads a part of a band strip by strip; missing cells are NaN, in the file's order of rows."""
+
+    def __init__(self, opened: Any, rows: slice, columns: slice, no_data: float | None) -> None:
+        self._opened, self._rows, self._columns, self._no_data = opened, rows, columns, no_data
+        self._width = columns.stop - columns.start
+        self.cells = self._width * (rows.stop - rows.start)
+
+    def plain(self) -> tuple[Floats, int]:
+        """All cells, and how many of them are missing."""
+        values = self._strip(self._rows.start, self._rows.stop)
+        return values, int(np.isnan(values).sum())
+
+    def reduced(self, dx_m: float, dy_m: float, spacing_m: float) -> tuple[Floats, int]:
+        """Medians of the cells nearest to each sample, and how many cells are missing."""
+        count = self._rows.stop - self._rows.start
+        # counted from the south, where the map begins
+        row_of = np.rint((count - 1 - np.arange(count)) * dy_m / spacing_m).astype(np.int64)
+        column_of = np.rint(np.arange(self._width) * dx_m / spacing_m).astype(np.int64)
+        from_south = self._opened.transform.e > 0.0
+        if from_south:
+            row_of = row_of[::-1]
+        samples = int(row_of.max()) + 1, int(column_of.max()) + 1
+        if samples[0] * samples[1] > MOST_SAMPLES:
+            enough_m = spacing_m * math.sqrt(samples[0] * samples[1] / MOST_SAMPLES)
+            raise InputError(
+                f"{self._opened.name}: {samples[1]} by {samples[0]} samples are over "
+                f"{MOST_SAMPLES}: take a --spacing of {enough_m:.3g} m of the file or more, or "
+                "--crop a part"
+            )
+        out, absent = np.full(samples, np.nan), 0
+        ends = [*(np.flatnonzero(np.diff(row_of)) + 1).tolist(), count]
+        most, begin = max(1, _STRIP_CELLS // self._width), 0
+        for k, end in enumerate(ends):
+            if k + 1 < len(ends) and ends[k + 1] - begin <= most:
+                continue  # the next group of rows fits into the same strip
+            z = self._strip(self._rows.start + begin, self._rows.start + end)
+            absent += int(np.isnan(z).sum())
+            for sample in np.unique(row_of[begin:end]):
+                place = sample if from_south else samples[0] - 1 - sample
+                chosen = z[row_of[begin:end] == sample]
+                out[place] = _column_medians(chosen, column_of, samples[1])
+            begin = end
+        return out, absent
+
+    def _strip(self, first: int, last: int) -> Floats:
+        from rasterio.windows import Window  # noqa: PLC0415  an extra
+
+        part = Window.from_slices((first, last), (self._columns.start, self._columns.stop))
+        values = self._opened.read(1, window=part, out_dtype="float64")
+        missing: Bools = self._opened.read_masks(1, window=part) == 0
+        missing |= ~np.isfinite(values)
+        if self._no_data is not None:
+            missing |= values == self._no_data
+        values[missing] = np.nan
+        return np.asarray(values)
+
+
+def _column_medians(z: Floats, column_of: Ints, samples: int) -> Floats:
+    """Median over the rows of z and the columns of each sample; NaN is left out."""
+    starts = np.searchsorted(column_of, np.arange(samples))
+    widths = np.diff([*starts, len(column_of)])
+    padded = np.full((samples, len(z) * int(widths.max())), np.nan)
+    for k in range(int(widths.max())):
+        has = widths > k
+        padded[has, k * len(z) : (k + 1) * len(z)] = z[:, starts[has] + k].T
+    padded.sort(axis=1)  # NaN comes last
+    count = np.isfinite(padded).sum(axis=1)
+    low, high = np.maximum((count - 1) // 2, 0), np.maximum(count // 2, 0)
+    at = np.arange(samples)
+    high = np.minimum(high, padded.shape[1] - 1)
+    return np.where(count > 0, 0.5 * (padded[at, low] + padded[at, high]), np.nan)
+
+
+def _horizontal_unit(file: Path, opened: Any) -> str:
+    """Unit of the cells by the coordinate system.
+
+    Raises:
+        InputError: there is none, and the cells may be of degrees.
+
+    """
+    crs, turn = opened.crs, opened.transform
+    if crs is not None:
+        if crs.is_geographic:
+            return DEGREE
+        try:
+            return unit_name(float(crs.linear_units_factor[1]))
+        except (ValueError, LookupError, TypeError) as error:
+            raise InputError(f"{file}: its system states no unit ({error}): --unit") from None
+    west, north = turn.c, turn.f
+    east, south = west + turn.a * opened.width, north + turn.e * opened.height
+    cell = max(abs(turn.a), abs(turn.e))
+    within = min(west, east) >= -180.0 and max(west, east) <= 360.0
+    within &= min(south, north) >= -90.0 and max(south, north) <= 90.0
+    if not within or cell > _DEGREES_LIKE:
+        return "m"
+    latitude = min(max(0.5 * (north + south), -89.0), 89.0)
+    wide_m, deep_m = degree_cell_m(abs(turn.a), abs(turn.e), latitude)
+    likely, other = (DEGREE, "m") if _is_part_of_a_degree(abs(turn.a)) else ("m", DEGREE)
+    raise InputError(
+        f"{file}: states no system; its cells of {abs(turn.a):.6g} may be degrees ({wide_m:.4g} m "
+        f"by {deep_m:.4g} m) or metres; add --unit {likely} (or --unit {other})"
+    )
+
+
+def _is_part_of_a_degree(cell: float) -> bool:
+    """Whether a degree holds a round number of cells: of 1/3600 or 1/1200, not of 0.05."""
+    per_degree = 1.0 / cell
+    return per_degree > 20.5 and abs(per_degree - round(per_degree)) < 1e-3 * per_degree**0.5
+
+
+def _height_unit(
+    file: Path, opened: Any, units: RasterUnits, horizontal: str
+) -> tuple[str, list[str]]:
+    """Unit of heights: by the user, the band, or the vertical part of the system.
+
+    Raises:
+        InputError: nothing states it where lengths are no metres, or two statements differ.
+
+    """
+    if units.height_unit is not None:
+        return units.height_unit, []
+    words = (opened.units[0] or "").strip()
+    band = named_unit(words) if words else None
+    if words and band is None:
+        raise InputError(f"{file}: its heights are in {words!r}: --height-unit, one of m, ft, ...")
+    vertical = None if opened.crs is None else vertical_unit(opened.crs.to_wkt())
+    if units.unit is not None and units.unit != DEGREE:
+        stated = vertical or band
+        differs = stated is not None and not math.isclose(unit_m(stated), unit_m(units.unit))
+        return units.unit, (
+            [f"heights are in {units.unit} by --unit; the file states {stated}"] if differs else []
+        )
+    if band is not None and vertical is not None and band != vertical:
+        raise InputError(
+            f"{file}: states heights in {band} (band) and in {vertical} (system): --height-unit"
+        )
+    stated = band or vertical
+    if stated is not None:
+        same = horizontal == stated
+        return stated, [] if same and stated == "m" else [f"heights are in {stated}, as it states"]
+    if horizontal in (DEGREE, "m"):
+        return "m", ["the file states no unit of heights: metres"]
+    raise InputError(
+        f"{file}: its cells are in {horizontal}, and it states no unit of heights: add "
+        f"--height-unit {horizontal} (or --height-unit m)"
+    )
+
+
+def _band_scale(opened: Any, units: RasterUnits) -> tuple[float, float, list[str]]:
+    """Factor and offset of the band's values; --height-step replaces them."""
+    scale, offset = float(opened.scales[0]), float(opened.offsets[0])
+    if units.height_step is not None:
+        stated = (scale, offset) != (1.0, 0.0)
+        words = [f"the band's scale {scale:g} and offset {offset:g} are left out for --height-step"]
+        return units.height_step, 0.0, words if stated else []
+    if (scale, offset) == (1.0, 0.0):
+        return 1.0, 0.0, []
+    if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
+        raise InputError(f"its band has a scale of {scale:g} and an offset of {offset:g}")
+    return scale, offset, [f"heights are {scale:g} times the values plus {offset:g}, as it states"]
+
+
+def _cells(
+    file: Path, opened: Any, unit: str, cell: tuple[float, float], part: tuple[slice, slice]
+) -> _Cells:
+    """Cells in metres on the ground, at the middle of a part."""
+    turn, (rows, columns) = opened.transform, part
+    middle_x = turn.c + turn.a * 0.5 * (columns.start + columns.stop)
+    middle_y = turn.f + turn.e * 0.5 * (rows.start + rows.stop)
+    if unit == DEGREE:
+        if not -89.0 <= middle_y <= 89.0:
+            raise InputError(f"{file}: its middle has no latitude between -89 and 89: --unit m")
+        return _Cells(*degree_cell_m(*cell, middle_y), "m", [])
+    per_unit_m = unit_m(unit)
+    notes: list[str] = []
+    scale_x, scale_y = per_unit_m, per_unit_m
+    if opened.crs is not None and not opened.crs.is_geographic:
+        edge_y = [turn.f + turn.e * row for row in (rows.start, rows.stop)]
+        edge_x = [turn.c + turn.a * column for column in (columns.start, columns.stop)]
+        places = [(middle_x, middle_y), *((middle_x, y) for y in edge_y),
+                  *((x, middle_y) for x in edge_x)]  # fmt: skip
+        try:
+            scale_x, scale_y, notes = ground_lengths(opened.crs, per_unit_m, places, cell)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from None
+    return _Cells(cell[0] * scale_x, cell[1] * scale_y, unit, notes)

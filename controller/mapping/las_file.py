@@ -1,0 +1,316 @@
+"""LAS and LAZ: points of airborne and terrestrial laser scanners, read in chunks by laspy."""
+
+import json
+import logging
+import re
+import subprocess
+import sys
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.mapping.length_units import (
+    DEGREE,
+    degree_cell_m,
+    ground_lengths,
+    unit_m,
+    unit_name,
+    vertical_unit,
+)
+from snakewalk.controller.mapping.raster_file import Crop
+
+MOST_POINTS: Final = 10_000_000
+"""Points that are kept at once (ours): 240 MB, and some copies."""
+_MOST_READ: Final = 2_000_000_000
+_CHUNK: Final = 1_000_000
+_GROUND: Final = (2, 8)
+"""Classes of the ground: ground, model key points (ASPRS LAS 1.4, tables 8 and 17)."""
+_NOISE: Final = (7, 18)
+"""Low and high noise."""
+_NAMES: Final = {
+    0: "never classified", 1: "unclassified", 2: "ground", 3: "low vegetation",
+    4: "medium vegetation", 5: "high vegetation", 6: "building", 7: "low noise",
+    8: "model key point", 9: "water", 10: "rail", 11: "road", 17: "bridge", 18: "high noise",
+}  # fmt: skip
+_MODEL_TYPE, _GEOGRAPHIC_TYPE, _PROJECTED_TYPE = 1024, 2048, 3072
+_LINEAR_UNITS, _VERTICAL_UNITS = 3076, 4099
+"""Keys of GeoTIFF, as records 34735 have them."""
+_USER_DEFINED, _WKT_RECORD = 32767, 2112
+_VERTICAL_PART: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
+_PROJECTED_PART: Final = re.compile(r"\b(?:PROJCS|PROJCRS|PROJECTEDCRS)\[")
+_KEY_UNITS: Final = {9001: "m", 9002: "ft", 9003: "us-ft"}
+_WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
+
+
+_MOST_MEMORY_BYTES, _MOST_CPU_S = 3_000_000_000, 600
+"""Of the process that reads a file (ours)."""
+_CHILD: Final = """
+import sys
+words, memory_bytes, cpu_s = sys.argv[1:]
+try:
+    import resource
+except ImportError:  # Windows
+    pass
+else:
+    for which, most in (("AS", memory_bytes), ("CPU", cpu_s)):
+        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
+from snakewalk.controller.mapping.las_file import child
+print(child(words))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class LasPoints:
+    """Points of a file, in its units, and what it states of them."""
+
+    points: Floats
+    """(n, 3) x, y, z."""
+    unit: str | None
+    """Of x and y: of ``UNITS_M`` or deg; None: not stated."""
+    height_unit: str | None
+    """Of z; None: not stated."""
+    crs: Any = None
+    """Projected coordinate system of Rasterio; None: not stated, or unknown."""
+    notes: list[str] = field(default_factory=list)
+    cropped: bool = False
+    """Whether the crop was cut already."""
+
+
+def read_las(
+    file: Path,
+    classes: Collection[int] | None,
+    crop: Crop | None = None,
+    unit: str | None = None,
+) -> LasPoints:
+    """Read the points of the ground, or of some classes.
+
+    The decoder of LAZ ends its process on some damaged files: it has a process of its own, which
+    is limited in memory and time.
+
+    Args:
+        file: ends in .las or .laz.
+        classes: to keep; None: ground where the file has some, else all but noise.
+        crop: in metres from the south-west corner; it is not cut from a file in degrees.
+        unit: of x and y by the user, for the crop.
+
+    Raises:
+        InputError: it is damaged, or holds too many points.
+        OSError: the file cannot be opened.
+
+    """
+    require_extra("LAS and LAZ need", "laspy", "lazrs")
+    with file.open("rb"):
+        pass
+    chosen = None if classes is None else sorted(classes)
+    with TemporaryDirectory() as folder:
+        out = Path(folder) / "points.npy"
+        said = run_child(json.dumps([str(file), chosen, crop, unit, str(out)]))
+        if "fault" in said:
+            raise InputError(f"{file}: {said['fault']}")
+        points = np.load(out)
+    system = said["system"]
+    return LasPoints(
+        points, said["unit"], said["height_unit"], None if system is None else _system(system),
+        said["notes"], said["cropped"],
+    )  # fmt: skip
+
+
+def run_child(words: str) -> dict[str, Any]:
+    """Read a file in a process of its own; what it states, or its fault."""
+    command = [sys.executable, "-c", _CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    try:
+        said = json.loads(ended.stdout)
+    except ValueError:
+        return {
+            "fault": "is damaged: its decoder gave up, or needed over "
+            f"{_MOST_MEMORY_BYTES / 1e9:g} GB or {_MOST_CPU_S} s"
+        }
+    assert isinstance(said, dict)
+    return said
+
+
+def child(words: str) -> str:
+    """Work of the process of its own: write the points, return what the file states as JSON."""
+    file, classes, crop, unit, out = json.loads(words)
+    import laspy  # noqa: PLC0415  an extra
+
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # its words are in the fault
+    try:
+        with laspy.open(file) as reader:
+            stated, height_unit, system = _units(reader.header)
+            plane = unit or stated
+            window = None
+            if crop is not None and plane not in (None, DEGREE):
+                window = [each / unit_m(plane) for each in crop]
+            points, notes = _read(reader, classes, window)
+    except InputError as error:
+        return json.dumps({"fault": str(error)})
+    except Exception as error:  # laspy and lazrs raise whatever their parsers meet
+        return json.dumps({"fault": f"cannot be read as LAS or LAZ: {error}"})
+    np.save(out, points)
+    return json.dumps(
+        {
+            "unit": stated, "height_unit": height_unit, "system": system, "notes": notes,
+            "cropped": window is not None,
+        }
+    )  # fmt: skip
+
+
+def _read(
+    reader: Any, classes: Collection[int] | None, window: Sequence[float] | None
+) -> tuple[Floats, list[str]]:
+    """Points, and how many of them were used and left out."""
+    header = reader.header
+    count = int(header.point_count)
+    if count > _MOST_READ:
+        raise InputError(f"states {count} points; the most is {_MOST_READ}")
+    corner = np.asarray(header.mins[:2], dtype=float)
+    low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if window is None else (
+        corner + np.array(window[:2]), corner + np.array(window[2:])
+    )  # fmt: skip
+    seen: dict[int, int] = {}
+    withheld, kept, total, held = 0, [], 0, 0
+    ground: list[Floats] = []
+    for chunk in reader.chunk_iterator(_CHUNK):
+        points = np.stack([np.asarray(getattr(chunk, axis), float) for axis in "xyz"], axis=-1)
+        kinds = np.asarray(chunk.classification)
+        held += len(points)
+        held_back = np.asarray(chunk.withheld, dtype=bool)
+        withheld += int(held_back.sum())
+        inside = ~held_back & ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
+        for kind, number in zip(*np.unique(kinds[inside], return_counts=True), strict=True):
+            seen[int(kind)] = seen.get(int(kind), 0) + int(number)
+        wanted = ~np.isin(kinds, _NOISE) if classes is None else np.isin(kinds, list(classes))
+        is_ground = np.isin(kinds, _GROUND) if classes is None else wanted
+        if not ground:
+            kept.append(points[inside & wanted])
+        ground_part = points[inside & is_ground]
+        if len(ground_part) and classes is None:
+            ground.append(ground_part)
+            kept = []
+        total = sum(map(len, kept)) + sum(map(len, ground))
+        if total > MOST_POINTS:
+            raise InputError(f"over {MOST_POINTS} points are left of {count}: --crop a part")
+    chosen = ground or kept
+    points = np.concatenate(chosen) if chosen else np.empty((0, 3))
+    if held < count:
+        raise InputError(f"states {count} points, and holds {held}")
+    notes = _class_notes(seen, classes, bool(ground), len(points))
+    if withheld:
+        notes.append(f"{withheld} withheld points are left out")
+    return points, notes
+
+
+def _class_notes(
+    seen: dict[int, int], classes: Collection[int] | None, by_ground: bool, kept: int
+) -> list[str]:
+    """How many points of which class were kept and left out."""
+    used = set(classes) if classes is not None else set(
+        _GROUND if by_ground else (kind for kind in seen if kind not in _NOISE)
+    )  # fmt: skip
+    dropped = {kind: number for kind, number in seen.items() if kind not in used}
+    notes = [f"{kept} points of {sum(seen.values())} are used"]
+    if classes is None:
+        notes[0] += ": those of the ground" if by_ground else ": no class is ground"
+    if dropped:
+        words = ", ".join(
+            f"{number} of class {kind} ({_NAMES.get(kind, 'other')})"
+            for kind, number in sorted(dropped.items())
+        )
+        notes.append(f"left out: {words}; --classes chooses")
+    return notes
+
+
+def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
+    """Units of x, y and of z, and the projected system, as the file states them."""
+    wkt, keys = "", {}
+    for record in [*header.vlrs, *(header.evlrs or [])]:
+        text = getattr(record, "string", None)
+        if isinstance(text, str) and record.record_id == _WKT_RECORD:
+            wkt = text.rstrip("\0")
+        for key in getattr(record, "geo_keys", ()):
+            if key.tiff_tag_location == 0:
+                keys[int(key.id)] = int(key.value_offset)
+    if wkt:
+        plain = _VERTICAL_PART.split(wkt)[0]
+        if _PROJECTED_PART.search(plain) is None:
+            return DEGREE, vertical_unit(wkt), None
+        units = _WKT_UNIT.findall(plain)
+        unit = unit_name(float(units[-1][1])) if units else None
+        return unit, vertical_unit(wkt), wkt
+    vertical = _KEY_UNITS.get(keys.get(_VERTICAL_UNITS, 0))
+    number = keys.get(_PROJECTED_TYPE, 0)
+    if keys.get(_MODEL_TYPE) == 2 or (_GEOGRAPHIC_TYPE in keys and not number):
+        return DEGREE, vertical, None
+    unit = _KEY_UNITS.get(keys.get(_LINEAR_UNITS, 0))
+    if not number or number == _USER_DEFINED:
+        return unit, vertical, None
+    system = _system(number)
+    if unit is None and system is not None:
+        unit = unit_name(float(system.linear_units_factor[1]))
+    return unit, vertical, number
+
+
+def _system(text_or_number: str | int) -> Any:
+    """Coordinate system, if Rasterio is there and knows it."""
+    try:
+        from rasterio.crs import CRS  # noqa: PLC0415  an extra
+
+        if isinstance(text_or_number, int):
+            return CRS.from_epsg(text_or_number)
+        return CRS.from_wkt(text_or_number)
+    except Exception:  # its unit is stated or asked for all the same
+        return None
+
+
+def in_metres(
+    file: Path, held: LasPoints, unit: str | None, height_unit: str | None
+) -> tuple[Floats, list[str]]:
+    """Points in metres.
+
+    Raises:
+        InputError: nothing states a unit (the question).
+
+    """
+    plane = unit or held.unit
+    if plane is None:
+        raise InputError(
+            f"{file}: states no coordinate system, and so no unit; add --unit m (or ft, us-ft, deg)"
+        )
+    up = height_unit or held.height_unit
+    notes = []
+    if up is None:
+        if plane not in ("m", DEGREE) and unit is None:
+            raise InputError(
+                f"{file}: its x and y are in {plane}, and it states no unit of heights: add "
+                f"--height-unit {plane} (or --height-unit m)"
+            )
+        up = "m" if plane == DEGREE else plane
+        if unit is None:
+            notes.append("the file states no unit of heights: metres")
+    elif height_unit is None and up != "m":
+        notes.append(f"heights are in {up}, as the file states")
+    points = held.points
+    if plane == DEGREE:
+        middle = float(np.median(points[:, 1])) if len(points) else 0.0
+        east_m, north_m = degree_cell_m(1.0, 1.0, middle)
+        return points * [east_m, north_m, unit_m(up)], notes
+    x_m = y_m = unit_m(plane)
+    if held.crs is not None and unit is None and len(points):
+        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1.0)
+        corners = [tuple(middle + half * side) for side in ((0, 0), (0, -1), (0, 1), (1, 0))]
+        try:
+            x_m, y_m, words = ground_lengths(held.crs, x_m, corners, (1.0, 1.0))
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from None
+        notes += words
+    return points * [x_m, y_m, unit_m(up)], notes

@@ -1,0 +1,128 @@
+"""Tables of numbers: CSV and XYZ, with decimal points or decimal commas."""
+
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.archive import check_expansion
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+
+_DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
+_MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+
+
+def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
+    """Numbers (rows, columns) of a table, after a line of names or none.
+
+    Commas, semicolons, tabs or blanks separate them. Empty cells, ``NaN`` and ``NA`` are NaN. A
+    table that is separated otherwise may have decimal commas.
+
+    Raises:
+        InputError: it is no such table; names row and column of the first cell that is no number.
+
+    """
+    size = file.stat().st_size
+    check_expansion(file, size, 4 * size)  # a number takes two characters or more
+    try:
+        text = file.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: is no text") from None
+    lines = [
+        (number, line)
+        for number, line in enumerate(text, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise InputError(f"{file}: holds no numbers")
+    mark = _separator([line for _, line in lines])
+    rows = [(number, [cell.strip() for cell in line.split(mark)]) for number, line in lines]
+    comma = mark != "," and _has_decimal_commas(file, rows)
+    if not all(_is_number(cell, comma) for cell in rows[0][1]):
+        rows = rows[1:]
+    widths = {len(cells) for _, cells in rows}
+    if len(widths) != 1:
+        raise InputError(_uneven(file, rows, widths))
+    values = np.full((len(rows), widths.pop()), np.nan)
+    for k, (number, cells) in enumerate(rows):
+        if not comma and (plain := _plain(cells)) is not None:
+            values[k] = plain
+            continue
+        for column, cell in enumerate(cells):
+            value = _number(cell, comma)
+            if value is None:
+                raise InputError(
+                    f"{file}: line {number}, column {column + 1}: {cell!r} is no number; leave "
+                    "cells without a value empty"
+                )
+            values[k, column] = value
+    if comma and notes is not None:
+        notes.append("numbers have decimal commas")
+    return values
+
+
+def _separator(lines: list[str]) -> str | None:
+    """What separates the cells: the first of ; tab , that is in a line of numbers; else blanks."""
+    first = lines[:10]
+    for mark in ";\t":
+        if any(mark in line for line in first):
+            return mark
+    if any("," in line for line in first):
+        words = next(line for line in reversed(first) if "," in line).split()
+        decimal = len(words) > 1 and all(
+            _DECIMAL_COMMA.fullmatch(word) or _is_number(word, False) for word in words
+        )
+        return None if decimal else ","
+    return None
+
+
+def _has_decimal_commas(file: Path, rows: list[tuple[int, list[str]]]) -> bool:
+    """Whether the numbers have decimal commas.
+
+    Raises:
+        InputError: they may as well be thousands.
+
+    """
+    cells = [cell for _, row in rows for cell in row if "," in cell]
+    if not cells or not any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells):
+        return False
+    if all(_THOUSANDS.fullmatch(cell) for cell in cells):
+        raise InputError(
+            f"{file}: {cells[0]!r} has a comma for decimals or for thousands; write decimal points"
+        )
+    return True
+
+
+def _uneven(file: Path, rows: list[tuple[int, list[str]]], widths: set[int]) -> str:
+    if not rows:
+        return f"{file}: holds no numbers behind its line of names"
+    first = len(rows[0][1])
+    line, count = next((number, len(cells)) for number, cells in rows if len(cells) != first)
+    return (
+        f"{file}: line {line} holds {count} numbers, line {rows[0][0]} holds {first}; all need as "
+        "many"
+    )
+
+
+def _plain(cells: list[str]) -> list[float] | None:
+    """Numbers of a row without missing values, which is most of them."""
+    try:
+        return [float(cell) for cell in cells]
+    except ValueError:
+        return None
+
+
+def _number(cell: str, comma: bool) -> float | None:
+    if cell.lower() in _MISSING:
+        return float("nan")
+    try:
+        return float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return None
+
+
+def _is_number(cell: str, comma: bool) -> bool:
+    return _number(cell, comma) is not None

@@ -1,0 +1,54 @@
+"""Fingerprint: the settings in a servo's EEPROM that say how its joint is mounted and protected.
+
+A zero or a direction that another program changes while torque is off leaves a servo that replies
+as before and moves its joint to another angle.
+"""
+
+from collections.abc import Mapping
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.protocol.registers import REVERSE
+
+FINGERPRINT = (
+    *("Homing Offset", "Drive Mode", "Operating Mode", "Shutdown"),
+    *("Min Position Limit", "Max Position Limit", "PWM Limit", "Current Limit"),
+)
+"""Registers of it; a model may lack some."""
+Fingerprint = Mapping[str, int]
+"""Values of these registers of one servo."""
+
+
+def fingerprint_of(registers: Mapping[str, int]) -> dict[str, int]:
+    """The fingerprint in the registers that were read of a servo."""
+    return {name: registers[name] for name in FINGERPRINT if name in registers}
+
+
+def register_change(name: str, before: int, now: int, rad_per_position: float) -> str:
+    """A change of one register in words, with its effect on the joint.
+
+    Args:
+        name: the register.
+        before: its value as it was.
+        now: its value as it is.
+        rad_per_position: unit of the joint's position.
+
+    """
+    text = f"{name} is {now}, was {before}"
+    if name == "Homing Offset":
+        moved_rad = (now - before) * abs(rad_per_position)
+        return f"{text}: its zero has moved by {moved_rad:+.2f} rad"
+    if name == "Drive Mode" and (now ^ before) & REVERSE:
+        return f"{text}: it turns the other way round"
+    return text
+
+
+def fingerprint_faults(
+    robot: RobotConfig, joint: int, before: Fingerprint, now: Fingerprint, rad_per_position: float
+) -> list[str]:
+    """Lines on the registers of a joint's servo that have changed."""
+    name = robot.joint_name(joint)
+    return [
+        f"{name}: {register_change(register, value, now[register], rad_per_position)}"
+        for register, value in before.items()
+        if register in now and now[register] != value
+    ]

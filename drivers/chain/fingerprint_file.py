@@ -1,0 +1,156 @@
+"""Fingerprint file: the fingerprints of a robot's servos, next to the robot's file.
+
+``my-robot.toml`` has ``my-robot.servos.toml``. Each start on a port compares the servos with it.
+"""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+from snakewalk.config.errors import ConfigError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.chain.fingerprint import (
+    FINGERPRINT,
+    Fingerprint,
+    register_change,
+)
+from snakewalk.drivers.errors import ChainError
+from snakewalk.drivers.protocol.registers import REVERSE
+
+_HEAD = """\
+# Settings of the servos as they were found at the last start on a port (snakewalk).
+# A start is refused if a zero, a direction, a PWM limit or a current limit differs.
+# Accept a change: snakewalk doctor --accept --robot {robot}
+"""
+
+
+def fingerprint_path(robot_file: Path) -> Path:
+    """Path of the fingerprint file of a robot's file."""
+    return robot_file.with_name(f"{robot_file.stem}.servos.toml")
+
+
+def own_file(name_or_path: str) -> Path | None:
+    """File of a robot that is not shipped, if it exists in this folder or by its path."""
+    path = Path(name_or_path)
+    return path if name_or_path.endswith(".toml") and path.is_file() else None
+
+
+class FingerprintFile:
+    """Reads, compares and writes the file of one robot."""
+
+    def __init__(self, robot_file: Path) -> None:
+        self._robot_file = robot_file
+        self.path = fingerprint_path(robot_file)
+
+    def read(self) -> dict[int, dict[str, int]] | None:
+        """Fingerprints by servo ID; None if there is no file.
+
+        Raises:
+            ConfigError: the file is broken.
+
+        """
+        try:
+            text = self.path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{self.path}: cannot be read: {error}") from None
+        try:
+            return _parse(text)
+        except (tomllib.TOMLDecodeError, ValueError) as error:
+            raise ConfigError(
+                f"{self.path}: is no fingerprint file: {error}; delete it, and the next start "
+                "creates it"
+            ) from None
+
+    def write(self, fingerprints: Mapping[int, Fingerprint]) -> None:
+        """Replace the file; ``fingerprints`` are by servo ID.
+
+        Raises:
+            OSError: it cannot be written.
+
+        """
+        lines = [_HEAD.format(robot=self._robot_file)]
+        for servo_id, values in sorted(fingerprints.items()):
+            lines.append(f"[{servo_id}]")
+            lines += [f'"{name}" = {value}' for name, value in values.items()]
+            lines.append("")
+        part = self.path.with_name(f"{self.path.name}.part")
+        part.write_text("\n".join(lines), encoding="utf-8")
+        os.replace(part, self.path)
+
+    def check(
+        self, robot: RobotConfig, fingerprints: Mapping[int, Fingerprint], rad_per_position: float
+    ) -> list[str]:
+        """Compare servos with the file; create it if it is missing.
+
+        Registers that the chain sets from the robot's file are not compared, only stored.
+
+        Args:
+            robot: the servos' robot.
+            fingerprints: as found, by servo ID.
+            rad_per_position: unit of the positions.
+
+        Returns:
+            Lines to report.
+
+        Raises:
+            ChainError: a servo differs, one line for each register.
+            ConfigError: the file is broken.
+
+        """
+        known = self.read()
+        if known is not None:
+            faults = changes(robot, known, fingerprints, rad_per_position)
+            if faults:
+                hint = f"snakewalk doctor --accept --robot {self._robot_file} accepts it"
+                raise ChainError(
+                    [f"{self.path}: {line}; if it is meant, {hint}" for line in faults]
+                )
+        new = {**(known or {}), **{i: dict(each) for i, each in fingerprints.items()}}
+        if new == known:
+            return []
+        try:
+            self.write(new)
+        except OSError as error:
+            return [f"{self.path}: cannot be written: {error}; no later start is compared"]
+        if known is None:
+            return [f"{self.path}: created with the settings of {len(new)} servos"]
+        return [f"{self.path}: updated: servos were added, or limits follow the robot's file"]
+
+
+def changes(
+    robot: RobotConfig,
+    before: Mapping[int, Fingerprint],
+    now: Mapping[int, Fingerprint],
+    rad_per_position: float,
+) -> list[str]:
+    """Lines on the registers that differ and that the chain does not set, by joint."""
+    lines = []
+    for joint, servo_id in enumerate(robot.servo_ids):
+        old, new = before.get(servo_id, {}), now.get(servo_id, {})
+        for name in _KEPT:
+            if name not in old or name not in new:
+                continue
+            mask = REVERSE if name == "Drive Mode" else -1
+            if (old[name] ^ new[name]) & mask:
+                change = register_change(name, old[name], new[name], rad_per_position)
+                lines.append(f"{robot.joint_name(joint)}: {change}")
+    return lines
+
+
+_KEPT = ("Homing Offset", "Drive Mode", "PWM Limit", "Current Limit")
+"""Registers that no start sets; of Drive Mode the direction."""
+
+
+def _parse(text: str) -> dict[int, dict[str, int]]:
+    found: dict[int, dict[str, int]] = {}
+    for key, table in tomllib.loads(text).items():
+        if not (key.isdigit() and isinstance(table, dict)):
+            raise ValueError(f"{key}: a table for each servo ID is expected")
+        for name, value in table.items():
+            if name not in FINGERPRINT or type(value) is not int:
+                raise ValueError(f"{key}: {name}: a register with a number is expected")
+        found[int(key)] = dict(table)
+    return found

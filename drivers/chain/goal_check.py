@@ -1,0 +1,148 @@
+"""Goal check: whether each servo holds the goal that was sent to it.
+
+Servos do not reply to a sync write. So Goal Position(116) is read back and compared with the goal
+that was sent last before the read. A difference counts once more only after another goal was sent.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Int32s
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
+from snakewalk.drivers.errors import BusError
+
+FOREIGN_READS, OWN_READS = 2, 4
+"""Reads in a row that differ and end a run: with a goal that was never sent, and with an older goal
+of this run, which a lost write leaves behind (ours). A line that loses one packet in twenty loses
+four writes in a row once in 160,000 reads."""
+_SECOND_MASTER = "another program writes goals (a second master)"
+_REMEMBERED = 256
+"""Goals that are known to be of this run (ours)."""
+
+
+@dataclass(slots=True)
+class _Difference:
+    """A joint whose servo holds another goal than the one sent to it."""
+
+    count: int
+    """Reads in a row."""
+    write: int
+    """Number of the newest write before the last of them."""
+    value: int
+    is_constant: bool
+    """Whether all of them returned the same value."""
+    is_foreign: bool
+    """Whether one of them returned a goal that was never sent."""
+
+
+class GoalCheck:
+    """Reads the goals of all joints back."""
+
+    def __init__(self, bus: ChainBus, robot: RobotConfig, *, fast: bool) -> None:
+        """Prepare the read.
+
+        Args:
+            bus: the servos' bus.
+            robot: their robot.
+            fast: begin with fast sync reads.
+
+        """
+        self._robot = robot
+        self.cycle: GroupCycle = bus.block(
+            robot.servo_ids, "Goal Position", "Goal Position", fast=fast
+        )
+        self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
+        self._writes = 0
+        self._differences: dict[int, _Difference] = {}
+        self._is_incomplete = False
+
+    def note_write(self, goals: Int32s) -> None:
+        """Note raw goals (J,) that have just been sent."""
+        self._sent.append(goals)
+        self._writes += 1
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the check should be made again as soon as there is time."""
+        return self._is_incomplete or any(
+            each.write < self._writes for each in self._differences.values()
+        )
+
+    def check(self, explain: Callable[[int], str | None]) -> None:
+        """Read the goals back and compare them.
+
+        Args:
+            explain: returns another reason why the servo of a joint does not take goals, or None.
+
+        Raises:
+            BusError: a servo holds another goal in ``FOREIGN_READS`` or ``OWN_READS`` reads in a
+                row, each after another goal was sent.
+            PortError: the port is gone.
+
+        """
+        if not self._sent:
+            return
+        reply, sent = self.cycle.read(), self._sent[-1]
+        if reply.flawless and not self._differences and reply.data.tobytes() == sent.tobytes():
+            self._is_incomplete = False
+            return
+        values = np.ascontiguousarray(reply.data).view("<i4")[:, 0]
+        self._is_incomplete = not reply.valid.all()
+        for joint in np.flatnonzero(reply.valid).tolist():
+            if values[joint] == sent[joint]:
+                self._differences.pop(joint, None)
+            else:
+                self._note(joint, int(values[joint]))
+        over = [joint for joint, each in self._differences.items() if _is_over(each)]
+        if over:
+            raise BusError(self._fault(sorted(over), sent, explain))
+
+    def explain(self, joint: int) -> str | None:
+        """Read the goals once; what is wrong with that of a joint, or None.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        if not self._sent:
+            return None
+        reply, sent = self.cycle.read(), self._sent[-1]
+        value = int(np.ascontiguousarray(reply.data).view("<i4")[joint, 0])
+        if not reply.valid[joint] or value == sent[joint]:
+            return None
+        is_foreign = not any(goals[joint] == value for goals in self._sent)
+        cause = _SECOND_MASTER if is_foreign else "its servo does not take the goals"
+        return f"Goal Position is {value}, not {sent[joint]}: {cause}"
+
+    def _note(self, joint: int, value: int) -> None:
+        known = self._differences.get(joint)
+        is_foreign = not any(goals[joint] == value for goals in self._sent)
+        if known is None:
+            self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign)
+        elif known.write < self._writes:
+            known.count, known.write = known.count + 1, self._writes
+            known.is_constant &= value == known.value
+            known.is_foreign |= is_foreign
+            known.value = value
+
+    def _fault(self, joints: list[int], sent: Int32s, explain: Callable[[int], str | None]) -> str:
+        first = self._differences[joints[0]]
+        reason = explain(joints[0])
+        if reason is not None:
+            return f"{self._robot.joint_name(joints[0])}: {reason}"
+        if first.is_foreign:
+            cause = _SECOND_MASTER
+        elif first.is_constant:
+            cause = "it ignores sync writes, or another program writes goals"
+        else:
+            cause = "writes to it get lost"
+        names = ", ".join(map(self._robot.joint_name, joints))
+        return f"{names}: Goal Position is {first.value}, not {sent[joints[0]]}: {cause}"
+
+
+def _is_over(difference: _Difference) -> bool:
+    return difference.count >= (FOREIGN_READS if difference.is_foreign else OWN_READS)
