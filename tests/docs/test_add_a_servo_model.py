@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import signal
 from pathlib import Path
 
 import pytest
@@ -54,7 +55,8 @@ def test_the_served_bus_is_scanned_and_examined(folder: Path) -> None:
         process.stdout.readline()  # it serves
         scan, doctor = (line for line in COMMANDS if "--port ./bus" in line)
         found = snakewalk(*shlex.split(scan)[1:])
-        assert found.stdout.count("XM430-W999") == 6, found.stderr
         examined = snakewalk(*shlex.split(doctor)[1:])
-        assert "6 times XM430-W999" in examined.stdout, examined.stderr
-        assert "fail" not in examined.stdout
+        process.send_signal(signal.SIGTERM)
+    assert found.stdout.count("XM430-W999") == 6, found.stderr
+    assert "6 times XM430-W999" in examined.stdout, examined.stderr
+    assert "fail" not in examined.stdout
