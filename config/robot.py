@@ -7,13 +7,14 @@ from functools import cache
 from itertools import accumulate, pairwise
 from typing import Literal, NamedTuple, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import StereoHeadConfig
+from snakewalk.config.joint_names import JOINT_NAME_PATTERN, default_joint_names, joint_label
 from snakewalk.config.motor import MotorConfig
 
-N = TypeVar("N", int, float)
+N = TypeVar("N", int, float, str)
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
 STALL_CURRENT_A: Mapping[str, float] = {
     "XL330-M077": 1.47,
@@ -169,6 +170,13 @@ class LinkConfig(Strict):
 class JointConfig(Strict):
     """What one joint has of its own, `[[joints]]` from the head; the rest is the chain's."""
 
+    name: str | None = Field(
+        None,
+        max_length=60,
+        pattern=JOINT_NAME_PATTERN,
+        description="in messages, tables and ROS: letters, digits and _; default: axis and place "
+        "from the head, such as yaw_03",
+    )
     axis: Literal["y", "p"] | None = Field(
         None, description="y = yaw, p = pitch; in every joint, unless joint_axes says it"
     )
@@ -207,6 +215,14 @@ class JointConfig(Strict):
     gear_drag_n_m_s: float | None = Field(
         None, ge=0.0, le=10.0, description="default: servo.gear_drag_n_m_s"
     )
+
+    @model_serializer(mode="wrap")
+    def _without_a_default_name(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Leave out a name that is not set: the configuration in a log keeps its bytes."""
+        keys: dict[str, object] = handler(self)
+        if self.name is None:
+            keys.pop("name", None)
+        return keys
 
 
 ImuModel = Literal["imu_to_dxl", "FFW-G40-IMU"]
@@ -460,15 +476,19 @@ class RobotConfig(Strict):
                 else f"joints: {len(self.joints)} of them, but spine and legs have "
                 f"{self.joint_count}"
             )
-        for number, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True), 1):
+        for k, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True)):
+            label = self.joint_label(k)
             if joint.axis not in (None, axis):
-                raise ValueError(
-                    f"joints: axis of joint {number} is {joint.axis}, joint_axes says {axis}"
-                )
+                raise ValueError(f"joints: {label}: axis is {joint.axis}, joint_axes says {axis}")
             if joint.current_limit_a is not None and axis != "p":
-                raise ValueError(
-                    f"joints: current_limit_a of joint {number}: only pitch joints have one"
-                )
+                raise ValueError(f"joints: {label}: current_limit_a: only pitch joints have one")
+        return self
+
+    @model_validator(mode="after")
+    def _joint_names_differ(self) -> Self:
+        twice = [name for name, count in Counter(self.joint_names).items() if count > 1]
+        if twice:
+            raise ValueError(f"joints: {twice[0]} is the name of two joints; names must differ")
         return self
 
     @model_validator(mode="after")
@@ -628,8 +648,8 @@ class RobotConfig(Strict):
             beyond = limit_rad + abs(self.zeros_rad[joint])
             if beyond > most_rad:
                 raise ValueError(
-                    f"{self.joint_name(joint)}: zero_rad {self.zeros_rad[joint]:g} with a limit of "
-                    f"{limit_rad:g} rad leaves the servo's turn by {beyond - most_rad:.3f} rad: "
+                    f"{self.joint_label(joint)}: zero_rad {self.zeros_rad[joint]:g} with a limit "
+                    f"of {limit_rad:g} rad leaves the servo's turn by {beyond - most_rad:.3f} rad: "
                     "mount the horn nearer to the servo's centre, or lower limit_rad"
                 )
         return self
@@ -869,19 +889,21 @@ class RobotConfig(Strict):
         own = (getattr(joint, key) for joint in self.joints)
         return tuple(u if o is None else o for o, u in zip(own, usual, strict=True))
 
-    def joint_name(self, joint: int) -> str:
-        """Name of a joint in all messages: its place, counted from 1 at the head, and servo ID.
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Name of each joint, in the order of the bus; names are unique and valid in ROS."""
+        usual = default_joint_names(self.all_axes, [each.side for each in self.limb_joints])
+        return self._own("name", usual)
 
-        Of a leg, the side and the link of the spine are told as well; where segments of the chain
-        are on ports of their own, the port.
-        """
+    def joint_label(self, joint: int) -> str:
+        """Text by which every message calls a joint: name, servo ID, and port of a segment."""
         servo_id = self.servo_ids[joint]
-        on = "".join(f" on {each.port}" for each in self.ports if servo_id in each.ids)
-        name = f"joint {joint + 1} (ID {servo_id}{on})"
-        if joint < len(self.joint_axes):
-            return name
-        limb = self.limb_joints[joint - len(self.joint_axes)]
-        return f"{name} of the {limb.side} leg at link {self.limbs[limb.pair].link}"
+        port = next((each.port for each in self.ports if servo_id in each.ids), None)
+        return joint_label(self.joint_names[joint], servo_id, port)
+
+    def label_of_servo(self, servo_id: int) -> str:
+        """Text of ``joint_label`` for the joint of a servo."""
+        return self.joint_label(self.servo_ids.index(servo_id))
 
     @property
     def yaw_joints(self) -> tuple[int, ...]:

@@ -109,7 +109,7 @@ def compare(
     a, b = original.cycle, replay.cycle
     names = ("asked_rad", "sent_rad", "measured_rad", "velocity_rad_s", "current_a")
     robot = original.header.robot
-    joints = tuple(map(robot.joint_name, range(robot.joint_count)))
+    joints = tuple(map(robot.joint_label, range(robot.joint_count)))
     pairs: list[tuple[str, tuple[str, ...], Floats, Floats, Floats]] = [
         (name, joints, a.deadline_s, getattr(a, name), getattr(b, name)) for name in names
     ]

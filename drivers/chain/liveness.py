@@ -126,7 +126,7 @@ class LivenessCheck:
                 f"{check.register.name} is {value}, not {check.expected[joint]}: has it rebooted, "
                 "or does another program write to it?"
             )
-        raise BusError(f"{', '.join(map(self._robot.joint_name, differing))}: {what}")
+        raise BusError(f"{', '.join(map(self._robot.joint_label, differing))}: {what}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

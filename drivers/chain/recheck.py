@@ -76,11 +76,11 @@ def recheck(
         old = known.get(servo.servo_id, servo)
         if servo.firmware != old.firmware:
             text = (
-                f"{robot.joint_name(joint)}: firmware {servo.firmware}, was {old.firmware}: "
+                f"{robot.joint_label(joint)}: firmware {servo.firmware}, was {old.firmware}: "
                 "another servo?"
             )
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
-        name = robot.joint_name(joint)
+        name = robot.joint_label(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:
             text = f"{name}: off by {turns:+d} turns: its turn count is lost"
@@ -98,5 +98,5 @@ def recheck(
         if not servo.torque_on or found != values:
             reset.append(joint)
     return Recheck(
-        tuple(faults), tuple(reset), tuple(map(robot.joint_name, reset)), moved, here_rad
+        tuple(faults), tuple(reset), tuple(map(robot.joint_label, reset)), moved, here_rad
     )

@@ -277,7 +277,7 @@ class ServoChain:
         if np.nanmax(moved_rad, initial=0.0) <= most_rad and not np.isnan(moved_rad).any():
             return
         joint = int(np.argmax(np.where(np.isnan(moved_rad), np.inf, moved_rad)))
-        name = self.robot.joint_name(joint)
+        name = self.robot.joint_label(joint)
         if np.isnan(moved_rad[joint]):
             text = (
                 f"{name}: its servo does not tell that it is this joint's: two servos with one ID?"
@@ -312,7 +312,7 @@ class ServoChain:
         self._check_stillness(now_rad, here_rad, STILL_RAD)  # IDs may have been exchanged since
         for joint in np.flatnonzero(held != goals).tolist():
             raise BusError(
-                f"{self.robot.joint_name(joint)}: {_GOAL} is {held[joint]:.0f} after "
+                f"{self.robot.joint_label(joint)}: {_GOAL} is {held[joint]:.0f} after "
                 f"{goals[joint]} was written to all"
             )
         bus.sync_write(ids, "Torque Enable", 1)
@@ -358,7 +358,7 @@ class ServoChain:
                 silent += self._without_torque_off(part, on[part])
             except PortError as error:
                 faults.append(error)
-        names = ", ".join(map(self.robot.joint_name, sorted(silent)))
+        names = ", ".join(map(self.robot.joint_label, sorted(silent)))
         if faults:
             which = "its servos: a servo" if len(on) > 1 else "a servo"
             text = (
@@ -565,7 +565,7 @@ class ServoChain:
         differing, _ = check.compare(ask_again=self._bus)
         for joint, got in differing.items():
             raise BusError(
-                f"{self.robot.joint_name(joint)}: {name} is {got} after {expected[joint]} was "
+                f"{self.robot.joint_label(joint)}: {name} is {got} after {expected[joint]} was "
                 "written to all"
             )
 
@@ -575,8 +575,8 @@ class ServoChain:
             if state.valid.all() and state.slow_age_s.max() <= _SLOW_S:
                 return state
             self._reads = 0  # so that the slow state is read again, too
-        silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
-        raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
+        silent = ", ".join(map(self.robot.joint_label, np.flatnonzero(~state.valid).tolist()))
+        raise BusError(f"{silent or 'all servos'}: group read fails, pings do not")
 
     def _read_alarm(self, joint: int) -> None:
         servo_id = self.robot.servo_ids[joint]

@@ -153,9 +153,9 @@ def test_a_swing_within_the_plan_follows() -> None:
 def test_a_joint_without_power_behind_healthy_registers_stops_the_run(joint: int) -> None:
     tripped = swing("limp", joint).tripped
     assert tripped is not None
-    assert f"joint {joint + 1} (ID {joint + 1})" in tripped
+    assert ("joint yaw_01 (ID 1)", "joint pitch_02 (ID 2)")[joint] in tripped
     assert "it does not follow" in tripped
 
 
 def test_a_blocked_joint_stops_the_run() -> None:
-    assert "joint 1 (ID 1)" in str(swing("stuck", 0).tripped)
+    assert "joint yaw_01 (ID 1)" in str(swing("stuck", 0).tripped)
