@@ -1,10 +1,12 @@
 """Faults of input, reported all at once.
 
 ``ConfigError`` carries one line per fault, each saying where, what, and what would be right.
-The command line prints the lines and ends with exit code 2.
+The command line prints the lines and ends with exit code 2. ``Assumptions`` holds the answers to
+questions about a file.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 
 
 class InputError(Exception):
@@ -17,3 +19,89 @@ class InputError(Exception):
 
 class ConfigError(InputError):
     """A configuration file is missing, is not TOML, or breaks its schema."""
+
+
+class Assumptions:
+    """Values that a user gives for what a foreign file does not state: ``--assume KEY=VALUE``.
+
+    A reader asks for a value with ``number``. If it is not given, the question is an ``InputError``
+    that names the option and the likely value. Values that are used are listed in ``lines``, which
+    belongs into the output.
+    """
+
+    def __init__(self, given: Iterable[str] = ()) -> None:
+        """Read ``KEY=VALUE`` words.
+
+        Raises:
+            InputError: a word is not of that form, or a key is given twice.
+
+        """
+        self._values: dict[str, str] = {}
+        self._used: dict[str, str] = {}
+        for word in given:
+            key, sign, value = word.partition("=")
+            if not (key.strip() and sign and value.strip()):
+                raise InputError(f"--assume {word}: must be KEY=VALUE")
+            if key.strip() in self._values:
+                raise InputError(f"--assume {word}: {key.strip()} is given twice")
+            self._values[key.strip()] = value.strip()
+
+    def given(self, key: str, low: float, high: float) -> float | None:
+        """Value of a key as a number between two limits; None if it is not given.
+
+        Raises:
+            InputError: the value is no number, or is beyond the limits.
+
+        """
+        text = self._values.get(key)
+        if text is None:
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise InputError(f"--assume {key}={text}: must be a number from {low:g} to {high:g}")
+        self._used[key] = text
+        return value
+
+    def number(
+        self, key: str, low: float, high: float, missing: str, likely: float | None = None
+    ) -> float:
+        """Value of a key that the file does not state.
+
+        Args:
+            key: of the option.
+            low: smallest value.
+            high: largest value.
+            missing: what the file does not state, with the place: ``link l4: states no mass``.
+            likely: value to suggest.
+
+        Raises:
+            InputError: the value is not given (the question), or is not usable.
+
+        """
+        value = self.given(key, low, high)
+        if value is None:
+            shown = "VALUE" if likely is None else f"{likely:.4g}"
+            raise InputError(f"{missing}; add --assume {key}={shown}")
+        return value
+
+    def check_used(self, known: str) -> None:
+        """Reject values that nothing asked for.
+
+        Raises:
+            InputError: there is one; ``known`` says which keys this command knows.
+
+        """
+        unused = [key for key in self._values if key not in self._used]
+        if unused:
+            raise InputError(
+                f"--assume {unused[0]}={self._values[unused[0]]}: this file does not need it; "
+                f"{known}"
+            )
+
+    @property
+    def lines(self) -> list[str]:
+        """One line per value that was used, for the output."""
+        return [f"assumed by option: {key} = {value}" for key, value in self._used.items()]

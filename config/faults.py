@@ -43,9 +43,9 @@ class NoiseFault(_Lasting):
 
 
 class ServoFault(_Lasting):
-    """Servos that fall silent, jam, lose their supply, or share an ID."""
+    """Servos that do not reply, jam, lose their supply, or whose output stage is dead."""
 
-    kind: Literal["mute", "stuck", "brown_out"]
+    kind: Literal["mute", "stuck", "brown_out", "no_output"]
     ids: tuple[ServoId, ...] = Field(min_length=1)
 
 
@@ -109,19 +109,18 @@ class PortFault(_Lasting):
     kind: Literal["port"]
 
 
-Fault = Annotated[
-    NoiseFault
-    | ServoFault
+ScheduledFault = (
+    ServoFault
     | ClashFault
     | WriteFault
     | TripFault
     | HeatFault
     | SupplyFault
     | UnplugFault
-    | StallFault
-    | PortFault,
-    Field(discriminator="kind"),
-]
+    | PortFault
+)
+"""Faults that begin and end at a time; the others change packets or stop the host."""
+Fault = Annotated[NoiseFault | StallFault | ScheduledFault, Field(discriminator="kind")]
 
 
 class FaultPlan(Strict):

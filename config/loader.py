@@ -130,7 +130,7 @@ def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
         ConfigError: no such file, world or ground; each fault of it.
 
     """
-    from snakewalk.config.world import ElevationGround, MapGround, WorldConfig  # noqa: PLC0415
+    from snakewalk.config.world import ElevationGround, MapGround, WorldConfig  # noqa: PLC0415  slow to build
 
     path = locate("worlds", name_or_path, beside)
     world = load(path, WorldConfig)
@@ -147,7 +147,7 @@ def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
 
 def load_run(name_or_path: str) -> "RunConfig":
     """Load a run by shipped name or path."""
-    from snakewalk.config.run import RunConfig  # noqa: PLC0415
+    from snakewalk.config.run import RunConfig  # noqa: PLC0415  slow to build
 
     return load(locate("runs", name_or_path), RunConfig)
 
@@ -236,9 +236,9 @@ def _parts(key: str) -> list[str]:
 
 def _files() -> dict[str, type[BaseModel]]:
     """Schemas of the three files of a run, by their names."""
-    from snakewalk.config.robot import RobotConfig  # noqa: PLC0415
-    from snakewalk.config.run import RunConfig  # noqa: PLC0415
-    from snakewalk.config.world import WorldConfig  # noqa: PLC0415
+    from snakewalk.config.robot import RobotConfig  # noqa: PLC0415  slow to build
+    from snakewalk.config.run import RunConfig  # noqa: PLC0415  slow to build
+    from snakewalk.config.world import WorldConfig  # noqa: PLC0415  slow to build
 
     return {"run": RunConfig, "robot": RobotConfig, "world": WorldConfig}
 

@@ -29,7 +29,7 @@ _ALONG_WAYPOINTS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp",
 MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
 """A motion of ``MOTIONS``, or the name of a plug-in."""
 
-_FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
+FULL_OUTPUT_RAD = 885 * 128 * 2.0 * math.pi / 4096
 """Position error at which a P gain of 1 gives full output: PWM 885 is 100 %, the gain is the
 register over 128, an error is counted in 4096ths of a turn (e-manual, X series)."""
 
@@ -153,6 +153,9 @@ class SafetyConfig(Strict):
     voltage_max_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_max_v"
     )
+    voltage_time_s: float = Field(
+        0.3, ge=0.0, description="how long the supply may be too low, but not at the start"
+    )
     stale_limit_s: float = Field(
         0.1, gt=0.0, description="how old a measured position, velocity or current may be"
     )
@@ -188,7 +191,7 @@ class SafetyConfig(Strict):
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
         for axis, gain in zip(robot.all_axes, robot.position_p_gains, strict=True):
-            full_rad = _FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
+            full_rad = FULL_OUTPUT_RAD / max(gain, 1) if axis != "p" else 0.0
             limits_rad.append(min(max(self.following_limit_rad, 2.0 * full_rad), most_rad))
         return tuple(limits_rad)
 

@@ -6,7 +6,7 @@ says where up is. About the vertical nothing corrects it: the heading drifts wit
 group", IEEE Transactions on Automatic Control 53, 2008, without its estimate of the bias.)
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -19,6 +19,13 @@ _AT_REST: Final = 0.15
 """A force that differs from gravity by a greater part says nothing of up (ours)."""
 _LONGEST_S: Final = 0.2
 """After a longer pause without a reading a correction counts as one of so long (ours)."""
+
+
+def rotations() -> Any:
+    """Return scipy's class of rotations; only a program with an IMU imports it."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  a light install has no scipy
+
+    return Rotation
 
 
 def rotation_by(vector: Floats) -> Floats:

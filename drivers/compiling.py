@@ -7,8 +7,13 @@ A package of the base install that may be absent all the same: a light install o
 has no numba (docs/start/ci.md), and runs the loops as they are written.
 """
 
+import sys
+from array import array
 from collections.abc import Callable
+from functools import cache
 from typing import Any, TypeVar
+
+from snakewalk.drivers.fallbacks import is_forced, report_fallback
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -35,9 +40,10 @@ def compiled(
         nogil: release Python's lock meanwhile; worth its cost for a loop that waits.
         divides_by_zero: a division by zero is infinite, not an error; without the question for it
             a loop is made for several numbers at once.
-        makes_arrays: False of a loop that only reads and writes what it is given: none of it is
-            counted then, which takes as long as a short loop over it. What makes an array all the
-            same is not compiled. Of numba's options the one without a page.
+        makes_arrays: False for a loop that only reads and writes the arrays it is given. Numba then
+            counts no references, which take as long as a short loop does. A loop that makes an
+            array in spite of it does not compile. If numba has no such option, all loops count
+            references: the results have the same bits.
 
     """
 
@@ -49,12 +55,61 @@ def compiled(
                 raise
             return function
         model = "numpy" if divides_by_zero else "python"
-        made: F = njit(signature, nogil=nogil, error_model=model, cache=True, _nrt=makes_arrays)(
-            function
-        )
+        options: dict[str, Any] = {}
+        if not makes_arrays and _can_skip_counting():
+            options = _UNCOUNTED
+        # numba's cache does not know the options: a forced fallback would share its files
+        cached = makes_arrays or not is_forced("numba")
+        made: F = njit(signature, nogil=nogil, error_model=model, cache=cached, **options)(function)
         return made
 
     return decorate
+
+
+_UNCOUNTED = {"_nrt": False}
+"""Numba's option that leaves out the counting of references. It is private to numba."""
+
+
+def _doubled(values: Any) -> float:
+    """Double the values behind the first; return the sum of a view of them."""
+    total = 0.0
+    behind = values[1:]
+    for k in range(len(behind)):
+        behind[k] *= 2.0
+        total += behind[k]
+    return total
+
+
+@cache
+def _can_skip_counting() -> bool:
+    """Whether numba accepts ``_UNCOUNTED`` and compiles a small loop correctly with it."""
+    import numba  # noqa: PLC0415  slow to import
+    import numpy as np  # noqa: PLC0415
+
+    if is_forced("numba"):
+        fault = "the environment asks for it"
+    else:
+        try:
+            loop = numba.njit("float64(float64[::1])", cache=True, **_UNCOUNTED)(_doubled)
+            memory = array("d", [1.0, 2.0, 3.0])
+            values = np.frombuffer(memory)
+            before = sys.getrefcount(memory), sys.getrefcount(values)
+            total = loop(values)
+            if (
+                total == 10.0
+                and memory.tolist() == [1.0, 4.0, 6.0]
+                and before == (sys.getrefcount(memory), sys.getrefcount(values))
+            ):
+                return True
+            fault = "a loop with its option _nrt is wrong"
+        except Exception as error:  # an unknown option is a KeyError, or whatever numba makes of it
+            fault = f"its option _nrt is not usable ({type(error).__name__})"
+    report_fallback(
+        "numba",
+        f"numba {numba.__version__}: loops count references to arrays, about 2 % slower, because "
+        f"{fault}; install a version that snakewalk's metadata names",
+    )
+    return False
 
 
 def inlined(function: F) -> F:

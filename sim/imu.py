@@ -11,7 +11,7 @@ import numpy as np
 
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import ImuConfig
-from snakewalk.drivers.attitude import AttitudeFilter
+from snakewalk.drivers.attitude import AttitudeFilter, rotations
 from snakewalk.drivers.protocol.imu_table import IMU_TABLES, encode
 from snakewalk.drivers.protocol.registers import BAUDS
 from snakewalk.sim.plant import LinkMotion
@@ -32,11 +32,9 @@ class Imu:
         baud: int = 1_000_000,
         seed: int = 0,
     ) -> None:
-        from scipy.spatial.transform import Rotation  # noqa: PLC0415  only an IMU needs it
-
         self.config, self.baud = config, baud
-        self._motion, self._turn = motion, Rotation
-        self._in_link = Rotation.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
+        self._motion, self._turn = motion, rotations()
+        self._in_link = self._turn.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
         self._random = np.random.default_rng(seed)
         self._bias_rad_s = np.deg2rad(config.gyro_bias_dps) * self._random.standard_normal(3)
         self._filter = AttitudeFilter()

@@ -13,12 +13,13 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Final
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
 from snakewalk.controller.console.child_process import pipe, start
+from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.drivers.priority import give_way
 from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.serve.live_table import Packet, Rows
@@ -85,7 +86,7 @@ def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
     """Draw what comes until the server is gone."""
     give_way()
     decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
-    screen = Console(file=sys.stderr)
+    screen = PlainConsole(file=sys.stderr)
     with Live(console=screen, auto_refresh=False) as live, suppress(EOFError, OSError):
         while True:
             line.send(None)

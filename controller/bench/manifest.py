@@ -3,14 +3,14 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "bus backup", "Write the EEPROM of all servos on the bus into a file; changes nothing.", "snakewalk.controller.bench.commands.bus:backup", ""),
-    ("command", "bus blink", "Let the LED of servos blink, to find them; nothing moves.", "snakewalk.controller.bench.commands.bus:blink", ""),
-    ("command", "bus identify", "Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file.", "snakewalk.controller.bench.commands.bus:bus_identify", ""),
-    ("command", "bus reboot", "Restart servos, which clears their alarms; torque goes off: what they hold falls.", "snakewalk.controller.bench.commands.bus:reboot", ""),
-    ("command", "bus restore", "Write a backup's values where they differ; shows them and asks first.", "snakewalk.controller.bench.commands.bus:restore", ""),
-    ("command", "bus serve", "Serve simulated servos at a serial device, in real time, with a live table.", "snakewalk.controller.bench.commands.bus:serve", ""),
-    ("command", "bus set", "Change settings of one servo that outlive its power; shows them and asks first.", "snakewalk.controller.bench.commands.bus:bus_set", ""),
-    ("command", "bus sniff", "Decode a live or recorded exchange packet by packet.", "snakewalk.controller.bench.commands.bus:sniff", ""),
+    ("command", "bus backup", "Write the EEPROM of all servos on the bus into a file; changes nothing.", "snakewalk.controller.bench.commands.bus_backup:backup", ""),
+    ("command", "bus blink", "Let the LED of servos blink, to find them; nothing moves.", "snakewalk.controller.bench.commands.bus_blink:blink", ""),
+    ("command", "bus identify", "Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file.", "snakewalk.controller.bench.commands.bus_identify:bus_identify", ""),
+    ("command", "bus reboot", "Restart servos, which clears their alarms; torque goes off: what they hold falls.", "snakewalk.controller.bench.commands.bus_reboot:reboot", ""),
+    ("command", "bus restore", "Write a backup's values where they differ; shows them and asks first.", "snakewalk.controller.bench.commands.bus_restore:restore", ""),
+    ("command", "bus serve", "Serve simulated servos at a serial device, in real time, with a live table.", "snakewalk.controller.bench.commands.bus_serve:serve", ""),
+    ("command", "bus set", "Change settings of one servo that outlive its power; shows them and asks first.", "snakewalk.controller.bench.commands.bus_set:bus_set", ""),
+    ("command", "bus sniff", "Decode a live or recorded exchange packet by packet.", "snakewalk.controller.bench.commands.bus_sniff:sniff", ""),
     ("command", "calibrate", "Wiggle one servo at a time, weakly, ask which joint moved, and write the robot's file.", "snakewalk.controller.bench.commands.calibrate:calibrate", "The bus"),
     ("command", "doctor", "Examine adapter, bus and servos; every fault with its remedy.", "snakewalk.controller.bench.commands.doctor:doctor", "The bus"),
     ("command", "robot power", "Compute the voltage of each servo under a load, and where to inject power.", "snakewalk.controller.bench.commands.cable_drop:power", ""),

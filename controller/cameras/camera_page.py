@@ -12,12 +12,12 @@ import numpy as np
 from snakewalk.config.arrays import Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.camera_check import CameraCheck
 from snakewalk.controller.cameras.camera_findings import camera_findings
 from snakewalk.controller.cameras.camera_watch import CameraWatch
 from snakewalk.controller.cameras.floor_markers import Markers
 from snakewalk.controller.view.live_view import host_and_port
+from snakewalk.controller.view.page_server import open_page
 from snakewalk.drivers.clock import WallClock
 
 _EVERY_S: Final = 0.2
@@ -33,8 +33,6 @@ class CameraPage:
     """Serves the page; ``stop`` it."""
 
     def __init__(self, host: str, port: int, camera: CameraConfig, watch: CameraWatch) -> None:
-        from snakewalk.controller.view.page_server import open_page  # noqa: PLC0415  an extra
-
         self._camera, self._watch = camera, watch
         self._server, self.url = open_page(host, port)
         """To be opened in a browser; contains the token."""
@@ -89,7 +87,6 @@ def open_camera_page(at: str, camera: CameraConfig, watch: CameraWatch) -> Itera
         InputError: viser is not installed, or nothing can be served there.
 
     """
-    require_extra("the page needs", "viser")
     host, port = host_and_port(at)
     try:
         page = CameraPage(host, port, camera, watch)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.extras import require_extra
@@ -10,9 +11,12 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import FlatGround, WorldConfig
 from snakewalk.controller.cameras.camera_pose import CameraPose
 from snakewalk.controller.cameras.device_camera import DeviceCamera
-from snakewalk.controller.cameras.rendered_camera import RenderedCamera
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.pose_provider import PoseContext, PoseProvider
+from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
+
+if TYPE_CHECKING:
+    from snakewalk.controller.cameras.rendered_camera import RenderedCamera
 
 
 @plugin("pose", "camera")
@@ -40,6 +44,10 @@ class OverheadCameraPose:
             faults += _missing(run.camera)
         return faults
 
+    def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
+        """Return that the camera measures the pose."""
+        return PoseEvidence(Kind.MEASURED, "camera")
+
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:
         """Open the camera for the time of a run.
@@ -58,11 +66,13 @@ class OverheadCameraPose:
             )
 
 
-def _camera(context: PoseContext) -> RenderedCamera | DeviceCamera:
+def _camera(context: PoseContext) -> "RenderedCamera | DeviceCamera":
     prepared, backend = context.prepared, context.backend
     run, robot = prepared.run, prepared.robot
     if backend.qpos is None:
         return DeviceCamera(run, robot, backend.clock, context.on_picture)
+    from snakewalk.controller.cameras.rendered_camera import RenderedCamera  # noqa: PLC0415  simulator: an extra
+
     return RenderedCamera(
         run, robot, prepared.world, backend.qpos, backend.clock, context.on_picture
     )

@@ -24,11 +24,6 @@ from snakewalk.controller.cameras.device_camera import (
     open_device,
     overhead_detector,
 )
-from snakewalk.controller.cameras.rendered_camera import (
-    centre_of,
-    floor_prints,
-    rendered_detector,
-)
 from snakewalk.controller.run.backend import metal, simulated
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.drivers.clock import WallClock
@@ -87,7 +82,10 @@ class CameraWatch:
 
     def _simulated(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
         """Hand over each frame a period after it was taken: the latency to be found."""
-        from snakewalk.sim.rendering.top_view import TopView  # noqa: PLC0415  the simulator is an extra
+        from snakewalk.controller.cameras.rendered_camera import (  # noqa: PLC0415  simulator: an extra
+            rendered_detector,
+            top_view,
+        )
 
         prepared, run, camera = self._prepared, self._prepared.run, self._camera
         robot = prepared.robot
@@ -97,9 +95,7 @@ class CameraWatch:
         chain, clock, qpos = backend.chain, backend.clock, backend.qpos
         if qpos is None:
             raise AssertionError("the simulator knows its coordinates")
-        centre_m, prints = centre_of(run), floor_prints(camera)
-        view = TopView(robot, prepared.world, camera, centre_m, run.seed, prints)
-        with closing(view):
+        with closing(top_view(run, robot, prepared.world)) as view:
             ground = view.empty_floor()
             check = CameraCheck(camera, robot, rendered_detector(run, robot, ground))
             begin = chain.enable()

@@ -16,6 +16,12 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.controller.cameras.camera_frames import (
+    CHECK_FRAMES,
+    OnPicture,
+    centre_of,
+    require_whole_body,
+)
 from snakewalk.controller.cameras.camera_pose import PriorAt
 from snakewalk.controller.cameras.floor_learning import FloorLearning
 from snakewalk.controller.cameras.lens import Lens
@@ -25,12 +31,6 @@ from snakewalk.controller.cameras.overhead_camera import (
     OverheadDetector,
 )
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
-from snakewalk.controller.cameras.rendered_camera import (
-    CHECK_FRAMES,
-    OnPicture,
-    centre_of,
-    require_whole_body,
-)
 from snakewalk.controller.images.video import read_image
 from snakewalk.drivers.clock import Clock
 

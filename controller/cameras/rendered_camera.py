@@ -1,17 +1,21 @@
-"""The overhead camera of a run: the simulator's rendered top view, or a device at the bench."""
+"""The overhead camera of a simulated run: rendered top views."""
 
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
-from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.cameras.camera_frames import (
+    CHECK_FRAMES,
+    OnPicture,
+    centre_of,
+    require_whole_body,
+)
 from snakewalk.controller.cameras.camera_pose import PriorAt
 from snakewalk.controller.cameras.floor_learning import FloorLearning
 from snakewalk.controller.cameras.floor_markers import marker_picture
@@ -21,43 +25,13 @@ from snakewalk.controller.cameras.overhead_camera import (
     OverheadDetector,
 )
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
-from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.clock import Clock
-
-if TYPE_CHECKING:
-    from snakewalk.sim.rendering.looks import FloorPrint
-
-OnPicture = Callable[[Image, float], None]
-"""Takes a picture (H, W, 3), blue first as OpenCV has it, and its time."""
-CHECK_FRAMES = 15
-"""After so many frames each it is looked whether the camera was bumped."""
+from snakewalk.sim.rendering.looks import FloorPrint
+from snakewalk.sim.rendering.top_view import TopView
 
 
-def centre_of(run: RunConfig) -> tuple[float, float]:
-    """Floor under the lens: as given, or the middle of start and waypoints."""
-    if run.camera.centre_m is not None:
-        return run.camera.centre_m
-    places = np.array([run.start_m, *run.waypoints_m])
-    x, y = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    return float(x), float(y)
-
-
-def require_whole_body(detection: LineDetection, camera: str) -> LineDetection:
-    """Return the detection.
-
-    Raises:
-        InputError: it does not show the whole body.
-
-    """
-    if detection.status is not FrameStatus.GOOD:
-        raise InputError(f"{camera}: the robot is not seen whole at its start: {detection.status}")
-    return detection
-
-
-def floor_prints(camera: CameraConfig) -> "list[FloorPrint]":
+def floor_prints(camera: CameraConfig) -> list[FloorPrint]:
     """The printed markers of a simulated floor, each with a white margin of a cell."""
-    from snakewalk.sim.rendering.looks import FloorPrint  # noqa: PLC0415  the simulator is an extra
-
     found = []
     for number, place_m in camera.marker_places_m.items():
         drawn = marker_picture(number, 96)
@@ -65,6 +39,12 @@ def floor_prints(camera: CameraConfig) -> "list[FloorPrint]":
         sheet = np.pad(drawn, cell, constant_values=255)
         found.append(FloorPrint(place_m, camera.marker_side_m * len(sheet) / len(drawn), sheet))
     return found
+
+
+def top_view(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> TopView:
+    """Return the view of the simulator's camera."""
+    camera = run.camera
+    return TopView(robot, world, camera, centre_of(run), run.seed, floor_prints(camera))
 
 
 def rendered_detector(run: RunConfig, robot: RobotConfig, ground: Image) -> OverheadDetector:
@@ -98,10 +78,7 @@ class RenderedCamera:
         clock: Clock,
         on_picture: OnPicture = lambda picture, time_s: None,
     ) -> None:
-        from snakewalk.sim.rendering.top_view import TopView  # noqa: PLC0415  the simulator is an extra
-
-        centre_m = centre_of(run)
-        self._view = TopView(robot, world, run.camera, centre_m, run.seed, floor_prints(run.camera))
+        self._view = top_view(run, robot, world)
         self.detector = rendered_detector(run, robot, self._view.empty_floor())
         self._qpos, self._clock, self._on_picture = qpos, clock, on_picture
         self._period_s = 1.0 / run.camera.rate_hz

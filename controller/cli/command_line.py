@@ -3,12 +3,15 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from itertools import pairwise
 from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import missing_extra
 from snakewalk.controller.cli.called_command import CalledCommand, with_messages
 from snakewalk.controller.console.command import (
     BUS,
@@ -35,7 +38,7 @@ _GROUPS: Final = (JOB, MOTION, RECORDINGS, BUS)
 """Order of the groups in ``--help``; other groups follow."""
 _FIRST: Final = ("list", "init", "plan", "run", "stop", "report")
 """Commands that come first in their group; the others follow by name."""
-_CONTEXT: Final = {"help_option_names": ["-h", "--help"]}
+_CONTEXT: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"]}
 
 
 class CommandGroup(TyperGroup):
@@ -176,13 +179,35 @@ def _stub(name: str, listed: Plugin) -> Any:
 
 def _whole(name: str, listed: Plugin) -> Any:
     """Import a command and build its options."""
-    function: Callable[..., Any] = listed.load()
+    try:
+        function: Callable[..., Any] = listed.load()
+    except ModuleNotFoundError as error:
+        needed = missing_extra(error)
+        if needed is None:
+            raise
+        return _unavailable(name, listed, needed)
     info = command_info(function)
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)
     alone.command(
         name, cls=CalledCommand, epilog=_examples(info), rich_help_panel=listed.group or None
     )(with_messages(function))
     return typer.main.get_command(alone)
+
+
+def _unavailable(name: str, listed: Plugin, needed: str) -> Any:
+    """Return a command that only says which package of an extra is missing."""
+
+    def reject() -> None:
+        raise InputError(needed)
+
+    return TyperCommand(
+        name,
+        callback=reject,
+        help=f"{listed.help}\n\nNot available: {needed}",
+        rich_help_panel=listed.group or None,
+        rich_markup_mode="rich",
+        context_settings=_CONTEXT | {"ignore_unknown_options": True, "allow_extra_args": True},
+    )
 
 
 def _examples(info: CommandInfo) -> str:
@@ -192,8 +217,6 @@ def _examples(info: CommandInfo) -> str:
 
 def _show_version(is_asked: bool) -> None:
     if is_asked:
-        from importlib.metadata import version  # noqa: PLC0415  --help stays quick
-
         print(f"snakewalk {version('snakewalk')}")
         raise typer.Exit
 

@@ -9,7 +9,7 @@ from types import FrameType
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
-from snakewalk.controller.console.messages import plain
+from snakewalk.config.plain_text import plain
 from snakewalk.controller.console.safe_path import make_path_safe
 from snakewalk.drivers.errors import DriverError, PortError
 

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 from typing import Any, Final
 
 from snakewalk.controller.console.safe_path import module_folders
@@ -38,11 +39,21 @@ def child_environ() -> dict[str, str]:
     return environ
 
 
-def run_code(code: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    """Run Python code in a child and wait; returns its exit code and output as text."""
+def run_code(
+    code: str, *arguments: str, folder: Path | None = None
+) -> "subprocess.CompletedProcess[str]":
+    """Run Python code in a child and wait; returns its exit code and output as text.
+
+    Args:
+        code: the program.
+        arguments: of the program.
+        folder: working folder of the child; default: that of this process.
+
+    """
     return subprocess.run(
         [sys.executable, "-c", code, *arguments],
         env=child_environ(),
+        cwd=folder,
         capture_output=True,
         text=True,
         errors="replace",

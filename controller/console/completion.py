@@ -6,6 +6,7 @@ file by itself where these return nothing.
 
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 Complete = Callable[[str], list[str]]
 
@@ -33,23 +34,21 @@ def words(*choices: str) -> Complete:
 
 def keys(incomplete: str) -> list[str]:
     """Keys of ``--set``, each with its ``=``; ``run``, ``robot`` and ``world`` name the file."""
-    from snakewalk.config.loader import known_keys  # noqa: PLC0415  --help stays quick
-
-    return [f"{key}=" for key in known_keys() if key.startswith(incomplete)]
+    return [f"{key}=" for key in _loader().known_keys() if key.startswith(incomplete)]
 
 
 def _shipped(kind: str) -> list[str]:
-    if kind == "all gaits":
-        from snakewalk.controller.gaits.registry import GAITS  # noqa: PLC0415  --help stays quick
+    if kind in ("all gaits", "spine gaits"):
+        from snakewalk.controller.gaits import registry  # noqa: PLC0415  --help does not need it
 
-        return list(GAITS)
-    if kind == "spine gaits":
-        from snakewalk.controller.gaits.registry import SPINE_GAITS  # noqa: PLC0415  --help stays quick
+        return list(registry.GAITS if kind == "all gaits" else registry.SPINE_GAITS)
+    return list(_loader().shipped(kind))
 
-        return list(SPINE_GAITS)
-    from snakewalk.config.loader import shipped  # noqa: PLC0415  --help stays quick
 
-    return list(shipped(kind))  # type: ignore[arg-type]
+def _loader() -> ModuleType:
+    from snakewalk.config import loader  # noqa: PLC0415  --help does not need it
+
+    return loader
 
 
 def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:

@@ -6,16 +6,19 @@ libraries warn of is ``debug``. Without :func:`messages` nothing is shown, as fo
 """
 
 import logging
-import re
+import platform
 import shlex
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TextIO
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.plain_text import plain
+from snakewalk.drivers.fallbacks import fallbacks_in_use
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,12 +27,6 @@ LOGGER: Final = logging.getLogger("snakewalk")
 LOGGER.addHandler(logging.NullHandler())
 FAULT: Final = "fault"
 """Attribute of a record whose text is printed by whoever ends the command."""
-_CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-
-
-def plain(text: str) -> str:
-    """Return a text without the characters with which a name or a file would steer a terminal."""
-    return _CONTROL.sub("?", text)
 
 
 class _Screen(logging.Handler):
@@ -50,10 +47,12 @@ class _OneLine(logging.Formatter):
 
 def stderr_console() -> "Console":
     """Standard error for bars and what changes in place; silent where no ``info`` is shown."""
-    from rich.console import Console  # noqa: PLC0415  a program starts without it
+    from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415  a program starts without it
 
     screens = [one for one in LOGGER.handlers if isinstance(one, _Screen)]
-    return Console(stderr=True, emoji=False, quiet=any(one.level > logging.INFO for one in screens))
+    return PlainConsole(
+        stderr=True, emoji=False, quiet=any(one.level > logging.INFO for one in screens)
+    )
 
 
 @contextmanager
@@ -79,14 +78,13 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
     shown = warnings.showwarning
     warnings.showwarning = _library_warning
     try:
-        import platform  # noqa: PLC0415  a program starts without these
-        from importlib.metadata import version  # noqa: PLC0415
-
         words = shlex.join(["snakewalk", *sys.argv[1:]])
         LOGGER.debug(
             "%s; version %s, Python %s, %s",
             *(words, version("snakewalk"), platform.python_version(), platform.platform()),
         )
+        for text in fallbacks_in_use():  # reported when modules were imported, before this
+            LOGGER.warning(text)
         yield
         LOGGER.debug("done")
     except BaseException as error:

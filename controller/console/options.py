@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.plain_console import PlainConsole
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
-console = Console(
+console = PlainConsole(
     highlight=False,
     markup=False,
     emoji=False,  # er:100:9 is a graph
@@ -30,6 +30,10 @@ RunName = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
+Assume = Annotated[
+    list[str] | None,
+    typer.Option(help="KEY=VALUE for what the file does not state; may be repeated"),
+]
 Seed = Annotated[int | None, typer.Option(help="of every random choice")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
 Motion = Annotated[

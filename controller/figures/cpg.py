@@ -6,8 +6,9 @@
 import sys
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from snakewalk.config.loader import load_robot
@@ -24,9 +25,6 @@ STAY_S = 5.0
 
 def draw(out: Path) -> None:
     """Draw angles and speeds of all joints over four gaits, and rest."""
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt  # noqa: PLC0415  after the choice of backend
-
     robot = load_robot(ROBOT)
     nowhere = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
     motion = CpgMotion(robot, np.zeros(robot.joint_count))
@@ -40,8 +38,9 @@ def draw(out: Path) -> None:
             angles.append(motion.step(STEP_S, nowhere))
             speeds.append(motion.velocity_rad_s())
     time_s = STEP_S * np.arange(len(angles))
-    figure, axes = plt.subplots(2, 1, figsize=(9.0, 5.0), sharex=True, layout="constrained")
-    colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.9, robot.joint_count))
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True)
+    colours = colormaps["viridis"](np.linspace(0.0, 0.9, robot.joint_count))
     for axis, rows, limit in (
         (axes[0], np.array(angles), max(robot.limit_rad)),
         (axes[1], np.array(speeds), robot.joint_speed_limit_rad_s),

@@ -3,9 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.figures.style import BLUE, GREY, INK, RED, save_picture, style
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.links import body_in_world
@@ -36,18 +39,6 @@ def bodies_m(gait: Gait, robot: RobotConfig, phases: int = PHASES) -> Floats:
 
 def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
     """Draw the strip into ``path``."""
-    from matplotlib.collections import LineCollection  # noqa: PLC0415  an extra
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
-    from snakewalk.controller.figures.style import (  # noqa: PLC0415
-        BLUE,
-        GREY,
-        INK,
-        RED,
-        save_picture,
-        style,
-    )
-
     bodies = bodies_m(gait, robot)
     length = robot.length_m
     span = 0.56 * length

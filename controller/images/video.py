@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 
 import cv2
 import numpy as np
@@ -134,8 +135,7 @@ class Footage:
 
 def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
     """All frames by PyAV, blue first as OpenCV has them, with times; None for those between."""
-    import av  # noqa: PLC0415  an extra
-
+    av = _av()
     try:
         with av.open(str(path)) as film:
             for number, frame in enumerate(film.decode(video=0)):
@@ -146,13 +146,17 @@ def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
         return  # what is missing is counted by the caller
 
 
+def _av() -> ModuleType:
+    import av  # noqa: PLC0415  an extra, for films that OpenCV does not read
+
+    return av  # type: ignore[no-any-return]
+
+
 def _av_facts(path: Path) -> tuple[int, float] | None:
     """Frames and rate (0: not stated) of a video that PyAV reads; None where it does not."""
     if find_spec("av") is None or next(_av_frames(path, 1), None) is None:
         return None
-    import av  # noqa: PLC0415  an extra
-
-    with av.open(str(path)) as film:
+    with _av().open(str(path)) as film:
         stream = film.streams.video[0]
         count = stream.frames or sum(1 for _ in film.decode(stream))
         return count, float(stream.average_rate or 0.0)

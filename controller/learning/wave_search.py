@@ -9,10 +9,10 @@ from contextlib import nullcontext
 from functools import cache, partial
 from importlib.metadata import version
 
+import cma
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.learning.environment import SnakeEnvironment
 from snakewalk.controller.motion.policy import WAVE_SPAN, Origin, Policy, PolicyWave
@@ -42,12 +42,9 @@ def search_wave(
     of the last.
 
     Raises:
-        InputError: the package ``cma`` is not installed, or no such robot or world.
+        InputError: there is no such robot or world.
 
     """
-    require_extra("learning a policy needs", "cma", "gymnasium", "mujoco")
-    import cma  # noqa: PLC0415  an extra
-
     start = PolicyWave().vector()
     options = {"popsize": population, "seed": seed + 1, "verbose": -9}  # 0 is the time of day
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(start)), _SIGMA, options)

@@ -5,9 +5,9 @@ from contextlib import closing, contextmanager
 
 import numpy as np
 
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.result_files import MAP
+from snakewalk.controller.mapping.stereo_head import StereoHead
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.map_provider import MapContext, MapProvider
 from snakewalk.controller.run.prepared_run import PreparedRun
@@ -21,7 +21,6 @@ class StereoMap:
     def faults(self, prepared: PreparedRun, *, on_port: bool) -> list[str]:
         """Return why the head cannot map the ground here, one line per fault."""
         run, robot = prepared.run, prepared.robot
-        require_extra("mapping on the way needs", "cv2", "mujoco")
         faults = []
         if robot.stereo_head is None:
             faults.append(
@@ -49,8 +48,6 @@ class StereoMap:
             OffscreenError: nothing here draws without a screen.
 
         """
-        from snakewalk.controller.mapping.stereo_head import StereoHead  # noqa: PLC0415  OpenCV, MuJoCo
-
         prepared, backend = context.prepared, context.backend
         measure, folder, on_event = context.measure, context.folder, context.on_event
         provider = MapProvider(measure)

@@ -1,6 +1,6 @@
 """The numbers of a run, as they go into ``summary.json``."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,8 @@ from snakewalk.controller.metrics.path_error import (
 )
 from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
-from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.evidence import Kind
+from snakewalk.controller.runlog.record import Header, RunRecord
 
 _KEYS = {"paths_replanned": "paths_laid_again"}
 """Names that ``summary.json`` spells otherwise: programs read its keys."""
@@ -64,11 +65,12 @@ class RunSummary:
     outcome: str
     """How the run ended, in words."""
     waypoints: int
-    waypoints_reached: int
-    """Waypoints that the centre of mass came to, in order, by the log's poses."""
+    waypoints_reached: int | None
+    """Waypoints that the centre of mass came to, in order; None where the pose is dead-reckoned,
+    as for every distance, speed and cost below: ``dead_reckoned_*`` has their counterparts."""
     waypoints_counted: int
     """Waypoints that the run itself counted."""
-    waypoint_times_s: tuple[float, ...]
+    waypoint_times_s: tuple[float, ...] | None
     duration_s: float | None
     path_length_m: float | None
     paths_replanned: int
@@ -133,14 +135,67 @@ class RunSummary:
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
     """What the run found at last; None where it did not look for it."""
+    pose_evidence: str
+    """How the poses are known: ``measured``, ``estimated`` or ``dead-reckoned``."""
+    pose_source: str
+    """``simulator``, ``camera``, ``joints``, ``imu``, or the name of a plug-in."""
+    pose_is_simulated: bool
+    """Whether the simulator measured the poses, or moved the body that was measured."""
+    port_is_pseudo_terminal: bool | None
+    """Whether simulated servos may have answered on the port; None without a port."""
+    assumptions: dict[str, dict[str, object]]
+    """Values that nothing measured, by name: ``value``, ``kind`` and ``source``."""
+    dead_reckoned_waypoints_reached: int | None = None
+    dead_reckoned_waypoint_times_s: tuple[float, ...] | None = None
+    dead_reckoned_travelled_m: float | None = None
+    dead_reckoned_path_error_mean_m: float | None = None
+    dead_reckoned_path_error_max_m: float | None = None
+    dead_reckoned_speed_m_s: float | None = None
+    dead_reckoned_eta: float | None = None
+    dead_reckoned_electrical_cost_of_transport: float | None = None
+    dead_reckoned_mechanical_cost_of_transport: float | None = None
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether distances and arrivals are measured."""
+        return self.pose_evidence != Kind.DEAD_RECKONED
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values of ``summary.json``."""
         return {_KEYS.get(key, key): value for key, value in asdict(self).items()}
 
 
+_OF_THE_POSE = (
+    "waypoints_reached",
+    "waypoint_times_s",
+    "travelled_m",
+    "path_error_mean_m",
+    "path_error_max_m",
+    "speed_m_s",
+    "eta",
+    "electrical_cost_of_transport",
+    "mechanical_cost_of_transport",
+)
+"""Numbers that need a measured pose."""
+
+
 def summary(record: RunRecord) -> RunSummary:
-    """Return the numbers of a run, from its log alone."""
+    """Return the numbers of a run, from its log alone.
+
+    Where the pose is dead-reckoned, the numbers that need a measured pose are None and have a
+    counterpart ``dead_reckoned_*``.
+    """
+    numbers = _summary(record)
+    if numbers.is_measured:
+        return numbers
+    changes: dict[str, Any] = {
+        f"dead_reckoned_{key}": getattr(numbers, key) for key in _OF_THE_POSE
+    }
+    changes |= dict.fromkeys(_OF_THE_POSE)
+    return replace(numbers, **changes)
+
+
+def _summary(record: RunRecord) -> RunSummary:
     header, cycle, pose, walk = record.header, record.cycle, record.pose, record.walk
     waypoints, times = len(header.plan.waypoints_m), waypoint_times_s(pose, header.plan)
     tripped = next((e.text for e in record.events if e.kind == "trip"), None)
@@ -213,7 +268,27 @@ def summary(record: RunRecord) -> RunSummary:
         decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
+        pose_evidence=str(header.pose_evidence.kind),
+        pose_source=header.pose_evidence.source,
+        pose_is_simulated=header.initial_pose is not None,
+        port_is_pseudo_terminal=header.port_is_pseudo_terminal,
+        assumptions=_assumptions(header),
     )
+
+
+def _assumptions(header: Header) -> dict[str, dict[str, object]]:
+    """Return friction, mass and supply voltage, with the files that they are taken from."""
+    robot, world = header.robot, header.world
+    values = {
+        "friction_along": (world.friction.along, f"world {world.name}"),
+        "friction_across": (world.friction.across, f"world {world.name}"),
+        "mass_kg": (float(f"{robot.mass_kg:.6g}"), f"robot {robot.name}"),
+        "supply_v": (robot.servo.supply_v, f"robot {robot.name}"),
+    }
+    return {
+        key: {"value": value, "kind": str(Kind.ASSUMED), "source": source}
+        for key, (value, source) in values.items()
+    }
 
 
 def _friction(record: RunRecord) -> SummarizedFriction | None:
@@ -237,9 +312,12 @@ def _friction(record: RunRecord) -> SummarizedFriction | None:
 def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | None) -> str:
     if tripped is not None:
         return f"stopped by safety: {tripped}"
-    if waypoints and reached == waypoints:
+    if not record.header.pose_evidence.is_measured and waypoints:
+        so_far = f"believes it reached {reached} of {waypoints} (dead reckoning)"
+    elif waypoints and reached == waypoints:
         return "every waypoint reached"
-    so_far = f"{reached} of {waypoints} waypoints reached"
+    else:
+        so_far = f"{reached} of {waypoints} waypoints reached"
     if any(event.kind == "interrupt" for event in record.events):
         return f"interrupted: {so_far}" if waypoints else "interrupted"
     if waypoints:

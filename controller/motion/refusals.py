@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
+from snakewalk.config.plain_text import plain
+
 QUIET_S: Final = 1.0
 """The same line is reported again after this time (ours)."""
 LINES_MAX: Final = 10
@@ -25,7 +27,7 @@ class Refusals:
     def add(self, why: str, time_s: float) -> None:
         """Report a rejection at a time of the run, or count it."""
         self.step(time_s)
-        text = why if len(why) <= TEXT_MAX else f"{why[: TEXT_MAX - 3]}..."
+        text = plain(why if len(why) <= TEXT_MAX else f"{why[: TEXT_MAX - 3]}...")
         if text == self._last and time_s - self._last_s < QUIET_S:
             return
         self._last, self._last_s = text, time_s

@@ -4,21 +4,18 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.detail import NEAR, DetailedCrowd, ViewFrustum
 from snakewalk.controller.repertoire.repertoire import Repertoire
-
-if TYPE_CHECKING:
-    from snakewalk.sim.rendering.crowd_film import CrowdShot
+from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot, CrowdView, render_crowd
 
 FPS: Final = 20
 SIZE_PX: Final = (960, 540)
@@ -67,10 +64,8 @@ class CrowdScene:
         self._chains = DetailedCrowd(ground, radii * thin)
         self.costs = CrowdCosts()
 
-    def shots(self, frames: int, steps: int) -> Iterator["CrowdShot"]:
+    def shots(self, frames: int, steps: int) -> Iterator[CrowdShot]:
         """Yield ``frames`` shots, ``steps`` frames of the repertoire apart."""
-        from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot  # noqa: PLC0415  an extra
-
         wandering, costs = self._wandering, self.costs
         crowd = wandering.crowd
         for k in range(frames):
@@ -134,12 +129,9 @@ def film_crowd(
     """Draw the film into ``path`` (.mp4); the number of its frames.
 
     Raises:
-        InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
+        InputError: nothing draws here without a screen.
 
     """
-    require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.crowd_film import CrowdView, render_crowd  # noqa: PLC0415  an extra
-
     view = CrowdView(robot, world, ground, bodies, SIZE_PX)
     try:
         shots = scene.shots(round(seconds * FPS), round(1.0 / (FPS * frame_s)))

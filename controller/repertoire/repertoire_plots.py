@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from snakewalk.controller.figures.style import save_picture
 from snakewalk.controller.kinematics.frame import Frame
@@ -18,8 +19,6 @@ SHADES = ("0.6", "#2c6fbb", "#c0392b")
 
 def draw_actions(repertoire: Repertoire, path: Path) -> None:
     """Draw two cycles of each action: track of the centre, body at the beginning and the end."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
-
     figure = Figure(figsize=(9.0, 0.95 * len(repertoire.segments)), layout="constrained")
     axes = figure.subplots(-(-len(repertoire.segments) // 2), 2, squeeze=False).ravel()
     for axis in axes[len(repertoire.segments) :]:
@@ -48,8 +47,6 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
 
 def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     """Draw the route as planned, and where the centre of the body went."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
-
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
     axis = figure.subplots()
     pose = job.route.pose
@@ -77,8 +74,6 @@ def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:
 
 def draw_schedule(job: ScheduleRun, played: Sequence[PlayedAction], path: Path) -> None:
     """Draw wanted speed and turn over time, those of the actions chosen, and the body's own."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
-
     figure = Figure(figsize=(8.0, 4.4), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
     end_s = played[-1].begin_s + job.repertoire.segments[played[-1].action].duration_s

@@ -28,6 +28,7 @@ def make_artifacts(
     fine: bool = False,
     look: str = SERVOS,
     made: str = "",
+    folders: bool = False,
 ) -> Artifacts:
     """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
 
@@ -36,7 +37,8 @@ def make_artifacts(
     that is there already is the same run's, and stays until then. What this machine cannot make (no
     simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
     pictures. Shows progress on standard error. ``look`` is the body in the film, as ``film_look``
-    accepts it; ``made`` says at the page's foot what made it.
+    accepts it; ``made`` says at the page's foot what made it. Without ``folders`` the page contains
+    the names of the user's files, but no folders.
     """
     notes: list[str] = []
     numbers = write_summary(summary(record) if numbers is None else numbers, folder)
@@ -44,11 +46,11 @@ def make_artifacts(
     drawn: _Drawn | None = None
     try:
         drawn = _draw(record, made)
-        _write_page(record, folder, path if path.exists() else None, numbers, drawn)
+        _write_page(record, folder, path if path.exists() else None, numbers, drawn, folders)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
     if film and _film(record, path, fine, look, notes) and drawn is not None:
-        _write_page(record, folder, path, numbers, drawn)
+        _write_page(record, folder, path, numbers, drawn, folders)
     report = None if drawn is None else folder / REPORT
     return Artifacts(report, path if path.exists() else None, tuple(notes))
 
@@ -84,7 +86,7 @@ class _Drawn:
 def _draw(record: RunRecord, made: str = "") -> _Drawn:
     require_extra("the report needs", "matplotlib", "plotly")
     from snakewalk.controller.report.curves import curves_html  # noqa: PLC0415  an extra
-    from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415
+    from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415  an extra
 
     return _Drawn(sections(record), curves_html(record), made)
 
@@ -95,6 +97,7 @@ def _write_page(
     film: Path | None,
     numbers: RunSummary,
     drawn: _Drawn,
+    folders: bool = False,
 ) -> Path:
     header = record.header
     film_on_page = ""
@@ -114,6 +117,7 @@ def _write_page(
         curves=drawn.curves,
         links=[name for name in (LOG, SUMMARY, FILM) if (out_dir / name).exists()],
         made=drawn.made,
+        folders=folders,
     )
     path = out_dir / REPORT
     with atomic_write(path) as part:

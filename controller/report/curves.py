@@ -9,6 +9,7 @@ from html import escape
 from typing import Any, Final
 
 import numpy as np
+from plotly.offline import get_plotlyjs
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.figures.style import (
@@ -174,8 +175,6 @@ def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> 
 @cache
 def _library() -> str:
     """Plotly, compressed once however many pages a process makes."""
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415  an extra
-
     return _zipped(get_plotlyjs())
 
 

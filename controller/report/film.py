@@ -49,9 +49,7 @@ def film_run(
             the log holds no two poses.
 
     """
-    require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
-
+    render_film = _renderer()
     header = record.header
     time_s, qpos = body_qpos(record)
     if len(time_s) < 2:
@@ -114,9 +112,7 @@ def film_motion(
         InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
 
     """
-    require_extra("films need", "mujoco", "av")
-    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
-
+    render_film = _renderer()
     frames, bones = motion.front_m.shape[:2]
     turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
     poses = np.concatenate([motion.front_m, turns.reshape(frames, bones, 4)], axis=2)
@@ -138,6 +134,13 @@ def film_motion(
         look=look,
         on_frame=on_progress,
     )
+
+
+def _renderer() -> Callable[..., int]:
+    require_extra("films need", "mujoco", "av")
+    from snakewalk.sim.rendering.film import render_film  # noqa: PLC0415  an extra
+
+    return render_film
 
 
 def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:

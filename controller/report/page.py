@@ -7,13 +7,14 @@ import base64
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from html import escape
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.shared_text import shared, without_folders
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.runlog.record import Event
 
@@ -44,6 +45,7 @@ def page(
     curves: str = "",
     links: Sequence[str] = (),
     made: str = "",
+    folders: bool = False,
 ) -> str:
     """Whole page.
 
@@ -56,8 +58,14 @@ def page(
         curves: HTML made by ``curves_html``, or empty.
         links: names of files beside the page.
         made: by which command, where and when the page was made; empty: not said.
+        folders: whether the texts keep the folders of the user's files.
 
     """
+    if not folders:
+        known = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
+        texts = {key: without_folders(one) for key, one in known.items() if isinstance(one, str)}
+        numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
+        events = [replace(event, text=without_folders(event.text)) for event in events]
     title = f"{numbers.run} on {numbers.backend}"
     note = f'<p class="note">{escape(numbers.log_note)}</p>' if numbers.log_note else ""
     body = [
@@ -70,7 +78,7 @@ def page(
         curves,
         *(_figure(s) for s in sections),
         _events(events),
-        _details("All numbers", numbers.to_dict()),
+        _details("All numbers", numbers.to_dict() if folders else shared(numbers.to_dict())),
         _details("Configuration", config),
         _footer(links, made),
     ]
@@ -86,7 +94,7 @@ def page(
 def _mood(n: RunSummary) -> str:
     if n.trip is not None:
         return "bad"
-    return "good" if n.waypoints_reached == n.waypoints else "fair"
+    return "good" if n.is_measured and n.waypoints_reached == n.waypoints else "fair"
 
 
 def _headline(n: RunSummary) -> str:
@@ -94,6 +102,8 @@ def _headline(n: RunSummary) -> str:
     where = "on the simulator" if n.backend == "sim" else f"on {n.backend}"
     late = n.missed_deadlines
     missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed."
+    if not n.is_measured:
+        return _believed_headline(n, where, missed)
     if n.waypoints == 0:
         return (
             f"{n.robot} moved by {n.motion} {where}: its centre of mass went "
@@ -106,6 +116,19 @@ def _headline(n: RunSummary) -> str:
     )
 
 
+def _believed_headline(n: RunSummary, where: str, missed: str) -> str:
+    """Return the sentence of a run whose pose was dead-reckoned."""
+    travelled = f"{_fmt(n.dead_reckoned_travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s"
+    unknown = "Nothing measured the pose: distances and arrivals are dead-reckoned."
+    if n.waypoints == 0:
+        moved = f"{n.robot} moved by {n.motion} {where} and believes it went"
+        return f"{moved} {travelled}, {missed} {unknown}"
+    return (
+        f"{n.robot} believes it reached {n.dead_reckoned_waypoints_reached} of "
+        f"{_count(n.waypoints, 'waypoint')} {where}: {travelled}, {missed} {unknown}"
+    )
+
+
 def _centimetres(length_m: float | None) -> str:
     return "–" if length_m is None else f"{100.0 * length_m:.1f} cm"
 
@@ -115,9 +138,16 @@ def _facts(n: RunSummary) -> str:
     facts = (
         ("robot", n.robot), ("ground", n.world), ("motion", n.motion),
         ("bus", backend), ("seed", n.seed), ("configuration", n.config_hash),
-        ("snakewalk", n.software),
+        ("pose", _evidence(n)), ("snakewalk", n.software),
     )  # fmt: skip
     return " ".join(f"<span><b>{k}</b> {escape(str(v))}</span>" for k, v in facts)
+
+
+def _evidence(n: RunSummary) -> str:
+    if n.pose_source == "simulator":
+        return "simulated"
+    simulated = ", simulated" if n.pose_is_simulated or n.port_is_pseudo_terminal else ""
+    return f"{n.pose_evidence} ({n.pose_source}{simulated})"
 
 
 def _tiles(n: RunSummary) -> list[str]:
@@ -127,7 +157,7 @@ def _tiles(n: RunSummary) -> list[str]:
     missed = f"{n.missed_deadlines} of {n.cycles}"
     took = f"in {_fmt(n.duration_s, 1)} s"
     tiles = [
-        _tile("Waypoints", f"{n.waypoints_reached} of {n.waypoints}",
+        _tile("Waypoints", f"{_fmt(n.waypoints_reached, 0)} of {n.waypoints}",
               f"in {_fmt(n.duration_s, 1)} s"),
         _tile("Path error", f"{_fmt(n.path_error_mean_m, 3)} m",
               f"at most {_fmt(n.path_error_max_m, 3)} m"),

@@ -3,9 +3,11 @@
 Everything above the byte port is the same object for both.
 """
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from snakewalk.config.arrays import Floats
@@ -83,23 +85,24 @@ def simulated(
 
     """
     require_extra("simulated runs need", "mujoco")
-    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
-    from snakewalk.sim.physics.twin import PlantTwin  # noqa: PLC0415
+    from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
 
     if deviation is None:
         deviation = Deviation.of_run(run.deviation, robot)
-    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
+    body = plant.MujocoPlant(
+        deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
+    )
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
-    plant.reset(run.start_m, initial_pose.heading_rad, joint_rad)
+    body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     servo = robot.servo
     line = SimLine(
         ServoBank(robot.servo_ids, robot.servo_models, servo.baud),
-        plant,
+        body,
         baud=servo.baud,
         mounting=deviation.mounting(robot),
         motors=motors_of(robot),
         supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=plant_imu(robot, plant, servo.baud, run.seed),
+        imu=plant.plant_imu(robot, body, servo.baud, run.seed),
     )
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),
@@ -111,7 +114,7 @@ def simulated(
     def lay_down(pose: InitialPose) -> None:
         line.settle()
         shaft_rad = deviation.shaft_rad(pose.joint_rad)
-        plant.lay_down(run.start_m, pose.heading_rad, shaft_rad)
+        body.lay_down(run.start_m, pose.heading_rad, shaft_rad)
         line.firmware.hold_position()
 
     drive = line.firmware.drive
@@ -121,11 +124,11 @@ def simulated(
         "sim",
         chain,
         line.clock,
-        plant.head_pose,
-        lambda: plant.qpos,
+        body.head_pose,
+        lambda: body.qpos,
         lambda: line.busy_s,
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
-        lambda: PlantTwin(robot, world, ground),
+        lambda: twin.PlantTwin(robot, world, ground),
         lay_down,
     )
 
@@ -189,7 +192,7 @@ def split(
 
     """
     require_extra("simulated servos need", "mujoco")
-    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415  an extra
 
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
@@ -261,3 +264,15 @@ def _bus_on_ports(
             parts.append((bus, each.ids))
         opened.pop_all()
     return SegmentedBus(parts)
+
+
+def is_pseudo_terminal(ports: Sequence[str] | None) -> bool | None:
+    """Return whether all ports are pseudo-terminals, as those of served simulations are.
+
+    Returns:
+        None where there is no port.
+
+    """
+    if not ports:
+        return None
+    return all(Path(os.path.realpath(port)).parts[:3] == ("/", "dev", "pts") for port in ports)

@@ -20,6 +20,7 @@ from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (
     Backend,
+    is_pseudo_terminal,
     is_split,
     metal,
     on_ports,
@@ -29,7 +30,12 @@ from snakewalk.controller.run.backend import (
 )
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.run.observer_watch import ObserverWatch, Watcher
-from snakewalk.controller.run.pose_provider import PoseProvider, pose_faults, pose_provider
+from snakewalk.controller.run.pose_provider import (
+    PoseProvider,
+    pose_evidence,
+    pose_faults,
+    pose_provider,
+)
 from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
 from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.run.watchers import SHADOW
@@ -131,6 +137,12 @@ def execute(  # noqa: PLR0915
     else:
         make = simulated if port is None else split
         backend = make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
+    evidence = pose_evidence(prepared, backend)
+    if not evidence.is_measured:
+        LOGGER.warning(
+            "pose: %s: distances and arrivals are not measured; give a pose source with --pose",
+            evidence.text,
+        )
     log_path = folder / LOG
     clear_run(folder)
     LOGGER.debug(
@@ -152,6 +164,8 @@ def execute(  # noqa: PLR0915
             initial_pose=initial_pose,
             torque_constant_n_m_a=torque_constant_n_m_a,
             winding=winding,
+            pose_evidence=evidence,
+            port_is_pseudo_terminal=is_pseudo_terminal(ports),
         )
         safety, clock = prepared.run.safety, backend.clock
         recovery = Recovery(

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
 SERVOS: Final = "servos"
 """A capsule per link."""
+ANIMAL: Final = "animal"
+"""The animal of the run's recording."""
 _BODY: Final = "body"
 """The plug-in for looks that are no plug-in's name: names and files of bodies."""
 

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Final
 
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import show
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG
+from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.run.execute import Finished
 from snakewalk.controller.runlog.record import RunRecord
@@ -34,9 +36,10 @@ class Artifacts:
         }
 
 
-def _what_made_it() -> str:
-    """The command, the machine and the time, for the foot of a page."""
-    words = shlex.join(["snakewalk", *sys.argv[1:]])
+def _what_made_it(folders: bool) -> str:
+    """Return command, machine and time for the foot of a page, with folders or only file names."""
+    given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
+    words = shlex.join(["snakewalk", *given])
     when = datetime.now().astimezone().isoformat(" ", "seconds")
     return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
 
@@ -49,11 +52,16 @@ def write_artifacts(
     film: bool,
     fine: bool = False,
     look: str = "servos",
+    folders: bool = False,
 ) -> Artifacts:
-    """Make the report and the film of a run; print on standard error what could not be made."""
+    """Make the report and the film of a run; print on standard error what could not be made.
+
+    The report contains the folders of the user's files if ``folders`` is true.
+    """
+    what = _what_made_it(folders)
     try:
         made: Artifacts = require("results", "report", "--film").load()(
-            record, folder, numbers, film=film, fine=fine, look=look, made=_what_made_it()
+            record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
         )
     except KeyboardInterrupt as stop:
         log = folder / LOG
@@ -74,3 +82,55 @@ def show_run(
     show({**facts, **files, **artifacts.to_dict()}, as_json)
     if finished.outcome.tripped is not None:
         raise SystemExit(1)
+
+
+NOT_MEASURED: Final = 3
+"""Exit code: finished as planned, arrival not measured."""
+
+
+def arrivals(finished: Finished) -> dict[str, object]:
+    """Return the waypoints that the body reached, with their evidence, for a command's answer."""
+    numbers, reached = finished.summary, finished.outcome.reached
+    found: dict[str, object] = {"waypoints_reached": reached if numbers.is_measured else None}
+    if not numbers.is_measured:
+        found["dead_reckoned_waypoints_reached"] = reached
+    return found | {"pose_evidence": numbers.pose_evidence, "pose_source": numbers.pose_source}
+
+
+def by_evidence(finished: Finished, values: Mapping[str, object]) -> dict[str, object]:
+    """Return values that need a measured pose; without one, None and ``dead_reckoned_*``."""
+    numbers = finished.summary
+    evidence = {"pose_evidence": numbers.pose_evidence, "pose_source": numbers.pose_source}
+    if numbers.is_measured:
+        return {**values, **evidence}
+    believed = {f"dead_reckoned_{key}": value for key, value in values.items()}
+    return {**dict.fromkeys(values), **believed, **evidence}
+
+
+def costs_of_transport(numbers: RunSummary) -> dict[str, float | None]:
+    """Return the costs of transport of a run, for a command's answer."""
+    found = {
+        "electrical_cost_of_transport": numbers.electrical_cost_of_transport,
+        "mechanical_cost_of_transport": numbers.mechanical_cost_of_transport,
+    }
+    if not numbers.is_measured:
+        found |= {
+            f"dead_reckoned_{key}": getattr(numbers, f"dead_reckoned_{key}") for key in tuple(found)
+        }
+    return found
+
+
+def exit_code(finished: Finished, accept_dead_reckoning: bool) -> int:
+    """Return the exit code of a run along waypoints.
+
+    Returns:
+        0: every waypoint was reached; 1: one was not, or safety tripped; 3: the run ended as
+        planned, but its pose was dead-reckoned, so that the arrival is not measured.
+
+    """
+    outcome = finished.outcome
+    if not outcome.complete:
+        return 1
+    if outcome.waypoints and not finished.summary.is_measured and not accept_dead_reckoning:
+        return NOT_MEASURED
+    return 0

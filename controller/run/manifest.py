@@ -4,9 +4,9 @@
 # fmt: off
 PLUGINS = (
     ("command", "gait fit", "Lay the robot on a curve in space: joint angles, and how far the joints are from it.", "snakewalk.controller.run.commands.gait_fit:fit_gait", ""),
-    ("command", "gait list", "List the gaits, what joints they need, and the shipped sets of their parameters.", "snakewalk.controller.run.commands.gait:list_gaits", ""),
+    ("command", "gait list", "List the gaits, what joints they need, and the shipped sets of their parameters.", "snakewalk.controller.run.commands.gait_list:list_gaits", ""),
     ("command", "gait run", "Run a gait on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.gait_run:run_gait", ""),
-    ("command", "gait show", "Show a gait's parameters with ranges and units, its source, and how fast joints must be.", "snakewalk.controller.run.commands.gait:show_gait", ""),
+    ("command", "gait show", "Show a gait's parameters with ranges and units, its source, and how fast joints must be.", "snakewalk.controller.run.commands.gait_show:show_gait", ""),
     ("command", "init", "Write run.toml, robot.toml and world.toml to change, with their schemas for editors.", "snakewalk.controller.run.commands.init:init", "The job"),
     ("command", "list", "List what is shipped and installed: runs, robots, worlds, recordings, policies, plug-ins.", "snakewalk.controller.run.commands.list:list_", "The job"),
     ("command", "plan", "Judge a run on paper: library, path and joint limits, with no servo and no simulator.", "snakewalk.controller.run.commands.plan:plan", "The job"),

@@ -18,6 +18,7 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.pose.dead_reckoning import DeadReckoning
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.runtime.drive import OnEvent, PoseSource
 from snakewalk.drivers.types import BodyPose, JointState
 
@@ -49,6 +50,10 @@ class PosePlugin(Protocol):
         """Return why the source cannot work in a run, one line per fault."""
         ...
 
+    def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
+        """Return how the poses of the source are known."""
+        ...
+
     def open(self, context: PoseContext) -> AbstractContextManager["PoseProvider"]:
         """Open the source for the time of a run."""
         ...
@@ -78,6 +83,16 @@ def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal
     faults = source.faults(run, robot, world, on_port=metal)
     if faults:
         raise InputError(faults)
+
+
+def pose_evidence(prepared: PreparedRun, backend: Backend) -> PoseEvidence:
+    """Return how the poses of a run are known."""
+    run, robot = prepared.run, prepared.robot
+    if backend.pose is not None and run.pose_is_true:
+        return SIMULATED
+    if run.pose is None:
+        return PoseEvidence(Kind.DEAD_RECKONED, "joints" if robot.imu is None else "imu")
+    return pose_plugin(run.pose)[0].evidence(run, robot)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +218,12 @@ def pose_provider(
 class _Reckoned:
     """A pose source that integrates the pose from the joints."""
 
+    source = "joints"
+
+    def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
+        """Return that the pose is dead-reckoned."""
+        return PoseEvidence(Kind.DEAD_RECKONED, self.source)
+
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
@@ -224,6 +245,8 @@ class JointsPose(_Reckoned):
 class ImuPose(_Reckoned):
     """Dead reckoning from the joint angles and the heading of the robot's IMU."""
 
+    source = "imu"
+
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
@@ -236,6 +259,10 @@ class ImuPose(_Reckoned):
 @plugin("pose", "simulator")
 class SimulatorPose(_Reckoned):
     """The true pose of the simulated body."""
+
+    def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
+        """Return that the simulator measures the pose."""
+        return SIMULATED
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool

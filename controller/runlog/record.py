@@ -13,6 +13,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.runlog.column import Json, Table
 from snakewalk.controller.runlog.encode import array, exact, floats, number, thinned
+from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
 from snakewalk.controller.runlog.topics import (
     FORMAT,
     CycleTable,
@@ -92,6 +93,11 @@ class Header:
     """Of the robot's servos; None where the log does not say it."""
     initial_pose: InitialPose | None
     """None on servos."""
+    pose_evidence: PoseEvidence
+    """How the poses of the log are known."""
+    port_is_pseudo_terminal: bool | None = None
+    """Whether the servos answered on a pseudo-terminal, as a served simulation does; None where
+    the log does not say it."""
 
     def row(self) -> Json:
         """Row of ``ConfigTable``; the ground is thinned."""
@@ -118,6 +124,10 @@ class Header:
                 "states": dict(plan.states or {}),
             },
             "ground": None if ground is None else thinned(ground),
+            "evidence": {
+                "pose": self.pose_evidence.row(),
+                "port_is_pseudo_terminal": self.port_is_pseudo_terminal,
+            },
         }
 
     @classmethod
@@ -131,13 +141,15 @@ class Header:
         """
         plan, ground = row["plan"], row["ground"]
         winding, pose = row.get("winding"), row.get("laid")
+        run, robot = RunConfig.model_validate(row["run"]), RobotConfig.model_validate(row["robot"])
+        evidence = row.get("evidence")
         return cls(
             software=row["software"],
             backend=row["backend"],
             config_hash=row["config_hash"],
             seed=row["seed"],
-            run=RunConfig.model_validate(row["run"]),
-            robot=RobotConfig.model_validate(row["robot"]),
+            run=run,
+            robot=robot,
             world=WorldConfig.model_validate(row["world"]),
             plan=PlanSummary(
                 path_m=array(plan["path_m"]),
@@ -156,6 +168,12 @@ class Header:
             initial_pose=None
             if pose is None
             else InitialPose(pose["heading_rad"], array(pose["joint_rad"])),
+            pose_evidence=PoseEvidence.of(evidence["pose"])
+            if evidence is not None
+            else evidence_of_old_log(run, row["backend"], robot.imu is not None),
+            port_is_pseudo_terminal=None
+            if evidence is None
+            else evidence["port_is_pseudo_terminal"],
         )
 
 

@@ -60,6 +60,9 @@ class ConfigTable(Table):
         Column("path_m, waypoints_m, waypoint_radius_m, predicted_speed_m_s, ...", "object"),
     ]
     ground: Annotated[Any, Column("thinned height field; null: flat", "object", default=None)]
+    evidence: Annotated[
+        Any, Column("pose: kind and source; port_is_pseudo_terminal", "object", default=None)
+    ]
 
 
 @topic("/cycle", is_fast=True)

@@ -13,10 +13,12 @@ from numpy.typing import ArrayLike
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import digest
+from snakewalk.config.plain_text import plain
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.runlog.column import Table
+from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
 from snakewalk.controller.runlog.record import Header, InitialPose, PlanSummary, Winding
 from snakewalk.controller.runlog.row_printer import RowPrinter
 from snakewalk.controller.runlog.topics import (
@@ -107,6 +109,8 @@ class RunLog:
         torque_constant_n_m_a: float = float("nan"),
         winding: Winding | None = None,
         initial_pose: InitialPose | None = None,
+        pose_evidence: PoseEvidence | None = None,
+        port_is_pseudo_terminal: bool | None = None,
     ) -> None:
         """Log the configuration, once and first; the ground is thinned to what a report draws."""
         header = Header(
@@ -122,6 +126,8 @@ class RunLog:
             torque_constant_n_m_a=torque_constant_n_m_a,
             winding=winding,
             initial_pose=initial_pose,
+            pose_evidence=pose_evidence or evidence_of_old_log(run, backend, robot.imu is not None),
+            port_is_pseudo_terminal=port_is_pseudo_terminal,
         )
         self._write(ConfigTable, 0.0, header.row())
         self._writer.flush()
@@ -182,7 +188,7 @@ class RunLog:
 
     def event(self, time_s: float, kind: str, text: str, level: Level = "info") -> None:
         """Log an event; above ``info`` it is on the disk when this returns."""
-        self.add(EventTable, time_s, level=level, kind=kind, text=text)
+        self.add(EventTable, time_s, level=level, kind=kind, text=plain(text))
         if level != "info":
             self._writer.flush()
 

@@ -68,7 +68,9 @@ class Trial:
     """Where the head started; None where the run could not be prepared."""
     waypoints: int = 0
     complete: bool = False
+    """Whether the body truly came to every waypoint, by the simulator, without a trip."""
     reached: int = 0
+    """Waypoints that the body truly came to, in order."""
     missed: int = 0
     """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
     duration_s: float = math.nan
@@ -220,12 +222,13 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
         finished = execute(prepared, Path(folder), stoppable=False)
         stood = ground_contact(finished.record, prepared.ground)
     numbers, outcome, off = finished.summary, finished.outcome, finished.pose.error
-    complete = outcome.complete
+    reached = outcome.reached if off is None else off.waypoints_reached
+    complete = outcome.tripped is None and reached == outcome.waypoints
     ended = None if complete else failure(finished.record)
     return replace(
         trial,
         complete=complete,
-        reached=outcome.reached,
+        reached=reached,
         missed=outcome.missed,
         duration_s=outcome.duration_s,
         speed_m_s=gait_displacement(finished.record).speed_m_s if trial.case.is_gait else math.nan,

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import viser
 
-from snakewalk.controller.console.messages import plain
+from snakewalk.config.plain_text import plain
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of

@@ -224,6 +224,12 @@ class Readings:
         self._alarmed = True
         self._flags = self._frozen_flags()
 
+    def dismiss_alert(self, joint: int) -> None:
+        """Take the alert bit of one joint's newest reply back: its register 70 shows no alarm."""
+        self._error[joint] &= 0xFF ^ ALERT
+        self.alert = bool((self._error & ALERT).any())
+        self._flags = self._frozen_flags()
+
     def update_slow(self, reply: GroupReadReply, measured_at_s: float) -> None:
         """Take the slow blocks: Present Input Voltage (2 bytes), Present Temperature (1)."""
         ok = slice(None) if reply.flawless else reply.valid  # picking rows takes 30 us
@@ -231,6 +237,16 @@ class Readings:
         self._temperature[ok] = reply.data[ok, 2]
         self._slow_measured_at_s[ok] = measured_at_s
         self.slow_at_s = float(self._slow_measured_at_s.min())
+
+    @property
+    def temperature_c(self) -> Floats:
+        """(J,) newest temperatures."""
+        return np.asarray(self._temperature)
+
+    @property
+    def current_a(self) -> Floats:
+        """(J,) newest currents."""
+        return np.asarray(self._motion[0])
 
     def state(self, now_s: float) -> JointState:
         """Read-only copies of everything."""

@@ -31,12 +31,26 @@ class Recheck:
     """(J,) from where each joint was believed to be to where it is; NaN where it was not read."""
     position_rad: Floats
     """(J,) where each joint is; NaN where it was not read."""
+    unidentified: tuple[str, ...] = ()
+    """Ports on which every servo has lost its torque or its settings."""
+
+    @property
+    def doubt(self) -> str | None:
+        """Why only a person can say that this is the same robot; None if its servos show it."""
+        if not self.unidentified:
+            return None
+        return (
+            f"{', '.join(self.unidentified)}: every servo has lost its torque or its settings: "
+            "their supply was off, or this is another robot with the same IDs"
+        )
 
     def __str__(self) -> str:
         if self.faults:
             return "; ".join(map(str, self.faults))
-        reset = f", to be set up again: {', '.join(self.names)}" if self.names else ""
         moved = float(np.abs(self.moved_rad).max())
+        if self.doubt is not None:
+            return f"{self.doubt}; its joints are at most {moved:.3f} rad from their last angles"
+        reset = f", to be set up again: {', '.join(self.names)}" if self.names else ""
         return f"the same servos, moved by at most {moved:.3f} rad{reset}"
 
 
@@ -97,6 +111,11 @@ def recheck(
             faults.append(ChainFault(FaultCause.EXCHANGED, other))
         if not servo.torque_on or found != values:
             reset.append(joint)
-    return Recheck(
-        tuple(faults), tuple(reset), tuple(map(robot.joint_label, reset)), moved, here_rad
+    lost = {robot.servo_ids[joint] for joint in reset}
+    unidentified = tuple(
+        part.port.name
+        for part in bus.parts
+        if lost.issuperset(i for i in robot.servo_ids if bus.port_of(i) is part.port)
     )
+    names = tuple(map(robot.joint_label, reset))
+    return Recheck(tuple(faults), tuple(reset), names, moved, here_rad, unidentified)

@@ -1,33 +1,34 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s
-from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
 from snakewalk.drivers.bus.budget import WireBudget, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.group_read import GroupReadReply
+from snakewalk.drivers.chain.alarm_reader import AlarmReader
+from snakewalk.drivers.chain.identified_read import IdentifiedRead, check_stillness
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
 from snakewalk.drivers.chain.liveness import SLOW_EVERY, LivenessCheck, RegisterCheck
+from snakewalk.drivers.chain.lost_replies import LostReplies
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
 from snakewalk.drivers.chain.start_up import (
-    IDENTITY,
     Inspection,
     check_pose,
     configure,
-    identity,
     inspect,
     let_reply,
 )
+from snakewalk.drivers.chain.temperature_sensors import TemperatureSensors
+from snakewalk.drivers.chain.torque_off import TorqueOff
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import BusError, ChainError, PortError
+from snakewalk.drivers.errors import BusError, ChainError
 from snakewalk.drivers.protocol.registers import (
     WATCHDOG_TICKS_MAX,
     WATCHDOG_UNIT_S,
@@ -37,19 +38,8 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 _SLOW_S = 1.0
 """Age from which voltages and temperatures are read in every cycle until they come (ours)."""
-_OFF_ROUNDS = 8
-"""Group reads in which the servos may confirm that their torque is off (ours)."""
-_OFF_S = 1.0
-"""How long servos that do not are asked one by one, round after round, s (ours): longer than a line
-may be disturbed before the state is stale and for some tenths of a second after it."""
-_PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
-"""How long torque off waits for a port that is gone, and between the tries to open it (ours)."""
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
-_LOSS_READS, _LOSSES = 100, 4
-"""So many losses within so many reads show a bad line (ours): a servo that falls silent, or a
-computer that stands still for a while, is one loss."""
-_GOAL = "Goal Position"
 _HOLD_READS = 2
 """Reads in which the servos may tell where they are before they hold (ours)."""
 STILL_RAD = 0.1
@@ -109,7 +99,12 @@ class ServoChain:
         self._prepare_reads(fast=True)
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
-        self._losses = _Losses()
+        self._losses = LostReplies()
+        self._alarms = AlarmReader(bus, robot, self._readings)
+        stall_a = [STALL_CURRENT_A.get(model, math.inf) for model in robot.servo_models]
+        names = [robot.joint_label(joint) for joint in range(robot.joint_count)]
+        self._sensors = TemperatureSensors(names, np.array(stall_a))
+        self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)
         self._armed = False
         self._sent_at_s = -np.inf
         self._goal_rad = np.full(robot.joint_count, np.nan)
@@ -199,11 +194,12 @@ class ServoChain:
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
+        self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
-            here_rad = self._own_positions(_FIRST_READS, ask_again=True)
+            here_rad = self._identified.positions_rad(_FIRST_READS, ask_again=True)
             before_rad = here_rad if found_rad is None else found_rad
-            self._check_stillness(here_rad, before_rad, MOVED_RAD)
+            check_stillness(self.robot, here_rad, before_rad, MOVED_RAD)
             return self._hold_and_arm(here_rad)
         except BaseException:
             self.disable()
@@ -228,67 +224,6 @@ class ServoChain:
         """
         self._bus.reopen()
 
-    def _own_positions(self, reads: int, *, ask_again: bool = False) -> Floats:
-        """(J,) where each joint is, by a reply that also tells which joint's its servo is."""
-        return self._own_registers(reads, ask_again=ask_again)[0]
-
-    def _own_registers(self, reads: int, *, ask_again: bool = False) -> tuple[Floats, Floats]:
-        """(J,) where each joint is, and its raw goal, by a reply that tells whose its servo is.
-
-        So no joint is given the place of another whose servo has the same ID, or its ID.
-
-        Args:
-            reads: how often all are asked; NaN for a joint whose servo has not told it.
-            ask_again: ask those alone: one may refuse to be read across registers that it lacks.
-
-        Raises:
-            BusError: a servo that is asked alone does not reply.
-            PortError: the port is gone.
-
-        """
-        here_rad, goals = np.full((2, self.joint_count), np.nan)
-        registers = self._own
-        start = registers[IDENTITY].address
-
-        def take(joint: int, values: Mapping[str, int]) -> None:
-            if values[IDENTITY] == identity(joint):
-                here_rad[joint] = self._units.position_rad(joint, values[self._position_name])
-                goals[joint] = values[_GOAL]
-
-        for _ in range(reads):
-            reply = self._identified.read()
-            for joint in np.flatnonzero(reply.valid & np.isnan(here_rad)).tolist():
-                row = reply.data[joint].tobytes()
-                take(joint, {n: r.decode(row[r.address - start :]) for n, r in registers.items()})
-            if not np.isnan(here_rad).any():
-                break
-        for joint in np.flatnonzero(np.isnan(here_rad)).tolist() if ask_again else ():
-            take(joint, self._bus.read_each(self.robot.servo_ids[joint], registers))
-        return here_rad, goals
-
-    def _check_stillness(self, position_rad: Floats, found_rad: Floats, most_rad: float) -> None:
-        """Compare where the joints are with where they have just been found.
-
-        Raises:
-            ChainError: a joint is elsewhere, or it is not known where, though it should hold.
-
-        """
-        moved_rad = np.abs(position_rad - found_rad)
-        if np.nanmax(moved_rad, initial=0.0) <= most_rad and not np.isnan(moved_rad).any():
-            return
-        joint = int(np.argmax(np.where(np.isnan(moved_rad), np.inf, moved_rad)))
-        name = self.robot.joint_label(joint)
-        if np.isnan(moved_rad[joint]):
-            text = (
-                f"{name}: its servo does not tell that it is this joint's: two servos with one ID?"
-            )
-        else:
-            text = (
-                f"{name}: read {position_rad[joint] - found_rad[joint]:+.2f} rad from where it was "
-                "found just before: two servos with one ID, or moved by hand"
-            )
-        raise ChainError([text])
-
     def hold(self) -> None:
         """Set the goals to where the joints are.
 
@@ -300,7 +235,7 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        here_rad = self._own_positions(_HOLD_READS)
+        here_rad = self._identified.positions_rad(_HOLD_READS)
         self._send_goals(np.where(np.isfinite(here_rad), here_rad, self._goal_rad))
 
     def _hold_and_arm(self, here_rad: Floats) -> JointState:
@@ -308,11 +243,13 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(here_rad)
-        now_rad, held = self._own_registers(_FIRST_READS, ask_again=True)
-        self._check_stillness(now_rad, here_rad, STILL_RAD)  # IDs may have been exchanged since
+        now_rad, held = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
+        check_stillness(
+            self.robot, now_rad, here_rad, STILL_RAD
+        )  # IDs may have been exchanged since
         for joint in np.flatnonzero(held != goals).tolist():
             raise BusError(
-                f"{self.robot.joint_label(joint)}: {_GOAL} is {held[joint]:.0f} after "
+                f"{self.robot.joint_label(joint)}: Goal Position is {held[joint]:.0f} after "
                 f"{goals[joint]} was written to all"
             )
         bus.sync_write(ids, "Torque Enable", 1)
@@ -325,110 +262,19 @@ class ServoChain:
         )
         self._armed = True
         state = self.read()
-        self._check_stillness(state.position_rad, here_rad, STILL_RAD)
+        check_stillness(self.robot, state.position_rad, here_rad, STILL_RAD)
         return state
 
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
 
-        Servos that do not confirm it in a group read are asked one by one, again and again for a
-        limited time: their watchdogs may be disarmed. Where one of several ports is gone, the
-        servos on the others are off before it is waited for.
-
         Raises:
-            BusError: servos that did not confirm; their watchdog stays armed and stops them.
+            BusError: servos did not confirm; their watchdog stays armed and stops them.
             PortError: a port is gone and does not come back; the watchdog stops its servos.
 
         """
         self._armed = False
-        give_up_s = self._clock.now_s() + _PORT_PATIENCE_S
-        on = {part: self._joints_on(part) for part in self._bus.parts}
-        gone: list[DynamixelBus] = []
-        for part, joints in on.items():
-            try:
-                part.sync_write(self._ids_of(joints), "Torque Enable", 0)
-            except PortError:
-                gone.append(part)
-        silent: list[int] = []
-        faults: list[PortError] = []
-        for part in sorted(on, key=gone.__contains__):
-            try:
-                if part in gone:
-                    self._wait_to_send_torque_off(part, on[part], give_up_s)
-                silent += self._without_torque_off(part, on[part])
-            except PortError as error:
-                faults.append(error)
-        names = ", ".join(map(self.robot.joint_label, sorted(silent)))
-        if faults:
-            which = "its servos: a servo" if len(on) > 1 else "a servo"
-            text = (
-                f"{'; '.join(map(str, faults))}; torque is not off: {which} that has torque holds "
-                f"where its bus watchdog ({self._watchdog_s:.3g} s) stops it: switch the servo "
-                "power off"
-            )
-            if len(on) > len(faults) and not silent:
-                text += "; on the other ports torque is off"
-            raise PortError(f"{text}; {names}: not confirmed" if names else text) from faults[0]
-        if names:
-            raise BusError(
-                f"{names}: torque off is not confirmed; if a joint still holds, switch the servo "
-                "power off"
-            )
-
-    def _joints_on(self, part: DynamixelBus) -> list[int]:
-        """Joints whose servos are on one of the ports."""
-        return [k for k, i in enumerate(self.robot.servo_ids) if self._bus.port_of(i) is part.port]
-
-    def _ids_of(self, joints: Iterable[int]) -> list[int]:
-        return [self.robot.servo_ids[joint] for joint in joints]
-
-    def _wait_to_send_torque_off(
-        self, part: DynamixelBus, joints: Sequence[int], give_up_s: float
-    ) -> None:
-        """Torque off, unconfirmed, on a port that is gone: wait a little, it may be back."""
-        while True:
-            late = self._clock.now_s() >= give_up_s
-            try:
-                part.reopen()
-                part.sync_write(self._ids_of(joints), "Torque Enable", 0)
-            except PortError:
-                if late:
-                    raise
-                self._clock.sleep_until_s(self._clock.now_s() + _REOPEN_S)
-            else:
-                return
-
-    def _without_torque_off(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
-        """Joints that do not confirm that their torque is off; the others' watchdogs are off."""
-        ids, joints = self.robot.servo_ids, list(on_it)
-        for _ in range(_OFF_ROUNDS):
-            asked = self._ids_of(joints)
-            reply = bus.block(asked, "Torque Enable", "Torque Enable", fast=False).read()
-            off = reply.valid & (reply.data[:, 0] == 0)
-            joints = [joint for joint, done in zip(joints, off, strict=True) if not done]
-            if not joints:
-                break
-            bus.sync_write(self._ids_of(joints), "Torque Enable", 0)
-        give_up_s = self._clock.now_s() + _OFF_S
-        silent = joints  # those behind a silent servo stay silent in a group read
-        while silent and self._clock.now_s() < give_up_s:
-            silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
-        confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
-        if confirmed:
-            bus.sync_write(confirmed, "Bus Watchdog", 0)
-            # the port may be closed right behind it: a reply shows that the packet has arrived
-            bus.block(confirmed, "Bus Watchdog", "Bus Watchdog", fast=False).read()
-        return silent
-
-    def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
-        """Ask a servo alone to switch its torque off; whether it confirms that, in time."""
-        if self._clock.now_s() >= give_up_s:
-            return False
-        try:
-            bus.write(servo_id, "Torque Enable", 0, tries=1)
-        except BusError:
-            return False
-        return True
+        self._torque_off.send()
 
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
@@ -470,13 +316,17 @@ class ServoChain:
         reply = self._slow.read()
         self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
         self._readings.update_slow(reply, self._sent_at_s)
+        readings = self._readings
+        for line in self._sensors.update(readings.temperature_c, readings.current_a, measured_at_s):
+            self.on_event(line)
         return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
         """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
-        for joint in self._readings.update(reply, measured_at_s, again=again):
-            self._read_alarm(int(joint))
+        alerted = self._readings.update(reply, measured_at_s, again=again)
+        for line in self._alarms.update(alerted):
+            self.on_event(line)
         return measured_at_s
 
     def _check_liveness(self, *, has_time: bool) -> None:
@@ -521,11 +371,7 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
-        table = bus.table_of(ids[0])
-        self._position_name = table.state_names[-1]
-        names = IDENTITY, _GOAL, self._position_name
-        self._own = {name: table.register(name) for name in names}
-        self._identified: GroupCycle = bus.block(ids, names[0], names[-1], fast=False)
+        self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 
     def _budget(self, *, fast: bool) -> WireBudget:
@@ -577,47 +423,3 @@ class ServoChain:
             self._reads = 0  # so that the slow state is read again, too
         silent = ", ".join(map(self.robot.joint_label, np.flatnonzero(~state.valid).tolist()))
         raise BusError(f"{silent or 'all servos'}: group read fails, pings do not")
-
-    def _read_alarm(self, joint: int) -> None:
-        servo_id = self.robot.servo_ids[joint]
-        try:
-            self._readings.update_alarm(joint, self._bus.read(servo_id, "Hardware Error Status"))
-        except BusError:
-            return  # the error byte carries the alert already; read again in the next cycle
-
-
-class _Losses:
-    """Replies that are lost again and again, or of all servos: the line is bad, not a servo."""
-
-    def __init__(self) -> None:
-        self._began: deque[int] = deque()  # numbers of reads, each the first of a loss
-        self._reads = 0
-        self._whole, self._any, self._shown = True, True, False
-
-    def update(self, read: int, joints: int) -> str | None:
-        """Count a read; a line for the user, the first time that there is reason for one.
-
-        Args:
-            read: number of joints that were read.
-            joints: of all.
-
-        """
-        self._reads += 1
-        whole, some = read == joints, read > 0
-        if self._whole and not whole:
-            self._began.append(self._reads)
-        nobody = not (some or self._any)
-        self._whole, self._any = whole, some
-        while self._began and self._began[0] <= self._reads - _LOSS_READS:
-            self._began.popleft()
-        if self._shown or not (nobody or len(self._began) >= _LOSSES):
-            return None
-        self._shown = True
-        span = self._reads - self._began[0] + 1
-        found = f"replies got lost {_LOSSES} times within {span} reads:"
-        if nobody:
-            found = "no servo was read in two reads in a row: no power,"
-        return (
-            f"{found} noise, a loose plug, another program on the line, or a computer that is too "
-            "busy; see snakewalk doctor"
-        )

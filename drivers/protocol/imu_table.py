@@ -19,6 +19,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import ImuConfig, ImuModel
+from snakewalk.drivers.attitude import rotations
 from snakewalk.drivers.protocol.control_table import Register
 
 COUNTS = 32_768
@@ -119,14 +120,12 @@ def decode(imu: ImuConfig, block: bytes) -> ImuSample:
 
 def _rotation(halves: bytes) -> Floats | None:
     """Axes of a quaternion whose vector stands in three half floats; None where there is none."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  only an IMU needs it
-
     vector = np.frombuffer(halves, "<f2").astype(float)
     square = float(vector @ vector)
     if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN is none, too
         return None
     whole = [*vector, np.sqrt(max(0.0, 1.0 - square))]
-    return np.asarray(Rotation.from_quat(whole).as_matrix())
+    return np.asarray(rotations().from_quat(whole).as_matrix())
 
 
 def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Floats) -> bytes:
@@ -139,10 +138,8 @@ def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Flo
         rotation: (3, 3) its axes in the world.
 
     """
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415  only an IMU needs it
-
     if imu.gyro_range_dps is None or imu.acceleration_range_g is None:
-        vector = Rotation.from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")
+        vector = rotations().from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")
         vector[vector == 0.0] = -0.0  # not all bytes 0: those mean that there is none yet
         return _counts(rate_rad_s / GYRO_RAD_S) + vector.tobytes()
     force = force_m_s2 * (COUNTS / (imu.acceleration_range_g * GRAVITY_M_S2))

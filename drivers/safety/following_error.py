@@ -1,11 +1,16 @@
-"""Following error: a joint that does not go where its goal is, though its servo could.
+"""Following error: a joint that does not go to its goal, though its servo could.
 
-A joint lags behind its goal as long as it moves, by what its P gain needs for the speed and load;
-that is honest, and bounded by the error at which the output is full. Beyond it, for a time, the
-joint is blocked, has no power, obeys another program, or is not the joint it is taken for. A
-current-limited joint may be held off its goal by the ground for as long as the ground is there; but
-then its servo pushes with all the current it is allowed.
+A joint lags behind its goal as long as it moves, by the error that its P gain needs for the speed
+and the load. That lag is bounded by the error at which the output is full. A larger error that
+lasts means that the joint is blocked, has no power, obeys another program, or is another joint. The
+ground may hold a current-limited joint off its goal for long, but then its servo pushes with all
+the current that it is allowed.
+
+The current is evidence at small errors, too: a motor whose output stage works draws current as soon
+as its joint is off the goal and slow. If it draws next to none, the output stage is dead.
 """
+
+import math
 
 import numpy as np
 
@@ -14,69 +19,132 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.types import JointState
 
+IDLE_TIME_S = 0.3
+"""How long in all a joint may draw no current although it should (ours)."""
+IDLE_SHARE = 0.1
+"""Share of the expected current below which a motor draws none (ours)."""
+IDLE_OUTPUT = 0.25
+"""Share of full output from which on a slow motor without current is at fault (ours). There a
+healthy motor on 3/4 of its nominal voltage still draws a third of its current at rest."""
+EVIDENT_OUTPUT = 0.1
+"""Share of full output from which on a current shows that the output stage works (ours)."""
+SLOW_RAD_S = 0.3
+"""Speed towards the goal below which the back-EMF may be neglected (ours): a tenth of the no-load
+speed of the slowest model."""
+LONGEST_STEP_S = 0.1
+"""A pause between two states counts as this much, s (ours)."""
 _FLOATS = readonly_array()
 
 
 class FollowingError:
-    """Since when each joint does not follow; ``update`` with every state."""
+    """Time for which each joint does not follow; ``update`` with every state."""
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
-        self._since_s = np.full(len(limits.limit_rad), np.nan)
+        joints = len(limits.limit_rad)
+        output = np.zeros((3, joints)) if limits.output is None else limits.output
+        self._rules = np.vstack([limits.following_limit_rad, limits.following_effort_a, output])
+        self._memory = np.zeros((2, joints))
+        self._since_s, self._idle_s = self._memory
+        self.reset()
 
     def reset(self) -> None:
-        """Forget what was: the joints rest at their goals."""
+        """Forget the past: the joints rest at their goals."""
         self._since_s[:] = np.nan
+        self._idle_s[:] = 0.0
+        self._time_s = math.inf
 
     def update(self, state: JointState, goal_rad: Floats) -> str | None:
-        """Take in a state and the goals (J,) that were sent before it; why to stop, or None."""
-        limits = self._limits
-        joint = _longest(
-            *(goal_rad, state.position_rad, state.current_a, state.valid, state.time_s),
-            *(limits.following_limit_rad, limits.following_effort_a, self._since_s),
+        """Evaluate a state and the goals (J,) sent before it; returns a reason to stop, or None."""
+        last_s, self._time_s = self._time_s, state.time_s
+        joint = _judge(
+            *(goal_rad, state.position_rad, state.velocity_rad_s, state.current_a, state.valid),
+            *(state.time_s, last_s, self._rules, self._memory),
         )
         if joint < 0:
             return None
+        if self._idle_s[joint] >= IDLE_TIME_S:
+            return self._idle_fault(state, goal_rad, joint)
         for_s = state.time_s - self._since_s[joint]
-        if not for_s >= limits.following_time_s:
+        if not for_s >= self._limits.following_time_s:
             return None
         error_rad = goal_rad[joint] - state.position_rad[joint]
         return (
-            f"{limits.joint_names[joint]}: {abs(error_rad):.2f} rad from its goal for {for_s:.2f} "
-            f"s with {state.current_a[joint]:.2f} A: it does not follow: is it blocked, weakened "
-            "by another program, or another joint's servo?"
+            f"{self._limits.joint_names[joint]}: {abs(error_rad):.2f} rad from its goal for "
+            f"{for_s:.2f} s with {state.current_a[joint]:.2f} A: it does not follow: is it "
+            "blocked, weakened by another program, or another joint's servo?"
+        )
+
+    def _idle_fault(self, state: JointState, goal_rad: Floats, joint: int) -> str:
+        error_rad = abs(float(goal_rad[joint] - state.position_rad[joint]))
+        _, _, per_rad, stall_a, limit_a = self._rules[:, joint]
+        expected_a = min(min(error_rad * per_rad, 1.0) * stall_a, limit_a)
+        return (
+            f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal with "
+            f"{state.current_a[joint]:.2f} A, expected about {expected_a:.2f} A: its motor does "
+            "not push: dead output stage, loose motor wire, or weakened by another program"
         )
 
 
 @compiled(
-    f"int64({_FLOATS}, {_FLOATS}, {_FLOATS}, {readonly_array('boolean')}, float64, {_FLOATS},"
-    f" {_FLOATS}, float64[::1])",
+    f"int64({', '.join([_FLOATS] * 4)}, {readonly_array('boolean')}, float64, float64,"
+    " float64[:, ::1], float64[:, ::1])",
     makes_arrays=False,
 )
-def _longest(
+def _judge(
     goal_rad: Floats,
     position_rad: Floats,
+    velocity_rad_s: Floats,
     current_a: Floats,
     valid: Bools,
     time_s: float,
-    limit_rad: Floats,
-    effort_a: Floats,
-    since_s: Floats,
+    last_s: float,
+    rules: Floats,
+    memory: Floats,
 ) -> int:
-    """Note since when each joint does not follow; the joint that has not for longest, or -1.
+    """Note for how long each joint does not follow, and for how long each motor draws no current.
 
-    A joint that was not read keeps its time.
+    A joint that was not read keeps its times. An error or a speed that shows nothing keeps the
+    time without current; a current ends it.
+
+    Args:
+        goal_rad: (J,) goals that were sent before the state.
+        position_rad: (J,)
+        velocity_rad_s: (J,)
+        current_a: (J,)
+        valid: (J,) whether the joint was read.
+        time_s: time of the state.
+        last_s: time of the state before; infinite if there is none.
+        rules: (5, J) limit of the error, rad; current towards the goal that excuses it, A; and
+            ``SafetyLimits.output``.
+        memory: (2, J) time since which a joint does not follow, or NaN; time without current, s.
+
+    Returns:
+        The first joint whose motor has drawn no current for ``IDLE_TIME_S``, else the joint that
+        has not followed for longest, else -1.
+
     """
-    longest = -1
+    step_s = min(max(time_s - last_s, 0.0), LONGEST_STEP_S)
+    longest, idle = -1, -1
     for k in range(len(goal_rad)):
-        error = goal_rad[k] - position_rad[k]
         if valid[k]:
-            towards_a = current_a[k] if error > 0.0 else -current_a[k]
-            if abs(error) > limit_rad[k] and towards_a < effort_a[k]:
-                if np.isnan(since_s[k]):
-                    since_s[k] = time_s
+            error = goal_rad[k] - position_rad[k]
+            sign = 1.0 if error > 0.0 else -1.0
+            towards_a, size = sign * current_a[k], abs(error)
+            if size > rules[0, k] and towards_a < rules[1, k]:
+                if np.isnan(memory[0, k]):
+                    memory[0, k] = time_s
             else:
-                since_s[k] = np.nan
-        if not np.isnan(since_s[k]) and (longest < 0 or since_s[k] < since_s[longest]):
+                memory[0, k] = np.nan
+            share = min(size * rules[2, k], 1.0)
+            if share >= EVIDENT_OUTPUT:
+                expected_a = min(share * rules[3, k], rules[4, k])
+                if towards_a >= IDLE_SHARE * expected_a:
+                    memory[1, k] = 0.0
+                elif share >= IDLE_OUTPUT and sign * velocity_rad_s[k] < SLOW_RAD_S:
+                    memory[1, k] += step_s
+            if idle < 0 and memory[1, k] >= IDLE_TIME_S:
+                idle = k
+        if not np.isnan(memory[0, k]) and (longest < 0 or memory[0, k] < memory[0, longest]):
             longest = k
-    return longest
+    return idle if idle >= 0 else longest

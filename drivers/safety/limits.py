@@ -6,13 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.robot import STALL_CURRENT_A, RobotConfig
+from snakewalk.config.run import FULL_OUTPUT_RAD, SafetyConfig
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 STEP_SLACK_RAD, STEP_RATE = 0.2, 2.0
 """Slack of a measured step, and its speed as a share of the goals' rate (ours): 0.36 rad in 20 ms;
 a link that falls off an edge was measured at 0.12."""
+_LEAST_LIMIT_A = 0.05
+"""A tenth of a lower limit of the current is lost in the sensor's resolution (ours)."""
 EFFORT_SHARE = 0.5
 """Of the pitch joints' current (ours); held off by the ground they were measured at over 0.8."""
 
@@ -36,6 +38,8 @@ class SafetyLimits:
     temperature_limit_c: float
     voltage_min_v: float
     voltage_max_v: float
+    voltage_time_s: float
+    """How long the supply may be too low."""
     stale_limit_s: float
     slow_stale_limit_s: float
     """The same for temperature and voltage."""
@@ -46,6 +50,9 @@ class SafetyLimits:
     current is not limited."""
     following_time_s: float
     """How long a joint may not follow."""
+    output: Floats | None = None
+    """(3, J) output of each joint's motor: share of full output for each radian of error; current
+    at full output and at rest, A; limit of the current, A. None: no joint is judged by it."""
     step_slack_rad: float = STEP_SLACK_RAD
     step_rate_rad_s: float = math.inf
     """How far a joint may be measured from its last angle: slack, and so much for each second."""
@@ -65,10 +72,23 @@ class SafetyLimits:
             temperature_limit_c=safety.temperature_limit_c,
             voltage_min_v=voltage_min_v,
             voltage_max_v=voltage_max_v,
+            voltage_time_s=safety.voltage_time_s,
             stale_limit_s=safety.stale_limit_s,
             slow_stale_limit_s=safety.slow_stale_limit_s,
             following_limit_rad=np.array(safety.following_limits_rad(robot)),
             following_effort_a=EFFORT_SHARE * np.array(robot.current_limits_a),
             following_time_s=safety.following_time_s,
+            output=_output(robot),
             step_rate_rad_s=STEP_RATE * safety.goal_rate_rad_s,
         )
+
+
+def _output(robot: RobotConfig) -> Floats:
+    """(3, J) as ``SafetyLimits.output``; the first row is 0 for a joint that cannot be judged."""
+    rows = []
+    joints = zip(robot.servo_models, robot.position_p_gains, robot.current_limits_a, strict=True)
+    for model, gain, limit_a in joints:
+        stall_a = STALL_CURRENT_A.get(model, 0.0)
+        is_judged = stall_a > 0.0 and limit_a >= _LEAST_LIMIT_A
+        rows.append((gain / FULL_OUTPUT_RAD if is_judged else 0.0, stall_a, limit_a))
+    return np.array(rows).T.copy()

@@ -14,7 +14,7 @@ from typing import Generic, Literal, Protocol, TypeVar
 
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import ChainFault, DriverError, FaultCause, PortError
+from snakewalk.drivers.errors import ChainError, ChainFault, DriverError, FaultCause, PortError
 from snakewalk.drivers.types import JointState
 
 Policy = Literal["stop", "confirm", "resume"]
@@ -27,6 +27,11 @@ class ChainComparison(Protocol):
     @property
     def faults(self) -> Sequence[ChainFault]:
         """Everything that forbids going on."""
+        ...
+
+    @property
+    def doubt(self) -> str | None:
+        """Why only a person can say that this is the same chain; None if it shows that itself."""
         ...
 
 
@@ -85,7 +90,8 @@ class Recovery(Generic[C]):
             limit: interruptions in one run after which no further one is recovered.
             overload_reboots: how often a servo that an overload has shut down is rebooted, whatever
                 the policy; with ``confirm`` an operator is asked as well.
-            confirm: asks an operator; gets what was found; without one ``confirm`` means no.
+            confirm: asks an operator; gets what was found. It is also asked, whatever the policy,
+                if no servo shows that this is the same robot. None: the answer is no.
             on_event: gets every step as one line, for the log.
 
         """
@@ -106,6 +112,7 @@ class Recovery(Generic[C]):
             stopped: called while waiting; returns a reason to give up, or None.
 
         Raises:
+            ChainError: no servo shows that this is the same robot, and nobody can be asked.
             DriverError: it broke again while going on.
 
         """
@@ -153,7 +160,11 @@ class Recovery(Generic[C]):
         if found is None:
             return None
         self._on_event(f"verified: {found}")
-        if self._policy == "confirm" and not (self._confirm and self._confirm(str(found))):
+        doubt = found.doubt if joint is None else None  # a servo that was rebooted is known to be
+        if doubt is not None and self._confirm is None:
+            raise ChainError(f"{doubt}; check that it is the same robot, then start again")
+        is_asked = self._policy == "confirm" or doubt is not None
+        if is_asked and not (self._confirm and self._confirm(str(found))):
             self._on_event("not confirmed")
             return None
         why = stopped()

@@ -72,6 +72,7 @@ class SafeLink:
         self._link = link
         self._recovery = recovery
         self._limits = limits
+        self._limits_at_start = replace(limits, voltage_time_s=0.0)
         self._clock = clock
         self._state: JointState | None = None
         self._following = FollowingError(limits)
@@ -141,7 +142,7 @@ class SafeLink:
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
         self._steps.reset()
-        self._check(state, self._memory)
+        self._check(state, self._memory, self._limits_at_start)
         self._refuse_if_tripped()
         return state
 
@@ -285,11 +286,14 @@ class SafeLink:
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
         self._steps.reset()
-        self._check(state, self._memory)
+        self._check(state, self._memory, self._limits_at_start)
         return state
 
-    def _check(self, state: JointState, memory: SafetyMemory) -> None:
-        fault, self._memory = check_state(state, memory, self._limits, self._clock.now_s())
+    def _check(
+        self, state: JointState, memory: SafetyMemory, limits: SafetyLimits | None = None
+    ) -> None:
+        now_s = self._clock.now_s()
+        fault, self._memory = check_state(state, memory, limits or self._limits, now_s)
         fault = self._stop() or fault or self._following.update(state, memory.goal_rad)
         if fault is not None:
             self._trip(fault)

@@ -21,6 +21,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.port.byte_port import is_url
 
@@ -133,7 +134,7 @@ class PressedButton:
             if not _is_mine(info) or info.st_size != _BYTES:
                 raise PermissionError(f"{path}: is no stop button of this user")
             self._map = mmap.mmap(self._file, _BYTES)
-            known = json.loads(_read_text(self._map, _RUN))
+            known = parse_json(_read_text(self._map, _RUN))
             self.run = StoppableRun(**known | {"ports": tuple(known["ports"])})
             self.since_s = info.st_mtime
             """Time of day at which it was made, s."""

@@ -2,7 +2,8 @@
 
 Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which makes the
 torque). What no healthy run shows is vetoed: values that are not numbers, a joint forced beyond its
-limit, an alarm, lasting over-current, heat, supply voltage, a state that is too old.
+limit, an alarm, lasting over-current, heat, a supply that is too high or too low for a while, a
+state that is too old.
 """
 
 import math
@@ -40,6 +41,8 @@ class SafetyMemory(NamedTuple):
     """(J,) last goals that passed; at the start the measured angles."""
     over_current_since_s: Floats
     """(J,) time of the first reading above the limit; NaN below it."""
+    under_voltage_since_s: Floats
+    """(J,) the same for a supply below its limit."""
     checked_state: CheckedState | None = None
     """The state that was checked last, if it kept the limits."""
 
@@ -47,7 +50,7 @@ class SafetyMemory(NamedTuple):
     def at_rest(state: JointState) -> "SafetyMemory":
         """Memory of joints that hold the pose in ``state``."""
         held = np.array(state.position_rad, float)
-        return SafetyMemory(state.time_s, held, _no_overcurrent(len(held)))
+        return SafetyMemory(state.time_s, held, _never(len(held)), _never(len(held)))
 
 
 class Verdict(NamedTuple):
@@ -91,7 +94,8 @@ def vet(
         veto = f"{limits.joint_names[bad]}: commanded {requested[bad]}: not a number"
         return _refused(veto, checked)
     goal.setflags(write=False)
-    memory = SafetyMemory(now_s, goal, checked.over_current_since_s, checked.checked_state)
+    over_s, under_s = checked.over_current_since_s, checked.under_voltage_since_s
+    memory = SafetyMemory(now_s, goal, over_s, under_s, checked.checked_state)
     return Verdict(goal, None, clamped, memory)
 
 
@@ -112,15 +116,17 @@ def check_state(
         if checked.age_max_s + aged_s <= limits.stale_limit_s:
             return None, last
         return stale_fault(state, limits, now_s), last
-    since_s, age_max_s = last.over_current_since_s, _age_max_s(state, last, limits)
+    over_s, under_s = last.over_current_since_s, last.under_voltage_since_s
+    age_max_s = _age_max_s(state, last, limits)
     if not age_max_s + aged_s <= limits.stale_limit_s:  # too old, or the quick check failed (NaN)
-        since_s = over_current_since_s(state, last, limits)
-        fault = state_fault(state, since_s, limits, now_s)
+        over_s = over_current_since_s(state, last, limits)
+        under_s = under_voltage_since_s(state, last, limits)
+        fault = state_fault(state, over_s, under_s, limits, now_s)
         if fault is not None:
-            return fault, SafetyMemory(last.time_s, last.goal_rad, since_s)
+            return fault, SafetyMemory(last.time_s, last.goal_rad, over_s, under_s)
         age_max_s = float(np.maximum.reduce(state.age_s))
     checked = CheckedState(state, limits, age_max_s)
-    return None, SafetyMemory(last.time_s, last.goal_rad, since_s, checked)
+    return None, SafetyMemory(last.time_s, last.goal_rad, over_s, under_s, checked)
 
 
 def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
@@ -128,9 +134,19 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
     since = last.over_current_since_s
     over = np.abs(state.current_a) > limits.current_limit_a
     if not over.any() and not np.isfinite(since).any():
-        return _no_overcurrent(len(since))
+        return _never(len(since))
     started = np.where(np.isnan(since), state.time_s, since)
     return np.where(state.valid, np.where(over, started, np.nan), since)
+
+
+def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
+    """(J,) when each supply that is too low was first measured so; NaN for the others."""
+    since = last.under_voltage_since_s
+    low = state.voltage_v < limits.voltage_min_v
+    if not low.any():
+        return _never(len(since))
+    started = np.where(np.isnan(since), state.time_s - state.slow_age_s, since)
+    return np.where(low, started, np.nan)
 
 
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
@@ -145,7 +161,11 @@ def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | 
 
 
 def state_fault(
-    state: JointState, over_since_s: Floats, limits: SafetyLimits, now_s: float
+    state: JointState,
+    over_since_s: Floats,
+    under_since_s: Floats,
+    limits: SafetyLimits,
+    now_s: float,
 ) -> str | None:
     """First reason to stop that the state gives; None if all is well.
 
@@ -155,6 +175,7 @@ def state_fault(
     if stale is not None:
         return stale
     over_s = state.time_s - over_since_s
+    under_s = state.time_s - state.slow_age_s - under_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
     # not (a <= b) also stops at a NaN, which a > b would let pass
@@ -178,7 +199,7 @@ def state_fault(
             "{:.0f} C: too hot",
         ),
         (
-            state.voltage_v < limits.voltage_min_v,
+            under_s >= limits.voltage_time_s,
             state.voltage_v,
             f"{{:.1f}} V: supply too low, under {limits.voltage_min_v:.4g} V: servo.supply_min_v "
             "of the robot, or safety.voltage_min_v of the run",
@@ -195,6 +216,8 @@ def state_fault(
             joint = int(np.argmax(bad))
             fault = f"{limits.joint_names[joint]}: " + what.format(values[joint])
             names = alarm_names(int(values[joint])) if what == "alarm" else ""
+            if what == "alarm" and not names:
+                names = "the alert bit is set, but no alarm was read from Hardware Error Status"
             return f"{fault}: {names}" if names else fault
     return None
 
@@ -221,7 +244,8 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
 
     The quick check costs a tenth of ``state_fault`` and is stricter: what fails it is left to that.
     """
-    if last.over_current_since_s is not _no_overcurrent(len(last.over_current_since_s)):
+    never = _never(len(last.over_current_since_s))
+    if last.over_current_since_s is not never or last.under_voltage_since_s is not never:
         return math.nan
     try:
         return _quick_check(
@@ -311,8 +335,8 @@ def _clamp(
 
 
 @cache
-def _no_overcurrent(joints: int) -> Floats:
-    """(J,) NaN, read-only: no current is above its limit. One array per J, compared by identity."""
+def _never(joints: int) -> Floats:
+    """(J,) NaN, read-only: no value is beyond its limit. One array per J, compared by identity."""
     since_s = np.full(joints, np.nan)
     since_s.setflags(write=False)
     return since_s

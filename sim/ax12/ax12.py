@@ -56,6 +56,7 @@ class Ax12Servos:
         """Events that happen to the servos at a time of their own, such as faults."""
         self.powered = np.ones(servos, bool)
         """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
+        self._no_output = np.zeros(servos, bool)
         self._trajectory = Trajectory(servos)
         self._turn_rad = np.zeros(servos)
         self._registered: dict[int, tuple[int, bytes]] = {}
@@ -161,6 +162,10 @@ class Ax12Servos:
         for row in rows:
             self.blocked_shaft.free(int(row))
 
+    def cut_output(self, rows: Indices, on: bool) -> None:
+        """Cut the output stages of servos off their motors, or connect them again."""
+        self._no_output[rows] = on
+
     def advance(self, until_s: float) -> None:
         """Step physics, trajectories and alarms to ``until_s``."""
         while self._time_s < until_s:
@@ -224,7 +229,8 @@ class Ax12Servos:
             inside, shaft, self._trajectory.position - np.sign(error) * margin / TICKS_PER_RAD
         )
         drive.goal_rad[:] = np.where(wheel, push / WHEEL_GAIN, aim)
-        drive.pwm_limit[:] = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
+        full = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
+        drive.pwm_limit[:] = np.where(self._no_output, 0.0, full)
         drive.current_limit_a[:] = np.inf
         self.blocked_shaft.hold()
 

@@ -2,7 +2,8 @@
 
 import random
 from collections.abc import Callable, Collection, Mapping
-from typing import Protocol
+from functools import partial
+from typing import Protocol, assert_never
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.noise import FaultScript, Noise
 from snakewalk.sim.servo.event_queue import EventQueue
 
+_Actions = tuple[Callable[[], None], Callable[[], None] | None]
+"""Actions at the beginning and at the end of a fault; None: the fault does not end."""
 _ID_KEYS = ("id", "takes", "behind")
 """Keys of a fault that name one servo."""
 
@@ -56,6 +59,10 @@ class FaultyServos(Protocol):
 
     def free_shafts(self, rows: Indices) -> None:
         """Free blocked shafts."""
+        ...
+
+    def cut_output(self, rows: Indices, on: bool) -> None:
+        """Cut the output stages of servos off their motors, or connect them again."""
         ...
 
     def cut_power(self, rows: Indices) -> None:
@@ -213,7 +220,7 @@ class FaultPlayer:
             if fault.kind not in alarms
         ]
 
-    def _schedule(self, fault: plan.Fault) -> None:
+    def _schedule(self, fault: plan.ScheduledFault) -> None:
         begin, end = self._actions(fault)
         self._servos.events.schedule(self._start_s + fault.at_s, self._then_refresh_ids(begin))
         for_s = getattr(fault, "for_s", None)
@@ -231,40 +238,51 @@ class FaultPlayer:
 
         return act
 
-    def _actions(self, fault: plan.Fault) -> tuple[Callable[[], None], Callable[[], None] | None]:
-        """Actions at the beginning and at the end of a fault."""
-        line, servos = self._line, self._servos
-        protection = servos.protection
+    def _actions(self, fault: plan.ScheduledFault) -> _Actions:
+        """Actions at the beginning and at the end of a fault; mypy reports a missing kind."""
+        line, protection = self._line, self._servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
-        if isinstance(fault, plan.PortFault):
-            return line.disconnect, line.reconnect
-        if isinstance(fault, plan.SupplyFault):
-            some = rows if len(rows) else None
-            return lambda: protection.supply(fault.volts, some), lambda: protection.supply(
-                None, some
-            )
-        if isinstance(fault, plan.UnplugFault):
-            behind = np.arange(self._rows[fault.behind] + 1, len(line.ids()))
-            return lambda: servos.cut_power(behind), lambda: servos.restore_power(behind)
-        if isinstance(fault, plan.ClashFault):
-            return lambda: self._rename(fault, True), lambda: self._rename(fault, False)
-        if isinstance(fault, plan.WriteFault):
-            return lambda: line.write_register(rows, fault.register_name, fault.value), None
-        if isinstance(fault, plan.HeatFault):
-            return lambda: protection.heat(rows, fault.celsius), None
-        if isinstance(fault, plan.TripFault):
-            return lambda: self._trip(rows, fault.kind), None
-        return self._servo_actions(fault, rows)
+        match fault:
+            case plan.PortFault():
+                return line.disconnect, line.reconnect
+            case plan.SupplyFault(volts=volts):
+                some = rows if len(rows) else None
+                return partial(protection.supply, volts, some), partial(
+                    protection.supply, None, some
+                )
+            case plan.UnplugFault(behind=behind):
+                return self._power_cut(np.arange(self._rows[behind] + 1, len(line.ids())))
+            case plan.ClashFault():
+                return partial(self._rename, fault, True), partial(self._rename, fault, False)
+            case plan.WriteFault(register_name=name, value=value):
+                return partial(line.write_register, rows, name, value), None
+            case plan.HeatFault(celsius=celsius):
+                return partial(protection.heat, rows, celsius), None
+            case plan.TripFault(kind=kind):
+                return partial(self._trip, rows, kind), None
+            case plan.ServoFault():
+                return self._servo_actions(fault, rows)
+            case unknown:
+                assert_never(unknown)
 
-    def _servo_actions(
-        self, fault: plan.Fault, rows: Indices
-    ) -> tuple[Callable[[], None], Callable[[], None]]:
+    def _servo_actions(self, fault: plan.ServoFault, rows: Indices) -> _Actions:
         line, servos = self._line, self._servos
-        if fault.kind == "mute":
-            return lambda: line.mute(rows, True), lambda: line.mute(rows, False)
-        if fault.kind == "stuck":
-            return lambda: servos.block_shafts(rows), lambda: servos.free_shafts(rows)
-        return lambda: servos.cut_power(rows), lambda: servos.restore_power(rows)
+        match fault.kind:
+            case "mute":
+                return partial(line.mute, rows, True), partial(line.mute, rows, False)
+            case "stuck":
+                return partial(servos.block_shafts, rows), partial(servos.free_shafts, rows)
+            case "no_output":
+                return partial(servos.cut_output, rows, True), partial(
+                    servos.cut_output, rows, False
+                )
+            case "brown_out":
+                return self._power_cut(rows)
+            case unknown:
+                assert_never(unknown)
+
+    def _power_cut(self, rows: Indices) -> _Actions:
+        return partial(self._servos.cut_power, rows), partial(self._servos.restore_power, rows)
 
     def _rename(self, fault: plan.ClashFault, begins: bool) -> None:
         new, old = (fault.takes, fault.id) if begins else (fault.id, fault.takes)

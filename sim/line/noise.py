@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Callable, Collection
-from typing import Protocol
+from typing import Protocol, assert_never
 
 from snakewalk.config import faults as plan
 
@@ -63,18 +63,25 @@ class Noise:
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
     def _one(self, fault: plan.NoiseFault, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
-        if fault.kind == "drop" or not data:
+        """Packets that arrive in place of one; mypy reports a missing kind."""
+        if not data:
             return []
-        if fault.kind == "corrupt":
-            at, bit = self._random.randrange(len(data)), self._random.randrange(8)
-            data = data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :]
-        if fault.kind == "truncate":
-            data = data[: self._random.randrange(1, max(2, len(data)))]
-        if fault.kind == "duplicate":
-            return [(slow_s, data), (slow_s, data)]
-        if fault.kind in ("delay", "late"):
-            slow_s += fault.by_s or (DELAY_S if fault.kind == "delay" else LATE_S)
-        return [(slow_s, data)]
+        match fault.kind:
+            case "drop":
+                return []
+            case "corrupt":
+                at, bit = self._random.randrange(len(data)), self._random.randrange(8)
+                return [(slow_s, data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :])]
+            case "truncate":
+                return [(slow_s, data[: self._random.randrange(1, max(2, len(data)))])]
+            case "duplicate":
+                return [(slow_s, data), (slow_s, data)]
+            case "delay":
+                return [(slow_s + (fault.by_s or DELAY_S), data)]
+            case "late":
+                return [(slow_s + (fault.by_s or LATE_S), data)]
+            case unknown:
+                assert_never(unknown)
 
 
 class FaultScript(Protocol):

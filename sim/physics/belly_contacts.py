@@ -8,7 +8,6 @@ ground, such as feet and obstacles.
 """
 
 import copy
-import ctypes
 from dataclasses import dataclass
 
 import mujoco
@@ -36,8 +35,6 @@ class BellyContacts:
 
     words: NDArray[np.int64]
     """(C, words of an ``mjContact``) what is the same in every step."""
-    hessian: tuple[int, int]
-    """Words among them that stay as they are: a contact without friction has no use for them."""
     geoms: NDArray[np.int32]
     """(C, 2) plane and belly."""
     shapes_m: Floats
@@ -62,23 +59,18 @@ class BellyContacts:
         whole = (bellies.sum() + (bellies & capsule).sum()) * each
         if count != whole or (data.contact.dim != 1).any():
             return None
-        size = layout.contact_size
-        address = data.contact.dist.ctypes.data
-        memory = (ctypes.c_int64 * (count * size // _WORD)).from_address(address)
-        words = np.array(memory, np.int64).reshape(count, size // _WORD)
+        words = layout.contact_words(data)
         geoms = data.contact.geom.astype(np.int32)
         is_capsule = capsule[geoms[:, 1]]
         second = np.concatenate([[False], (geoms[1:] == geoms[:-1]).all(axis=1)])
         along_m = np.where(is_capsule, model.geom_size[geoms[:, 1], 1], 0.0)
         along_m[second] *= -1.0
         shapes = along_m, model.geom_size[geoms[:, 1], 0], data.contact.includemargin
-        first, last = (offset // _WORD for offset in layout.contact_hessian)
-        return cls(words, (first, last), geoms, np.stack(shapes, axis=1), _reach_m2(model, bellies))
+        return cls(words, geoms, np.stack(shapes, axis=1), _reach_m2(model, bellies))
 
 
 NO_CONTACTS = BellyContacts(
     np.zeros((0, 1), np.int64),
-    (0, 0),
     np.zeros((0, 2), np.int32),
     np.zeros((0, 3)),
     np.zeros((0, 0)),
@@ -165,7 +157,8 @@ def write_contacts(
 
     Args:
         reals: room for all contacts, as numbers.
-        at: where in a contact stand distance, place and normal, in words, and ``hessian``.
+        at: where in a contact stand distance, place and normal, in words; begin
+            and end of the words that stay as they are: contacts without friction do not use them.
         words: of ``BellyContacts``, and the two below.
         geoms: likewise.
         shapes_m: likewise.

@@ -12,6 +12,7 @@ without friction.
 """
 
 import math
+from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -166,7 +167,7 @@ def mjcf(
     overlapping = "".join(
         f'<exclude body1="link{i}" body2="link{j}"/>' for i, j in overlapping_links(robot)
     )
-    return f"""<mujoco model="{robot.name}">
+    return f"""<mujoco model={quoteattr(robot.name)}>
   <compiler angle="radian" autolimits="true"/>
   <option timestep="{step_s!r}" gravity="0 0 {-GRAVITY_M_S2!r}" integrator="Euler" solver="Newton"
     {options}/>

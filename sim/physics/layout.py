@@ -1,16 +1,23 @@
-"""Where MuJoCo keeps a step's contacts in memory, so that compiled code can follow them.
+"""The private interface of MuJoCo: the memory of ``mjData`` and C functions by address.
 
-The arrays of ``mjData`` never move, except those of the contact solver, which are laid out anew in
-every step. The offsets come from the description of the C structures that the mujoco package
-carries, and are checked against the addresses that its Python objects show.
+Nothing else in snakewalk reads them. The arrays of ``mjData`` never move, except those of the
+contact solver, which each step lays out again. The offsets come from the description of the C
+structures in the mujoco package. ``step_layout`` checks them once per process.
 """
 
+import contextlib
 import ctypes
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any, Final
 
 import mujoco
-from mujoco.introspect import ast_nodes, structs
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.drivers.fallbacks import is_forced
+from snakewalk.sim.physics.step_memory import FUNCTIONS, POINTERS, WHOLE
 
 _PLAIN: dict[str, type] = {
     "int": ctypes.c_int,
@@ -24,76 +31,94 @@ _PLAIN: dict[str, type] = {
     "mjtBool": ctypes.c_uint8,
     "mjtByte": ctypes.c_uint8,
 }
+_POINTERS: Final = (ctypes.c_void_p,) * 3
+_IN_DATA: Final = POINTERS[2:]
+_WORD: Final = 8
 _BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body pos="0 0 .09"><freejoint/><geom size=".1"/></body></worldbody></mujoco>"""
 
 
 @dataclass(frozen=True, slots=True)
 class StepLayout:
-    """Byte offsets in ``mjData`` and ``mjContact``, and what compiled code calls."""
+    """Byte offsets in ``mjData`` and ``mjContact``, and addresses of C functions."""
 
-    time: int
-    ncon: int
-    contact: int
-    efc_force: int
-    contact_size: int
-    contact_dist: int
-    contact_pos: int
-    contact_normal: int
-    contact_geom: int
-    contact_row: int
-    """Of a contact's first row in ``efc_force``, -1 for none."""
-    contact_hessian: tuple[int, int]
-    """Begin and end of what the solver notes of a contact with friction."""
-    kinematics_address: int
-    """Of ``mj_kinematics(model, data)``: where everything is."""
-    step1_address: int
-    """Of the C function ``mj_step1(model, data)``: all that follows from position and velocity."""
-    step2_address: int
-    """Of ``mj_step2(model, data)``: forces, and the state after them."""
-    parena: int
-    """Bytes of the arena that are taken, the contacts first."""
-    parts: tuple[int, ...]
-    """Addresses of the ``STEP1_PARTS``; none where this MuJoCo has not all of them."""
+    data: Mapping[str, int]
+    """Of ``step_memory.POINTERS`` in ``mjData``."""
+    contact: Mapping[str, int]
+    """``step_memory.CONTACT``."""
+    functions: Mapping[str, int]
+    """``step_memory.FUNCTIONS``: all, or the first three."""
 
+    @property
+    def has_parts(self) -> bool:
+        """Whether ``mj_step1`` can be called by parts."""
+        return len(self.functions) == len(FUNCTIONS)
 
-STEP1_PARTS = (
-    *("mj_checkPos", "mj_checkVel", "mj_comPos", "mj_makeM", "mj_factorM", "mj_collision"),
-    *("mj_makeConstraint", "mj_projectConstraint", "mj_fwdVelocity", "mj_addContact"),
-)
-"""Of ``mj_step1`` all that a chain without actuators, sensors and cameras needs; and what adds a
-contact. Left out is the search for islands: a chain is one."""
+    def fields(self, model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, int]:
+        """Return the fields of a ``step_memory.STEP_MEMORY`` that concern MuJoCo's memory."""
+        return {
+            "model_at": model._address,
+            "data_at": data._address,
+            **{f"{name}_at": data._address + offset for name, offset in self.data.items()},
+            **{f"contact_{name}": value for name, value in self.contact.items()},
+            **{f"{name}_at": address for name, address in self.functions.items()},
+        }
+
+    def contact_words(self, data: mujoco.MjData) -> NDArray[np.int64]:
+        """Copy the present contacts as (contacts, words of eight bytes)."""
+        size = data.ncon * self.contact["size"] // _WORD
+        memory = (ctypes.c_int64 * size).from_address(data.contact.dist.ctypes.data)
+        return np.array(memory, np.int64).reshape(data.ncon, -1)
 
 
 @cache
-def step_layout() -> StepLayout | None:
-    """Offsets for this MuJoCo, or None where they cannot be verified on a ball on a floor."""
+def step_layout() -> StepLayout | str:
+    """Return the layout of this MuJoCo, or the reason why it cannot be used.
+
+    It is checked on a ball on a floor: addresses against those that MuJoCo's Python objects show,
+    and a step by parts, with a contact written in place, against ``mj_step``.
+    """
+    if is_forced("mujoco"):
+        return "the environment asks for it"
     try:
-        of_data, of_contact = _structure("mjData"), _structure("mjContact")
-        layout = StepLayout(
-            time=of_data.time.offset,
-            ncon=of_data.ncon.offset,
-            contact=of_data.contact.offset,
-            efc_force=of_data.efc_force.offset,
-            contact_size=ctypes.sizeof(of_contact),
-            contact_dist=of_contact.dist.offset,
-            contact_pos=of_contact.pos.offset,
-            contact_normal=of_contact.frame.offset,
-            contact_geom=of_contact.geom.offset,
-            contact_row=of_contact.efc_address.offset,
-            contact_hessian=(of_contact.H.offset, of_contact.H.offset + of_contact.H.size),
-            kinematics_address=_address("mj_kinematics"),
-            step1_address=_address("mj_step1"),
-            step2_address=_address("mj_step2"),
-            parena=of_data.parena.offset,
-            parts=_parts(),
-        )
-    except (KeyError, AttributeError, OSError):
-        return None
-    return layout if _verified(layout, of_data) else None
+        layout, arrays = _described()
+    except ImportError:
+        return "it does not describe its memory"
+    except (KeyError, AttributeError, OSError) as error:
+        return f"its memory is not described as expected ({error})"
+    if not _is_as_shown(layout, arrays):
+        return "its memory is not as it describes it"
+    if layout.has_parts and not _steps_by_parts(layout):
+        return StepLayout(layout.data, layout.contact, _addresses(FUNCTIONS[:WHOLE]))
+    return layout
 
 
-def _structure(name: str) -> type[ctypes.Structure]:
+def _described() -> tuple[StepLayout, dict[str, int]]:
+    """Return the layout that MuJoCo describes, and offsets in ``mjData`` of two arrays."""
+    data, contact = _structure("mjData"), _structure("mjContact")
+    hessian = contact.H.offset // _WORD
+    fields = {
+        "size": ctypes.sizeof(contact),
+        "dist": contact.dist.offset,
+        "place": contact.pos.offset,
+        "normal": contact.frame.offset,
+        "geom": contact.geom.offset,
+        "row": contact.efc_address.offset,
+        "hessian_begin": hessian,
+        "hessian_end": hessian + contact.H.size // _WORD,
+    }
+    functions = _addresses(FUNCTIONS[:WHOLE])
+    with contextlib.suppress(AttributeError):  # one of them is not exported
+        functions = _addresses(FUNCTIONS)
+    offsets = {name: getattr(data, name).offset for name in _IN_DATA}
+    arrays = {name: getattr(data, name).offset for name in ("qpos", "qvel")}
+    return StepLayout(offsets, fields, functions), arrays
+
+
+def _structure(name: str) -> Any:
+    """Return a structure of MuJoCo as one of ctypes."""
+    from mujoco.introspect import ast_nodes, structs  # noqa: PLC0415  MuJoCo 3.2 lacks it
+
     fields = []
     for member in structs.STRUCTS[name].fields:
         if not isinstance(member, ast_nodes.StructFieldDecl):
@@ -102,7 +127,9 @@ def _structure(name: str) -> type[ctypes.Structure]:
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def _ctype(kind: object) -> type:
+def _ctype(kind: object) -> Any:
+    from mujoco.introspect import ast_nodes  # noqa: PLC0415
+
     if isinstance(kind, ast_nodes.PointerType):
         return ctypes.c_void_p
     if isinstance(kind, ast_nodes.ArrayType):
@@ -114,46 +141,78 @@ def _ctype(kind: object) -> type:
     return _PLAIN[name] if name in _PLAIN else _structure(name)
 
 
-def _address(function: str) -> int:
-    """Find a C function in the library that the Python module itself is linked to."""
+def _addresses(functions: Iterable[str]) -> dict[str, int]:
+    """Find C functions in the library that the Python module itself is linked to."""
     library = ctypes.CDLL(mujoco._functions.__file__)
-    address = ctypes.cast(getattr(library, function), ctypes.c_void_p).value
-    if address is None:
-        raise OSError(f"{function} is not exported")
-    return address
+    found = {name: ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in functions}
+    return {name: address for name, address in found.items() if address}
 
 
-def _parts() -> tuple[int, ...]:
-    try:
-        return tuple(map(_address, STEP1_PARTS))
-    except AttributeError:
-        return ()
-
-
-def _verified(layout: StepLayout, of_data: type[ctypes.Structure]) -> bool:
+def _ball() -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = mujoco.MjModel.from_xml_string(_BALL)
-    data = mujoco.MjData(model)
+    return model, mujoco.MjData(model)
+
+
+def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
+    """Whether numbers and addresses in memory are those of MuJoCo's Python objects."""
+    model, data = _ball()
     mujoco.mj_step(model, data)
 
-    def at(offset: int, kind: type) -> float:
-        value: float = kind.from_address(data._address + offset).value  # type: ignore[attr-defined]
+    def at(offset: int, kind: Any) -> float:
+        value: float = kind.from_address(data._address + offset).value
         return value
 
-    contacts = data.contact
-    stable = of_data.qpos.offset, of_data.qvel.offset
-    return (
+    contacts, fields, offset = data.contact, layout.contact, layout.data
+    first = contacts.dist.ctypes.data
+    return bool(
         data.ncon > 0
-        and at(layout.time, ctypes.c_double) == data.time > 0.0
-        and at(layout.ncon, ctypes.c_int) == data.ncon
-        and at(layout.contact, ctypes.c_size_t) == contacts.dist.ctypes.data
-        and at(layout.parena, ctypes.c_size_t) >= data.ncon * layout.contact_size
-        and at(layout.efc_force, ctypes.c_size_t) == data.efc_force.ctypes.data
-        and at(stable[0], ctypes.c_size_t) == data.qpos.ctypes.data
-        and at(stable[1], ctypes.c_size_t) == data.qvel.ctypes.data
-        and layout.contact_size == contacts.dist.strides[0]
-        and layout.contact_dist == 0
-        and layout.contact_pos == contacts.pos.ctypes.data - contacts.dist.ctypes.data
-        and layout.contact_normal == contacts.frame.ctypes.data - contacts.dist.ctypes.data
-        and layout.contact_geom == contacts.geom.ctypes.data - contacts.dist.ctypes.data
-        and layout.contact_row == contacts.efc_address.ctypes.data - contacts.dist.ctypes.data
+        and at(offset["time"], ctypes.c_double) == data.time > 0.0
+        and at(offset["ncon"], ctypes.c_int) == data.ncon
+        and at(offset["contact"], ctypes.c_size_t) == first
+        and at(offset["parena"], ctypes.c_size_t) >= data.ncon * fields["size"]
+        and at(offset["efc_force"], ctypes.c_size_t) == data.efc_force.ctypes.data
+        and at(arrays["qpos"], ctypes.c_size_t) == data.qpos.ctypes.data
+        and at(arrays["qvel"], ctypes.c_size_t) == data.qvel.ctypes.data
+        and fields["size"] == contacts.dist.strides[0]
+        and fields["dist"] == 0
+        and fields["place"] == contacts.pos.ctypes.data - first
+        and fields["normal"] == contacts.frame.ctypes.data - first
+        and fields["geom"] == contacts.geom.ctypes.data - first
+        and fields["row"] == contacts.efc_address.ctypes.data - first
     )
+
+
+def _steps_by_parts(layout: StepLayout) -> bool:
+    """Whether steps by parts, with their contact written in place, are ``mj_step`` to the bit."""
+    model, whole = _ball()
+    _, parts = _ball()
+    part, add = ctypes.CFUNCTYPE(None, *_POINTERS[:2]), ctypes.CFUNCTYPE(ctypes.c_int, *_POINTERS)
+    calls = {name: part(address) for name, address in layout.functions.items()}
+    add_contact = add(layout.functions["mj_addContact"])
+    for _ in range(3):
+        mujoco.mj_step(model, whole)
+        for name in FUNCTIONS[WHOLE:-4]:
+            if name == "mj_comPos":
+                calls["mj_kinematics"](model._address, parts._address)
+            calls[name](model._address, parts._address)
+        words, fields = layout.contact_words(parts), layout.fields(model, parts)
+        count = len(words)
+        if count != 1:
+            return False
+        ctypes.c_int.from_address(fields["ncon_at"]).value = 0
+        if add_contact(model._address, parts._address, words.ctypes.data) != 0:
+            return False
+        begin, end = layout.contact["hessian_begin"], layout.contact["hessian_end"]
+        first = parts.contact.dist.ctypes.data
+        ctypes.memmove(first, words.ctypes.data, begin * _WORD)
+        ctypes.memmove(
+            first + end * _WORD, words.ctypes.data + end * _WORD, (words.shape[1] - end) * _WORD
+        )
+        ctypes.c_int.from_address(fields["ncon_at"]).value = count
+        ctypes.c_int64.from_address(fields["parena_at"]).value = count * layout.contact["size"]
+        for name in (*FUNCTIONS[-4:-1], "mj_step2"):
+            calls[name](model._address, parts._address)
+        pairs = ((whole.qpos, parts.qpos), (whole.qvel, parts.qvel))
+        if any(one.tobytes() != other.tobytes() for one, other in pairs):
+            return False
+    return whole.efc_force.tobytes() == parts.efc_force.tobytes()

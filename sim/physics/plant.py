@@ -2,7 +2,6 @@
 
 import math
 from functools import partial
-from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -20,7 +19,7 @@ from snakewalk.sim.physics.body import build_model
 from snakewalk.sim.physics.mechanics import Mechanics, PhysicsError
 from snakewalk.sim.physics.obstacles import place_at_obstacle, start_fault
 from snakewalk.sim.physics.placing import float_at, lay_down, place
-from snakewalk.sim.physics.stepper import CompiledSteps
+from snakewalk.sim.physics.stepper import Steps, make_steps
 from snakewalk.sim.plant import LinkMotion, ServoDrive
 
 FLOOR_STEP_S = 0.002
@@ -42,21 +41,8 @@ def _pose(place: Floats, pose: Floats) -> None:
     pose[3, 2] = w * w - x * x - y * y + z * z
 
 
-class Steps(Protocol):
-    """Drive, friction and ``mj_step``, a number of times."""
-
-    def run(self, steps: int, drive: ServoDrive) -> float:
-        """Advance ``steps`` steps; MuJoCo's time then."""
-        ...
-
-
 class MujocoPlant:
-    """A chain on its ground; starts straight at the origin, heading along x, at rest.
-
-    Raises:
-        PhysicsError: the memory layout of the installed MuJoCo cannot be verified.
-
-    """
+    """A chain on its ground; starts straight at the origin, heading along x, at rest."""
 
     def __init__(
         self,
@@ -84,7 +70,7 @@ class MujocoPlant:
         self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
         self._place_body((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
-        self.steps: Steps = CompiledSteps(self.mechanics)
+        self.steps: Steps = make_steps(self.mechanics)
         """The loop that advances the body."""
 
     @property

@@ -87,6 +87,8 @@ class Firmware:
         self._held = np.zeros(joints, bool)
         self.powered = np.ones(joints, bool)
         """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
+        self.no_output = np.zeros(joints, bool)
+        """(S,) whether the output stage is dead: registers show a servo that works."""
         self.events = EventQueue()
         """Events that happen to the servos at a time of their own, such as faults."""
         self.control_loops = ControlLoops(bank, self.drive, motor)
@@ -172,7 +174,7 @@ class Firmware:
         if self.control_loops.active and not was_active:
             self._control_s = self._time_s + CONTROL_S
         full = np.abs(bank["Goal PWM"].astype(float)) / PWM_FULL
-        drive.pwm_limit[:] = full
+        drive.pwm_limit[:] = np.where(self.no_output, 0.0, full)
         self.protection.full = np.where(full > 0.0, full, 1.0)  # 0 of 0 is no effort
         self._push = np.zeros(len(bank))
         for pushing, goal in ((PWM_MODE, "Goal PWM"), (CURRENT_MODE, "Goal Current")):
@@ -282,6 +284,11 @@ class Firmware:
         """Free blocked shafts."""
         for row in rows:
             self.blocked_shaft.free(int(row))
+        self.apply_registers()
+
+    def cut_output(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Cut the output stages of servos off their motors, or connect them again."""
+        self.no_output[rows] = on
         self.apply_registers()
 
     def cut_power(self, rows: NDArray[np.intp]) -> None:

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-import typer
+import pytest
 
-from snakewalk.controller.cli.command_line import app
+from tests.helpers.command import command_words
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "helpers" / "base_install.py"
@@ -37,18 +37,6 @@ def call(folder: Path, *commands: tuple[str, ...]) -> list[Result]:
     )
     assert ran.returncode == 0, ran.stderr
     return [Result(*row) for row in json.loads(ran.stdout)]
-
-
-def commands() -> list[tuple[str, ...]]:
-    found: list[tuple[str, ...]] = []
-
-    def walk(command: object, words: tuple[str, ...]) -> None:
-        found.append(words)
-        for name, inner in getattr(command, "commands", {}).items():
-            walk(inner, (*words, name))
-
-    walk(typer.main.get_command(app), ())  # type: ignore[arg-type]
-    return found
 
 
 BASE = [
@@ -105,3 +93,61 @@ JOB = (
     *("--set", "run.time_limit_s=5", *ON_SERVOS),
 )
 EXPORT = ("export", "gait/log.mcap", "--csv", "tables", "--foxglove", "f.mcap", "--json")
+HELP = [(*words, "--help") for words in command_words()]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, ...], Result]:
+    """Every command above, each once, in one interpreter: importing takes longer than running."""
+    words = [GAIT, JOB, EXPORT, *BASE, *(words for words, _ in NEEDY), *HELP]
+    return dict(zip(words, call(tmp_path_factory.mktemp("base"), *words), strict=True))
+
+
+def test_a_motion_runs_on_servos(results: dict[tuple[str, ...], Result]) -> None:
+    ran = results[GAIT]
+    assert ran.code == 0, ran.err
+    result = json.loads(ran.out)
+    assert result["tripped"] is None
+    assert result["duration_s"] > 2.0
+    assert result["report"] is None
+    assert result["film"] is None
+    assert "snakewalk: no film: films need MuJoCo and PyAV: pip install" in ran.err
+    assert "snakewalk: no report: the report needs matplotlib and Plotly: pip install" in ran.err
+
+
+def test_a_log_becomes_tables_and_a_scene(results: dict[tuple[str, ...], Result]) -> None:
+    ran = results[EXPORT]
+    assert ran.code == 0, ran.err
+    assert json.loads(ran.out)["written"]["tables/cycle.csv"] > 100
+
+
+def test_a_job_runs_on_servos_by_its_joints_alone(results: dict[tuple[str, ...], Result]) -> None:
+    ran = results[JOB]
+    assert ran.code in {0, 1}, ran.err
+    assert json.loads(ran.out)["tripped"] is None
+
+
+@pytest.mark.parametrize("words", BASE, ids=" ".join)
+def test_a_command_needs_no_extra(
+    words: tuple[str, ...], results: dict[tuple[str, ...], Result]
+) -> None:
+    ran = results[words]
+    assert ran.code == 0, ran.err
+
+
+@pytest.mark.parametrize(("words", "extra"), NEEDY, ids=[" ".join(words) for words, _ in NEEDY])
+def test_a_command_that_needs_an_extra_names_it(
+    words: tuple[str, ...], extra: str, results: dict[tuple[str, ...], Result]
+) -> None:
+    ran = results[words]
+    assert ran.code == 2, ran.err
+    lines = [line for line in ran.err.splitlines() if line.startswith("snakewalk: ")]
+    assert len(lines) == 1, ran.err
+    assert f"pip install 'snakewalk[{extra}]'" in lines[0]
+
+
+def test_help_of_every_command(results: dict[tuple[str, ...], Result]) -> None:
+    assert len(HELP) > 25
+    for words in HELP:
+        assert results[words].code == 0, results[words].err
+        assert "Usage: " in results[words].out

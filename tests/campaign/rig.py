@@ -1,7 +1,8 @@
 """A chain of simulated servos under faults, and a witness who knows what is true.
 
 The witness stamps every reading: during cycle k the servo of row j reports a current that encodes
-(k, j), so a value from another cycle or another servo is known at sight. And it reads every packet
+(k, j), with the sign of its true current, so a value from another cycle or another servo is known
+at sight. And it reads every packet
 on the wire, so a goal beyond a limit is seen where it counts.
 """
 
@@ -240,13 +241,15 @@ class Rig:
 
         def stamped() -> None:
             plain()
-            bank["Present Current"][:] = self._cycle % _STAMPS * 8 + rows + 1
+            sign = np.where(bank["Present Current"] < 0, -1, 1)
+            stamp = self._cycle % _STAMPS * 8 + rows + 1
+            bank["Present Current"][:] = np.where(firmware.no_output, 0, sign * stamp)
 
         firmware.refresh_motion = stamped  # type: ignore[method-assign]
 
     def _check_values(self, state: JointState, before: JointState | None) -> None:
-        stamp = np.rint(state.current_a / self._units.a_per_current).astype(int)
-        ok = state.valid
+        stamp = np.rint(np.abs(state.current_a) / self._units.a_per_current).astype(int)
+        ok = state.valid & (stamp > 0)  # without an output stage there is no current to stamp
         old = ok & ((stamp - 1) // 8 != self._cycle % _STAMPS)
         foreign = ok & ~old & ((stamp - 1) % 8 != np.arange(JOINTS)) & (not self.clashing)
         self._sin("old", old)
@@ -257,7 +260,7 @@ class Rig:
                 & (state.current_a == before.current_a)
                 & (state.age_s > before.age_s)
             )
-            self._sin("not_held", ~ok & ~held)
+            self._sin("not_held", ~state.valid & ~held)
 
     def _here_rad(self) -> np.ndarray:
         """(J,) where the servo of each joint is."""

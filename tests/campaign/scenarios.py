@@ -8,7 +8,7 @@ from snakewalk.config.faults import FaultPlan
 from .rig import ROBOT
 
 NOISE = ("drop", "corrupt", "truncate", "duplicate", "delay", "late")
-SERVO = ("mute", "stuck", "brown_out")
+SERVO = ("mute", "stuck", "brown_out", "no_output")
 TRIPS = ("reboot", "overload", "overheating", "voltage", "encoder", "shock")
 WRITES = {
     "P gain": ("Position P Gain", (50, 400, 3000)),

@@ -1,11 +1,18 @@
 """What is compiled is what is written, with and without arrays of its own."""
 
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
+from pytest_mock import MockerFixture
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers import compiling, fallbacks
 from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.drivers.fallbacks import ENVIRONMENT, fallbacks_in_use
 
 
 def doubled(values: Floats, out: Floats) -> float:
@@ -38,3 +45,65 @@ def test_a_loop_that_makes_an_array_has_to_say_so() -> None:
 
     with pytest.raises(NumbaError):
         compiled(f"float64({readonly_array(layout='C')})", makes_arrays=False)(gathered)
+
+
+@pytest.fixture
+def checked_again(mocker: MockerFixture, tmp_path: Path) -> Iterator[None]:
+    """The check of numba's private option runs again, and numba's cache is empty."""
+    mocker.patch("numba.config.CACHE_DIR", str(tmp_path))
+    mocker.patch.dict(fallbacks._reported, clear=True)
+    compiling._can_skip_counting.cache_clear()
+    yield
+    compiling._can_skip_counting.cache_clear()
+
+
+def counts(loop: Any) -> bool:
+    """Whether a compiled loop was made with the counting of references."""
+    return "NRT_" in next(iter(loop.inspect_llvm().values()))
+
+
+def nothing(values: Floats) -> float:
+    return 0.0
+
+
+SIGNATURE = f"float64({readonly_array(layout='C')}, float64[::1])"
+
+
+@pytest.mark.usefixtures("checked_again")
+def test_numba_without_the_option_counts_references_and_has_the_same_bits(
+    mocker: MockerFixture, tmp_path: Path
+) -> None:
+    usual = compiled(SIGNATURE, makes_arrays=False)(doubled)
+    compiling._can_skip_counting.cache_clear()
+    mocker.patch("numba.config.CACHE_DIR", str(tmp_path / "other"))
+    mocker.patch.object(compiling, "_UNCOUNTED", {"_unknown": False})
+    loop = compiled(SIGNATURE, makes_arrays=False)(doubled)
+    values = np.random.default_rng(3).normal(size=50)
+    ends = []
+    for each in (usual, loop):
+        out = np.zeros(49)
+        ends.append((each(values, out), out.tobytes()))
+    assert ends[0] == ends[1]
+    assert not counts(usual)
+    assert counts(loop)
+    (text,) = fallbacks_in_use()
+    assert "_nrt is not usable (KeyError)" in text
+
+
+@pytest.mark.usefixtures("checked_again")
+def test_the_environment_forces_counted_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(ENVIRONMENT, "numba")
+    forced = compiled(SIGNATURE, makes_arrays=False)(doubled)
+    assert forced._cache.__class__.__name__ == "NullCache"
+    monkeypatch.delenv(ENVIRONMENT)
+    compiling._can_skip_counting.cache_clear()
+    assert counts(forced)
+    assert len(fallbacks_in_use()) == 1
+
+
+@pytest.mark.usefixtures("checked_again")
+def test_an_option_that_compiles_wrongly_is_not_used(mocker: MockerFixture) -> None:
+    mocker.patch.object(compiling, "_doubled", nothing)
+    assert not compiling._can_skip_counting()
+    (text,) = fallbacks_in_use()
+    assert "is wrong" in text

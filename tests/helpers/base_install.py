@@ -15,22 +15,9 @@ from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType, TracebackType
 from typing import Any
 
-BLOCKED = frozenset(
-    (
-        *(
-            "mujoco",
-            "matplotlib",
-            "mpl_toolkits",
-            "plotly",
-            "av",
-            "cv2",
-            "skimage",
-            "imageio",
-            "PIL",
-        ),
-        *("h5py", "trimesh", "distributed", "dask", "rosbags", "pyarrow", "gymnasium"),
-    )
-)
+from snakewalk.config.extras import EXTRAS
+
+BLOCKED = frozenset(EXTRAS)
 
 
 class BaseInstallFinder(PathFinder):
@@ -55,7 +42,7 @@ def hide_extras() -> None:
 
 def simulate_port() -> None:
     """Replace the serial port by simulated servos."""
-    from snakewalk.drivers.port import serial_port
+    from snakewalk.drivers.port import network_port, serial_port
     from snakewalk.sim.serve.bench_line import bench_line
     from snakewalk.sim.serve.chain_spec import parse_chain
 
@@ -65,7 +52,7 @@ def simulate_port() -> None:
         latency_s = 0.02
         latency_timer_ms = None
 
-        def __init__(self, device: str, baud: int = 1_000_000) -> None:
+        def __init__(self, device: str, baud: int = 1_000_000, clock: object = None) -> None:
             self._line = bench_line(parse_chain("1-16"), baud)
 
         def __getattr__(self, name: str) -> Any:
@@ -83,6 +70,7 @@ def simulate_port() -> None:
             pass
 
     serial_port.SerialPort = SimulatedPort  # type: ignore[assignment, misc]
+    network_port.SerialPort = SimulatedPort  # type: ignore[attr-defined]
 
 
 def call(words: Sequence[str]) -> tuple[int, str, str]:

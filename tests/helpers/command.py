@@ -7,6 +7,7 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 from snakewalk.controller.cli.main import main
+from snakewalk.controller.console.plugins import own_plugins
 
 
 class Ended(NamedTuple):
@@ -31,3 +32,10 @@ def snakewalk(*words: str) -> Ended:
         except SystemExit as ended:
             code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     return Ended(code, out.getvalue(), err.getvalue())
+
+
+def command_words() -> list[tuple[str, ...]]:
+    """Return the words of the program itself, of each family, and of each command."""
+    commands = [tuple(each.name.split()) for each in own_plugins() if each.kind == "command"]
+    families = dict.fromkeys(words[:end] for words in commands for end in range(len(words)))
+    return [*families, *commands]

@@ -19,7 +19,7 @@ _SERVER = get_context("forkserver")
 _SERVER.set_forkserver_preload(
     [
         "tests.helpers.swing_child",
-        "snakewalk.controller.bench.commands.bus",
+        "snakewalk.controller.bench.commands.bus_serve",
         "snakewalk.controller.run.factory",
         "snakewalk.sim.serve.pty",
     ]

@@ -1,20 +1,30 @@
 """``snakewalk body``: a solid body from skeletons and widths, and a skin that moves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from types import ModuleType
+from typing import Annotated
 
+import numpy as np
 import typer
+from PIL import Image as Pillow
+from PIL import UnidentifiedImageError
 
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.animals.mesh import body_model as model
-from snakewalk.controller.animals.mesh.body_model import pose, straight
+from snakewalk.controller.animals.mesh.body_model import BodyModel, pose, straight
 from snakewalk.controller.animals.mesh.body_motion import animated
+from snakewalk.controller.animals.mesh.body_skin import (
+    BodySkin,
+    Cut,
+    body_skin,
+    is_skin,
+    model_skin,
+)
 from snakewalk.controller.animals.mesh.mesh import body_mesh
 from snakewalk.controller.animals.mesh.rig import spine_rig
+from snakewalk.controller.animals.mesh.skin_file import write_skin
 from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import RECORDINGS, command
@@ -24,18 +34,35 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.images.mesh import Mesh
+from snakewalk.controller.images.mesh_files import MESH_ENDINGS, mesh_files, write_mesh
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from snakewalk.controller.animals.mesh.body_model import BodyModel
-    from snakewalk.controller.animals.mesh.body_skin import BodySkin
-    from snakewalk.controller.images.mesh import Mesh
-
-    Floats = NDArray[np.float64]
-    Image = NDArray[np.uint8]
+Animate = Annotated[
+    str | None,
+    typer.Option(
+        help="what moves it: a recording, the log of a run, or a spine gait",
+        autocompletion=completion.MOVING,
+    ),
+]
+Curves = Annotated[int | None, typer.Option(help="boundary curves of the skin; default 37")]
+Order = Annotated[
+    int | None,
+    typer.Option(help="of the skin: 1 creased, 2 biharmonic (default), 3 with even curvature"),
+]
+Surface = Annotated[
+    bool, typer.Option("--surface", help="of a mesh: the surface through its curves instead")
+]
+Forward = Annotated[
+    str | None, typer.Option(help="of a mesh: axis to its head, +x, -z, ...; default: longest")
+]
+Up = Annotated[
+    str | None, typer.Option(help="of a mesh: axis that points up; default: +y, of an .obj +z")
+]
+Frame = Annotated[
+    int | None,
+    typer.Option(help="of the track, from 0 (default): that --image shows, or --posed takes"),
+]
 
 
 @command(
@@ -53,39 +80,19 @@ def body(
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="body.glb or body.obj")],
-    animate: Annotated[
-        str | None,
-        typer.Option(
-            help="what moves it: a recording, the log of a run, or a spine gait",
-            autocompletion=completion.MOVING,
-        ),
-    ] = None,
+    animate: Animate = None,
     fps: Annotated[
         float | None, typer.Option(help="frames a second; default: a recording's own, 25 of a log")
     ] = None,
-    curves: Annotated[
-        int | None, typer.Option(help="boundary curves of the skin; default 37")
-    ] = None,
-    order: Annotated[
-        int | None,
-        typer.Option(help="of the skin: 1 creased, 2 biharmonic (default), 3 with even curvature"),
-    ] = None,
-    surface: Annotated[
-        bool, typer.Option("--surface", help="of a mesh: the surface through its curves instead")
-    ] = False,
-    forward: Annotated[
-        str | None, typer.Option(help="of a mesh: axis to its head, +x, -z, ...; default: longest")
-    ] = None,
-    up: Annotated[
-        str | None, typer.Option(help="of a mesh: axis that points up; default: +y, of an .obj +z")
-    ] = None,
+    curves: Curves = None,
+    order: Order = None,
+    surface: Surface = False,
+    forward: Forward = None,
+    up: Up = None,
     image: Annotated[
         Path | None, typer.Option(help="picture of the body from above: the skin's texture")
     ] = None,
-    frame: Annotated[
-        int | None,
-        typer.Option(help="of the track, from 0 (default): that --image shows, or --posed takes"),
-    ] = None,
+    frame: Frame = None,
     side: Annotated[
         Path | None, typer.Option(help="an .npz of the same body seen from the side: its heights")
     ] = None,
@@ -100,13 +107,10 @@ def body(
     as_json: Json = False,
 ) -> None:
     """Make the body's mesh, or a skin that moves: a textured, animated glTF (--animate)."""
-    require_extra("body: meshes need", "trimesh", *(["pygltflib"] if animate else []))
     check_picture(picture)
     if not 0.1 <= aspect <= 10.0:
         raise InputError(f"aspect: height over width must be from 0.1 to 10, not {aspect:g}")
     made = _Made(output, picture, force, as_json)
-    from snakewalk.controller.animals.mesh.body_skin import Cut, body_skin, is_skin, model_skin  # noqa: PLC0415
-
     given = is_skin(track)
     _check_options(
         track,
@@ -160,8 +164,6 @@ class _Made:
 
     def refuse(self, *, textured: bool) -> None:
         """Check the files before any work."""
-        from snakewalk.controller.images.mesh_files import mesh_files  # noqa: PLC0415
-
         refuse_to_overwrite([*mesh_files(self.output, textured), *self.drawn], self.force)
 
     def solid(self, body: _Measured, skeleton: Floats | None, image: Path | None) -> None:
@@ -170,9 +172,7 @@ class _Made:
         mesh = body_mesh(one, straight() if skeleton is None else skeleton)
         files = self._write(mesh, body.texture)
         if self.picture is not None:
-            from snakewalk.controller.animals.plots.body import draw_body  # noqa: PLC0415
-
-            draw_body(self.picture, one, mesh, body.texture, body.shown)
+            _plots().draw_body(self.picture, one, mesh, body.texture, body.shown)
         show(
             {
                 "files": files,
@@ -195,8 +195,6 @@ class _Made:
         if animate is None:
             files = self._write(skin.mesh, body.texture)
         else:
-            from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415
-
             if self.output.suffix.lower() != ".glb":
                 raise InputError(f"{self.output}: a skin that moves is written as .glb")
             skin, motion = animated(skin, animate, fps)
@@ -217,9 +215,7 @@ class _Made:
                 "bones": len(motion.bone_m),
             }
         if self.picture is not None:
-            from snakewalk.controller.animals.plots.body import draw_skin  # noqa: PLC0415
-
-            draw_skin(self.picture, skin, motion, body.texture)
+            _plots().draw_skin(self.picture, skin, motion, body.texture)
         sizes = {
             "files": files,
             "vertices": len(skin.mesh.vertices),
@@ -229,11 +225,15 @@ class _Made:
         show(sizes | facts | body.facts, self.as_json)
 
     def _write(self, mesh: Mesh, texture: Image | None) -> list[str]:
-        from snakewalk.controller.images.mesh_files import mesh_files, write_mesh  # noqa: PLC0415
-
         with atomic_write(self.output) as part:
             write_mesh(part, mesh, texture)
         return [str(f) for f in [*mesh_files(self.output, texture is not None), *self.drawn]]
+
+
+def _plots() -> ModuleType:
+    from snakewalk.controller.animals.plots import body as plots  # noqa: PLC0415  --picture: an extra
+
+    return plots
 
 
 def _check_options(
@@ -246,8 +246,6 @@ def _check_options(
     of_meshes: dict[str, object],
 ) -> None:
     """Refuse options that would do nothing."""
-    from snakewalk.controller.images.mesh_files import MESH_ENDINGS  # noqa: PLC0415
-
     mesh = given and body.lower().endswith(MESH_ENDINGS)
     faults = [
         f"{name}: is for recordings with widths; {body} is none"
@@ -311,10 +309,6 @@ def _texture(image: Path, shown: tuple[Image, Floats, Floats], pixels: bool) -> 
 
 def _read_picture(image: Path) -> Image:
     """Grey or colour, whatever the file holds."""
-    import numpy as np  # noqa: PLC0415
-    from PIL import Image as Pillow  # noqa: PLC0415
-    from PIL import UnidentifiedImageError  # noqa: PLC0415
-
     try:
         with Pillow.open(image) as picture:
             return np.asarray(picture.convert("RGB"))
@@ -327,8 +321,6 @@ def _read_picture(image: Path) -> Image:
 
 
 def _check_frame(name: str, points: Floats, frame: int) -> None:
-    import numpy as np  # noqa: PLC0415
-
     if not 0 <= frame < len(points):
         raise InputError(f"{name}: frame {frame} is not in 0..{len(points) - 1}")
     if not np.isfinite(points[frame]).all():

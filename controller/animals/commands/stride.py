@@ -77,7 +77,7 @@ def stride(
     with atomic_write(output) as part:
         part.write_text(made.text(), encoding="utf-8")
     if picture is not None:
-        from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415
+        from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415  --picture: an extra
 
         draw_stride(made.stride, picture, f"{keypoints.name}: {made.stride.cycles:.1f} cycles")
     files = {"animal": str(output), "picture": None if picture is None else str(picture)}

@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal, synthesise_animal
-from snakewalk.controller.animals.mesh.body_look import ANIMAL
+from snakewalk.controller.animals.plots.animal_synthesis import draw_animal
+from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
 from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
@@ -31,9 +32,8 @@ from snakewalk.controller.console.result_files import (
     refuse_to_overwrite,
 )
 from snakewalk.controller.run.factory import prepare_walk
-
-if TYPE_CHECKING:
-    from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.film_look import ANIMAL
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
@@ -119,14 +119,12 @@ def synthesise(
 
 
 def _snake(
-    prepared: "WalkRun", frames: int | None, look: str, files: Mapping[str, Path]
+    prepared: WalkRun, frames: int | None, look: str, files: Mapping[str, Path]
 ) -> tuple[dict[str, object], bool]:
     """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
-    from snakewalk.controller.animals.plots.snake_synthesis import draw_walk  # noqa: PLC0415
-
     worn = None
     if "skin" in files or "film" in files:
-        from snakewalk.controller.animals.synthesis.synthesis_skin import SynthesisSkin  # noqa: PLC0415
+        from snakewalk.controller.animals.synthesis.synthesis_skin import SynthesisSkin  # noqa: PLC0415  --film and --glb: an extra
 
         worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
     elif look != ANIMAL:
@@ -145,15 +143,13 @@ def _snake(
 
 
 def _with_legs(
-    prepared: "WalkRun", frames: int | None, name: str, files: Mapping[str, Path]
+    prepared: WalkRun, frames: int | None, name: str, files: Mapping[str, Path]
 ) -> tuple[dict[str, object], bool]:
     """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
-    from snakewalk.controller.animals.plots.animal_synthesis import draw_animal  # noqa: PLC0415
-
     config = read_animal(name)
     body = None
     if "skin" in files or "film" in files:
-        from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415
+        from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415  --film and --glb: an extra
 
         body = AnimalBody.of(config)
     made = synthesise_animal(prepared, config, frames)

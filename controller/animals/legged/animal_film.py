@@ -7,13 +7,13 @@ import numpy as np
 
 from snakewalk.config.animal import AnimalConfig, SkinConfig
 from snakewalk.config.arrays import Image
-from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load, locate
 from snakewalk.controller.animals.legged.animal_rig import animal_bones, animal_rig
 from snakewalk.controller.animals.legged.animal_synthesis import SynthesisedAnimal, as_long_robot
 from snakewalk.controller.animals.mesh.body_look import rig_look
 from snakewalk.controller.animals.mesh.body_skin import Cut, shipped_skin
 from snakewalk.controller.animals.mesh.rig import Rig
+from snakewalk.controller.animals.mesh.skin_file import write_skin
 from snakewalk.controller.animals.synthesis.synthesis_skin import film_over
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.run.kinds.walk_run import WalkRun
@@ -34,7 +34,6 @@ class AnimalBody:
             InputError: no such skin, or an extra is missing.
 
         """
-        require_extra("a skin needs", "trimesh", "pygltflib")
         config = load(locate("skins", animal.skin), SkinConfig)
         worn = shipped_skin(config, Cut())
         rig = animal_rig(animal, worn.skin.sized(animal.length_m), config.bands)
@@ -42,8 +41,6 @@ class AnimalBody:
 
     def write(self, made: SynthesisedAnimal, file: Path) -> None:
         """Write the animated glTF, ``file`` ends in .glb."""
-        from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415  an extra
-
         bones = animal_bones(made.animal, made.motion)
         with atomic_write(file) as part:
             write_skin(part, self.rig, bones, self.texture, made.animal.name)

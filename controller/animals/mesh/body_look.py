@@ -2,25 +2,21 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.config.world import Water
 from snakewalk.controller.animals.mesh.body_model import read_silhouettes
 from snakewalk.controller.animals.mesh.body_motion import robot_skin
-from snakewalk.controller.animals.mesh.rig import spine_rig
+from snakewalk.controller.animals.mesh.body_skin import body_skin
+from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
 from snakewalk.controller.console.command import plugin
+from snakewalk.controller.run.film_look import ANIMAL
 from snakewalk.controller.runlog.record import Header
+from snakewalk.sim.rendering.looks import SkinLook
 
-if TYPE_CHECKING:
-    from snakewalk.controller.animals.mesh.rig import Rig
-    from snakewalk.sim.rendering.looks import SkinLook
-
-ANIMAL: Final = "animal"
 _PLAIN = "snake"
 """The animal of a run whose recording holds no widths."""
 
@@ -38,7 +34,7 @@ class BodyLook:
         """
         _check(look)
 
-    def make(self, look: str, header: Header) -> "SkinLook":
+    def make(self, look: str, header: Header) -> SkinLook:
         """Return the skin of a run's film."""
         return skin_look(look, header)
 
@@ -49,14 +45,11 @@ class AnimalLook(BodyLook):
 
 
 def _check(look: str) -> None:
-    require_extra("a skin needs", "trimesh")
     if look != ANIMAL:
-        from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415  an extra
-
         body_skin(look)
 
 
-def skin_look(look: str, header: Header) -> "SkinLook":
+def skin_look(look: str, header: Header) -> SkinLook:
     """Make the skin of a run's film.
 
     Args:
@@ -68,9 +61,6 @@ def skin_look(look: str, header: Header) -> "SkinLook":
         InputError: no such skin, or an extra is missing.
 
     """
-    require_extra("a skin needs", "trimesh", "mujoco")
-    from snakewalk.controller.animals.mesh.body_skin import body_skin  # noqa: PLC0415
-
     dressed = body_skin(animal(header.run.track) if look == ANIMAL else look)
     robot = header.robot
     skin = robot_skin(dressed.skin, robot, isinstance(header.world.ground, Water))
@@ -80,7 +70,7 @@ def skin_look(look: str, header: Header) -> "SkinLook":
     return rig_look(replace(rig, rest_m=origins), dressed.texture, free=False)
 
 
-def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLook":
+def rig_look(rig: Rig, texture: Image | None, *, free: bool = True) -> SkinLook:
     """Make the look of a rig.
 
     Args:
@@ -89,8 +79,6 @@ def rig_look(rig: "Rig", texture: Image | None, *, free: bool = True) -> "SkinLo
         free: whether its bones float, for a motion that no robot makes.
 
     """
-    from snakewalk.sim.rendering.looks import SkinLook  # noqa: PLC0415  an extra
-
     return SkinLook(
         vertices_m=rig.mesh.vertices,
         uv=rig.mesh.uv,

@@ -56,57 +56,12 @@ def write_skin(
     if len(motion.time_s) < 2:
         raise InputError(f"{file}: an animation needs two frames or more")
     out = _Builder()
-    mesh, held, rest = rig.mesh, rig.held, rig.rest_m
-    shares = np.zeros((len(mesh.vertices), 4), np.float32)
-    shares[:, [0, 2]] = held.shares[:, [0, 2]]
-    shares[:, 1] = np.float32(1.0) - shares[:, 0] - shares[:, 2]  # sum 1 in single precision
-    joints = np.zeros((len(mesh.vertices), 4), np.uint8)
-    joints[:, :3] = np.where(shares[:, :3] > 0.0, held.bones, 0)  # no bone may idle
-    array, element = pygltflib.ARRAY_BUFFER, pygltflib.ELEMENT_ARRAY_BUFFER
-    normals = mesh.normals @ Y_UP.T
-    attributes = pygltflib.Attributes(
-        POSITION=out.add(mesh.vertices @ Y_UP.T, "VEC3", array, bounds=True),
-        NORMAL=out.add(normals / np.linalg.norm(normals, axis=1, keepdims=True), "VEC3", array),
-        JOINTS_0=out.add(joints, "VEC4", array),
-        WEIGHTS_0=out.add(shares, "VEC4", array),
+    attributes = _surface(out, rig, textured=texture is not None)
+    faces = out.add(
+        rig.mesh.faces.astype(np.uint32).ravel(), "SCALAR", pygltflib.ELEMENT_ARRAY_BUFFER
     )
-    if texture is not None:
-        attributes.TEXCOORD_0 = out.add(mesh.uv * [1.0, -1.0] + [0.0, 1.0], "VEC2", array)
-    faces = out.add(mesh.faces.astype(np.uint32).ravel(), "SCALAR", element)
-    inverse = np.zeros((bones, 4, 4))  # column by column, as glTF wants it
-    inverse[:, :3, :3] = Y_UP
-    inverse[:, 3, :3] = -rest
-    inverse[:, 3, 3] = 1.0
-    turn, place = _carried(motion, rig.parent)
-    carried = rig.parent >= 0
-    local = np.where(carried[:, None], rest - rest[rig.parent], rest)
-    nodes = [
-        pygltflib.Node(name="body", mesh=0, skin=0),
-        pygltflib.Node(
-            name="spine",
-            rotation=_ROOT_QUATERNION,
-            children=(np.flatnonzero(~carried) + 2).tolist(),
-        ),
-    ]
-    for k in range(bones):
-        children = (np.flatnonzero(rig.parent == k) + 2).tolist()
-        nodes.append(
-            pygltflib.Node(name=f"bone{k}", translation=local[k].tolist(), children=children)
-        )
-    time = out.add(motion.time_s, "SCALAR", None, bounds=True)
-    samplers: list[pygltflib.AnimationSampler] = []
-    channels: list[pygltflib.AnimationChannel] = []
-    slides = np.abs(place - local).max(axis=(0, 2)) > _STILL_M * motion.length_m
-    for k in range(bones):
-        paths: list[tuple[str, Floats, str]] = [("rotation", turn[:, k], "VEC4")]
-        if slides[k] or not carried[k]:
-            paths.append(("translation", place[:, k], "VEC3"))
-        for path, values, kind in paths:
-            target = pygltflib.AnimationChannelTarget(node=k + 2, path=path)
-            channels.append(pygltflib.AnimationChannel(sampler=len(samplers), target=target))
-            samplers.append(
-                pygltflib.AnimationSampler(input=time, output=out.add(values, kind, None))
-            )
+    nodes, local = _bones(rig)
+    animation = _animation(out, rig, motion, local, name)
     gltf = pygltflib.GLTF2(
         asset=pygltflib.Asset(version="2.0", generator="snakewalk"),
         scene=0,
@@ -122,10 +77,10 @@ def write_skin(
             pygltflib.Skin(
                 joints=list(range(2, bones + 2)),
                 skeleton=2,
-                inverseBindMatrices=out.add(inverse.reshape(bones, 16), "MAT4", None),
+                inverseBindMatrices=out.add(_to_bones(rig), "MAT4", None),
             )
         ],
-        animations=[pygltflib.Animation(name=name, samplers=samplers, channels=channels)],
+        animations=[animation],
         materials=[_material(texture is not None, both_sides)],
     )
     if texture is not None:
@@ -137,6 +92,79 @@ def write_skin(
     gltf.buffers = [pygltflib.Buffer(byteLength=len(out.data))]
     gltf.set_binary_blob(bytes(out.data))
     file.write_bytes(b"".join(gltf.save_to_bytes()))
+
+
+def _surface(out: "_Builder", rig: Rig, *, textured: bool) -> pygltflib.Attributes:
+    """Append places, normals, bones and weights of the corners."""
+    mesh, held = rig.mesh, rig.held
+    shares = np.zeros((len(mesh.vertices), 4), np.float32)
+    shares[:, [0, 2]] = held.shares[:, [0, 2]]
+    shares[:, 1] = np.float32(1.0) - shares[:, 0] - shares[:, 2]  # sum 1 in single precision
+    joints = np.zeros((len(mesh.vertices), 4), np.uint8)
+    joints[:, :3] = np.where(shares[:, :3] > 0.0, held.bones, 0)  # no bone may idle
+    array = pygltflib.ARRAY_BUFFER
+    normals = mesh.normals @ Y_UP.T
+    attributes = pygltflib.Attributes(
+        POSITION=out.add(mesh.vertices @ Y_UP.T, "VEC3", array, bounds=True),
+        NORMAL=out.add(normals / np.linalg.norm(normals, axis=1, keepdims=True), "VEC3", array),
+        JOINTS_0=out.add(joints, "VEC4", array),
+        WEIGHTS_0=out.add(shares, "VEC4", array),
+    )
+    if textured:
+        attributes.TEXCOORD_0 = out.add(mesh.uv * [1.0, -1.0] + [0.0, 1.0], "VEC2", array)
+    return attributes
+
+
+def _to_bones(rig: Rig) -> Floats:
+    """(K, 16) matrices from the body at rest into each bone, column by column."""
+    bones = len(rig.rest_m)
+    inverse = np.zeros((bones, 4, 4))
+    inverse[:, :3, :3] = Y_UP
+    inverse[:, 3, :3] = -rig.rest_m
+    inverse[:, 3, 3] = 1.0
+    return inverse.reshape(bones, 16)
+
+
+def _bones(rig: Rig) -> tuple[list[pygltflib.Node], Floats]:
+    """Return the nodes, and the places (K, 3) of the bones at rest in their parents."""
+    rest, carried = rig.rest_m, rig.parent >= 0
+    local = np.where(carried[:, None], rest - rest[rig.parent], rest)
+    nodes = [
+        pygltflib.Node(name="body", mesh=0, skin=0),
+        pygltflib.Node(
+            name="spine",
+            rotation=_ROOT_QUATERNION,
+            children=(np.flatnonzero(~carried) + 2).tolist(),
+        ),
+    ]
+    for k in range(len(rest)):
+        children = (np.flatnonzero(rig.parent == k) + 2).tolist()
+        nodes.append(
+            pygltflib.Node(name=f"bone{k}", translation=local[k].tolist(), children=children)
+        )
+    return nodes, local
+
+
+def _animation(
+    out: "_Builder", rig: Rig, motion: BoneMotion, local: Floats, name: str
+) -> pygltflib.Animation:
+    """Append the turns of all bones, and the places of those that slide."""
+    turn, place = _carried(motion, rig.parent)
+    time = out.add(motion.time_s, "SCALAR", None, bounds=True)
+    samplers: list[pygltflib.AnimationSampler] = []
+    channels: list[pygltflib.AnimationChannel] = []
+    slides = np.abs(place - local).max(axis=(0, 2)) > _STILL_M * motion.length_m
+    for k in range(len(motion.bone_m)):
+        paths: list[tuple[str, Floats, str]] = [("rotation", turn[:, k], "VEC4")]
+        if slides[k] or rig.parent[k] < 0:
+            paths.append(("translation", place[:, k], "VEC3"))
+        for path, values, kind in paths:
+            target = pygltflib.AnimationChannelTarget(node=k + 2, path=path)
+            channels.append(pygltflib.AnimationChannel(sampler=len(samplers), target=target))
+            samplers.append(
+                pygltflib.AnimationSampler(input=time, output=out.add(values, kind, None))
+            )
+    return pygltflib.Animation(name=name, samplers=samplers, channels=channels)
 
 
 def _carried(motion: BoneMotion, parent: Ints) -> tuple[Floats, Floats]:

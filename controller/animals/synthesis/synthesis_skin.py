@@ -3,25 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.animals.mesh.body_look import ANIMAL, animal, rig_look
+from snakewalk.controller.animals.mesh.body_look import animal, rig_look
 from snakewalk.controller.animals.mesh.body_motion import robot_skin
 from snakewalk.controller.animals.mesh.body_skin import BodySkin, body_skin
 from snakewalk.controller.animals.mesh.rig import spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
+from snakewalk.controller.animals.mesh.skin_file import write_skin
 from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.report.film import film_motion
+from snakewalk.controller.run.film_look import ANIMAL
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.track.bone_motion import BoneMotion
-
-if TYPE_CHECKING:
-    from snakewalk.sim.rendering.looks import SkinLook
+from snakewalk.sim.rendering.looks import SkinLook
 
 FILM_SEGMENTS = 5
 """Segments of the skeleton that are one bone in the film; the file has a bone a segment."""
@@ -42,14 +40,11 @@ class SynthesisSkin:
             InputError: no such body, or an extra is missing.
 
         """
-        require_extra("a skin needs", "trimesh", "pygltflib")
         dressed = body_skin(animal(track) if look == ANIMAL else look)
         return cls(dressed, robot_skin(dressed.skin, robot))
 
     def write(self, made: SynthesisedWalk, file: Path) -> None:
         """Write the animated glTF, ``file`` ends in .glb."""
-        from snakewalk.controller.animals.mesh.skin_file import write_skin  # noqa: PLC0415  an extra
-
         worn, bones = self.dressed, made.bones()
         rig = spine_rig(self.skin, bones.bone_m)
         with atomic_write(file) as part:

@@ -1,18 +1,18 @@
 """``snakewalk camera board``: the board of a calibration, to print."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from PIL import Image as Pictures
+from PIL import ImageOps
 
+from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
+from snakewalk.controller.cameras.calibration_board import CalibrationBoard, read_pattern
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
-
-if TYPE_CHECKING:
-    from snakewalk.config.arrays import Image
 
 Pattern = Annotated[str, typer.Option(help="charuco, which may be seen in part, or chessboard")]
 Squares = Annotated[str, typer.Option(help="across x down, also of a chessboard", metavar="NxM")]
@@ -47,12 +47,6 @@ def board(
     as_json: Json = False,
 ) -> None:
     """Draw the board for `camera calibrate`; print it without scaling, and glue it on a plate."""
-    require_extra("a board needs", "cv2", "PIL")
-    from snakewalk.controller.cameras.calibration_board import (  # noqa: PLC0415
-        CalibrationBoard,
-        read_pattern,
-    )
-
     made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
     check_print(out)
     refuse_to_overwrite([out], force)
@@ -72,11 +66,8 @@ def check_print(out: Path) -> None:
         raise InputError(f"{out}: what is printed ends in .pdf or .png")
 
 
-def write_print(out: Path, pages: "list[Image]") -> None:
+def write_print(out: Path, pages: list[Image]) -> None:
     """Write pages (H, W) in their true size with a white margin of 10 mm."""
-    from PIL import Image as Pictures  # noqa: PLC0415  an extra
-    from PIL import ImageOps  # noqa: PLC0415
-
     margin = round(10.0 / 25.4 * DOTS)
     sheets = [ImageOps.expand(Pictures.fromarray(page), margin, 255) for page in pages]
     with atomic_write(out) as part:

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.config.extras import require_extra
+from snakewalk.controller.cameras.camera_findings import camera_findings
+from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.options import VIEW_AT, Json, RunName, RunPort, Set, key_values
@@ -34,10 +35,6 @@ def check(
 
     With --port the joints are read, never moved: turn one by hand, unevenly, for the latency.
     """
-    require_extra("a camera's check needs", "cv2", "skimage")
-    from snakewalk.controller.cameras.camera_findings import camera_findings  # noqa: PLC0415
-    from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody  # noqa: PLC0415
-
     prepared = prepare_job(run, keys=key_values("--set", set_))
     if device is not None:
         camera = prepared.run.camera.model_copy(update={"device": device})
@@ -49,7 +46,7 @@ def check(
     with ExitStack() as stack:
         on_frame = nobody
         if view:
-            from snakewalk.controller.cameras.camera_page import open_camera_page  # noqa: PLC0415
+            from snakewalk.controller.cameras.camera_page import open_camera_page  # noqa: PLC0415  --view: an extra
 
             page = stack.enter_context(open_camera_page(view_at, prepared.run.camera, watch))
             on_frame = page.on_frame

@@ -2,27 +2,32 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
 import typer
 
+from snakewalk.config.arrays import Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
+from snakewalk.controller.cameras.calibration_board import (
+    BoardView,
+    CalibrationBoard,
+    read_pattern,
+)
 from snakewalk.controller.cameras.commands.board import (
     Pattern,
     SquareMm,
     Squares,
     read_squares,
 )
+from snakewalk.controller.cameras.device_camera import open_device
+from snakewalk.controller.cameras.lens_calibration import calibrate_lens
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.images.video import open_footage
 from snakewalk.drivers.clock import WallClock
-
-if TYPE_CHECKING:
-    from snakewalk.config.arrays import Image
-    from snakewalk.controller.cameras.calibration_board import BoardView, CalibrationBoard
 
 _ENDINGS = (".yml", ".yaml", ".xml", ".json")
 _PAUSE_S = 0.7
@@ -51,13 +56,6 @@ def calibrate_camera(
 
     Hold the board at 15 places or more, also in the picture's corners, tilted by up to 45 degrees.
     """
-    require_extra("a camera's calibration needs", "cv2", "skimage")
-    from snakewalk.controller.cameras.calibration_board import (  # noqa: PLC0415
-        CalibrationBoard,
-        read_pattern,
-    )
-    from snakewalk.controller.cameras.lens_calibration import calibrate_lens  # noqa: PLC0415
-
     if out.suffix.lower() not in _ENDINGS:
         raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
     board = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
@@ -96,12 +94,8 @@ def calibrate_camera(
 
 
 def _from_files(
-    path: Path, board: "CalibrationBoard", most: int
-) -> tuple[list["BoardView | None"], tuple[int, int]]:
-    import numpy as np  # noqa: PLC0415  --help stays quick
-
-    from snakewalk.controller.images.video import open_footage  # noqa: PLC0415  an extra
-
+    path: Path, board: CalibrationBoard, most: int
+) -> tuple[list[BoardView | None], tuple[int, int]]:
     # OpenCV finds boards in 8 bit; deeper pictures come on the same scale
     pictures = [np.clip(one, 0, 255).astype(np.uint8) for one in open_footage(path).spread(most)]
     sizes = sorted({picture.shape[1::-1] for picture in pictures})
@@ -112,13 +106,9 @@ def _from_files(
 
 
 def _from_device(
-    name: str, size: str, board: "CalibrationBoard", count: int
-) -> tuple[list["BoardView | None"], tuple[int, int]]:
+    name: str, size: str, board: CalibrationBoard, count: int
+) -> tuple[list[BoardView | None], tuple[int, int]]:
     """Take pictures one after another and say of each whether the board was found in it."""
-    import numpy as np  # noqa: PLC0415  --help stays quick
-
-    from snakewalk.controller.cameras.device_camera import open_device  # noqa: PLC0415  an extra
-
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
         raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
+from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import refuse_to_overwrite
@@ -30,9 +30,6 @@ def markers(
     Four or more, flat on the floor, as far apart as the picture allows: the table
     `camera.markers_m` of a run names their places.
     """
-    require_extra("markers need", "cv2", "PIL")
-    from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet  # noqa: PLC0415
-
     check_print(out)
     if out.suffix.lower() == ".png" and count > 1:
         raise InputError(f"{out}: a .png holds one marker: --count 1, or a .pdf")

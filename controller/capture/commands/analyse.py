@@ -63,7 +63,7 @@ def analyse(
             load_track(name, *(None, None, ALL) if shipped else (rate, min_score, choice))
         )
         if file is not None:
-            from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415
+            from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415  --picture: an extra
 
             draw_analysis(one, file)
         found.append(one.facts() | {"picture": None if file is None else str(file)})

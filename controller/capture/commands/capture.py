@@ -6,9 +6,56 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.config.extras import require_extra
+from snakewalk.controller.capture.capturing import (
+    CaptureOptions,
+    capture_recording,
+    correct_recording,
+)
 from snakewalk.controller.console.command import RECORDINGS, command
-from snakewalk.controller.console.options import Json, show
+from snakewalk.controller.console.options import Force, Json, show
+
+Footage = Annotated[
+    Path,
+    typer.Argument(
+        help="a video, or a folder of images; with --corrections a track captured before",
+        metavar="VIDEO|FOLDER|TRACK.npz",
+    ),
+]
+Marker = Annotated[
+    str | None,
+    typer.Option(
+        help="or: the SIDE, m, of a printed ArUco or AprilTag marker in view; or "
+        "X0,Y0,X1,Y1,METRES, two places in the image and how far apart they are"
+    ),
+]
+Cropped = Annotated[
+    bool,
+    typer.Option("--cropped", help="the images were cropped to the animal, or the camera moves"),
+]
+Threshold = Annotated[
+    float | None,
+    typer.Option(
+        help="grey levels by which the body's boundary stands out from the background; "
+        "default: half of the body's own contrast"
+    ),
+]
+Review = Annotated[
+    Path | None,
+    typer.Option(
+        help="write a page (.html) on which a person flips heads, leaves frames out, drags "
+        "points, and saves the corrections; open it in a browser",
+        metavar="PAGE",
+    ),
+]
+Corrections = Annotated[
+    Path | None,
+    typer.Option(
+        help="apply what was saved on the review page of TRACK.npz; write to -o", metavar="JSON"
+    ),
+]
+Background = Annotated[
+    Path | None, typer.Option(help="image without the animal; default: estimated from frames")
+]
 
 
 @command(
@@ -22,52 +69,27 @@ from snakewalk.controller.console.options import Json, show
     ),
 )
 def capture(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help="a video, or a folder of images; with --corrections a track captured before",
-            metavar="VIDEO|FOLDER|TRACK.npz",
-        ),
-    ],
+    recording: Footage,
     output: Annotated[Path, typer.Option("-o", "--output", help="the track")] = Path("track.npz"),
-    background: Annotated[
-        Path | None, typer.Option(help="image without the animal; default: estimated from frames")
-    ] = None,
+    background: Background = None,
     length_m: Annotated[
         float | None, typer.Option(help="how long the animal is: the scale")
     ] = None,
-    marker: Annotated[
-        str | None,
-        typer.Option(
-            help="or: the SIDE, m, of a printed ArUco or AprilTag marker in view; or "
-            "X0,Y0,X1,Y1,METRES, two places in the image and how far apart they are"
-        ),
-    ] = None,
+    marker: Marker = None,
     rate: Annotated[
         float | None, typer.Option(help="frames a second, instead of what the file says")
     ] = None,
     head: Annotated[
         str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")
     ] = None,
-    cropped: Annotated[
-        bool,
-        typer.Option(
-            "--cropped", help="the images were cropped to the animal, or the camera moves"
-        ),
-    ] = False,
+    cropped: Cropped = False,
     roi: Annotated[
         str | None, typer.Option(help="look only here: X,Y,W,H in pixels", metavar="X,Y,W,H")
     ] = None,
     mask: Annotated[
         Path | None, typer.Option(help="look only where this picture is white", metavar="PNG")
     ] = None,
-    threshold: Annotated[
-        float | None,
-        typer.Option(
-            help="grey levels by which the body's boundary stands out from the background; "
-            "default: half of the body's own contrast"
-        ),
-    ] = None,
+    threshold: Threshold = None,
     overlay: Annotated[
         Path | None, typer.Option(help="write the film with the skeleton on it (.mp4, .avi)")
     ] = None,
@@ -77,31 +99,12 @@ def capture(
     steps: Annotated[
         Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
     ] = None,
-    review: Annotated[
-        Path | None,
-        typer.Option(
-            help="write a page (.html) on which a person flips heads, leaves frames out, drags "
-            "points, and saves the corrections; open it in a browser",
-            metavar="PAGE",
-        ),
-    ] = None,
-    corrections: Annotated[
-        Path | None,
-        typer.Option(
-            help="apply what was saved on the review page of TRACK.npz; write to -o", metavar="JSON"
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
+    review: Review = None,
+    corrections: Corrections = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail."""
-    require_extra("capture needs", "cv2", "skimage")
-    from snakewalk.controller.capture.capturing import (  # noqa: PLC0415  heavy
-        CaptureOptions,
-        capture_recording,
-        correct_recording,
-    )
-
     options = CaptureOptions(
         recording=recording,
         output=output,

@@ -88,7 +88,7 @@ def track(
         for name in show_progress(names, "recordings", len(names))
     ]
     if picture is not None:
-        from snakewalk.controller.capture.plots.recording import draw  # noqa: PLC0415
+        from snakewalk.controller.capture.plots.recording import draw  # noqa: PLC0415  --picture: an extra
 
         draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
     if output is not None:

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 import typer
 from rich.table import Table
 
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_robot
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, Json, RobotName, console, show
+from snakewalk.controller.console.options import Assume, Force, Json, RobotName, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 
@@ -75,26 +75,34 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
     ),
 )
 def import_robot(
-    file: Annotated[Path, typer.Argument(help="MuJoCo model (.xml) or URDF of a chain")],
+    file: Annotated[Path, typer.Argument(help="URDF, xacro or MuJoCo model (.xml)")],
     out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
     servo: Annotated[
         str, typer.Option(help="model of all servos, which such files do not know")
     ] = ("XM430-W350"),
     scale: Annotated[float, typer.Option(help="lengths times this, masses times its cube")] = 1.0,
     reverse: Annotated[bool, typer.Option(help="the model's first body is the tail")] = False,
+    assume: Assume = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a robot's file of another program's model; what cannot be said there is told."""
+    """Make a robot's file of another program's model; report what was dropped or changed."""
     require_extra("MuJoCo models and URDF need", "mujoco")
-    from snakewalk.controller.exchange import robot_import  # noqa: PLC0415
+    from snakewalk.controller.exchange.robot_import import robot_import  # noqa: PLC0415
 
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:
         raise InputError(f"--scale {scale:g}: 0.001 to 1000")
     refuse_to_overwrite([out], force)
-    made = robot_import.import_robot(file, out.stem, servo, scale=scale, reverse=reverse)
+    made = robot_import.import_robot(
+        file,
+        out.stem,
+        servo,
+        scale=scale,
+        reverse=reverse,
+        assumed=Assumptions(assume or ()),
+    )
     joints = ", ".join(made.joint_names)
     comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
     comment += [f"- {note}" for note in made.notes]

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.command import command
@@ -35,6 +36,7 @@ def crowd(
     as_json: Json = False,
 ) -> None:
     """Film many animals that wander over a terrain by recorded actions, without physics."""
+    require_extra("films need", "av")
     if out.suffix != ".mp4":
         raise InputError(f"{out}: a film ends in .mp4")
     refuse_to_overwrite([out], force)

@@ -7,7 +7,7 @@ from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.options import show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
-from snakewalk.controller.repertoire.commands.repertoire import carry_out
+from snakewalk.controller.repertoire.commands.repertoire_run import carry_out
 from snakewalk.controller.repertoire.repertoire_planning import (
     plan_facts,
     plan_route,

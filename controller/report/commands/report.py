@@ -23,6 +23,9 @@ def report(
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
     fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
     look: Look = "servos",
+    folders: Annotated[
+        bool, typer.Option("--folders", help="leave the folders of your files in report.html")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -33,7 +36,7 @@ def report(
         LOGGER.warning("%s: %s", log, record.note)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
-    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look)
+    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look, folders=folders)
     if artifacts.report is None:
         raise SystemExit(2)
     files = artifacts.to_dict()

@@ -27,7 +27,7 @@ from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.ros.ros_link import open_ros
 from snakewalk.controller.ros.ros_options import RosOptions
-from snakewalk.controller.run.commands.gait import Param, parameters
+from snakewalk.controller.run.commands.gait_options import Param, parameters
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import gait_by_name, prepare_commanded
 from snakewalk.controller.run.finish import show_run

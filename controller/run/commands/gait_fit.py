@@ -3,8 +3,9 @@
 import csv
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
+import numpy as np
 import typer
 
 from snakewalk.config.archive import why_no_file
@@ -18,9 +19,6 @@ from snakewalk.controller.console.result_files import (
     refuse_to_overwrite,
 )
 from snakewalk.controller.gaits.backbone import fit_backbone
-
-if TYPE_CHECKING:
-    from snakewalk.controller.gaits.backbone import BackboneFit
 
 COLUMNS = ("x_m", "y_m", "z_m")
 
@@ -44,8 +42,6 @@ def fit_gait(
     as_json: Json = False,
 ) -> None:
     """Lay the robot on a curve in space: joint angles, and how far the joints are from it."""
-    import numpy as np  # noqa: PLC0415  heavy; --help stays quick
-
     check_picture(picture)
     if output is not None and output.suffix.lower() != ".npz":
         raise InputError(f"{output}: joint angles go to a file that ends in .npz")
@@ -68,7 +64,9 @@ def fit_gait(
                 robot=np.array(body.name),
             )
     if picture is not None:
-        _draw(fit, points_m, body.name, picture)
+        from snakewalk.controller.figures.backbone import draw_fit  # noqa: PLC0415  --picture: an extra
+
+        draw_fit(fit, points_m, body.name, picture)
     limit = np.array(body.limit_rad)
     found: dict[str, object] = {
         "curve": str(curve),
@@ -122,37 +120,3 @@ def _number(path: Path, line: int, name: str, text: str | None) -> float:
     if not math.isfinite(value):
         raise InputError(f"{path}, line {line}: {name} is {text or 'empty'}; expected a number")
     return value
-
-
-def _draw(fit: "BackboneFit", curve_m: list[list[float]], robot: str, path: Path) -> None:
-    """Curve and chain in space on the left, joint angles on the right."""
-    import numpy as np  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
-
-    from snakewalk.controller.figures.style import (  # noqa: PLC0415
-        AMBER,
-        BLUE,
-        INK,
-        RED,
-        save_picture,
-        style,
-    )
-
-    points = np.array(curve_m)
-    with style():
-        figure = Figure(figsize=(11.0, 5.0), layout="constrained")
-        space = figure.add_subplot(1, 2, 1, projection="3d")
-        space.plot(*points.T, color=AMBER, linewidth=2.0, label="curve")
-        space.plot(*fit.points_m.T, "o-", color=BLUE, markersize=3.5, label="chain")
-        space.plot(*fit.points_m[:1].T, "o", color=RED, label="head")
-        space.set(xlabel="x, m", ylabel="y, m", zlabel="z, m")
-        space.set_box_aspect(np.maximum(np.ptp(points, axis=0), 0.1 * np.ptp(points)))
-        space.locator_params(nbins=4)
-        space.legend(loc="upper left")
-        angles = figure.add_subplot(1, 2, 2)
-        angles.bar(np.arange(1, len(fit.joint_rad) + 1), fit.joint_rad, color=BLUE)
-        angles.axhline(0.0, color=INK, linewidth=0.5)
-        angles.set(xlabel="joint, from the head", ylabel="angle, rad")
-        title = f"{robot}: at most {1000.0 * fit.residual_m:.1f} mm from the curve"
-        figure.suptitle(title, x=0.01, ha="left", fontweight="bold")
-        save_picture(figure, path, dpi=110)

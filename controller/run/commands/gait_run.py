@@ -33,14 +33,16 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import KEYS, Operator
-from snakewalk.controller.run.commands.gait import Name, Param, parameters
+from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.finish import by_evidence, costs_of_transport, show_run
+from snakewalk.controller.run.observer_watch import ADVICE
 from snakewalk.controller.run.watchers import watched
 
 if TYPE_CHECKING:
@@ -159,16 +161,18 @@ def run_gait(
         result |= {
             "frequency_hz": round(displacement.frequency_hz, 3),
             "cycles": displacement.cycles,
+        }
+        moved = {
             "forward_body_lengths_cycle": _digits(displacement.forward_bl),
             "left_body_lengths_cycle": _digits(displacement.left_bl),
             "up_body_lengths_cycle": _digits(displacement.up_bl),
             "turn_rad_cycle": _digits(displacement.turn_rad),
             "speed_m_s": _digits(displacement.speed_m_s),
         }
+        result |= by_evidence(finished, moved)
     result |= {
         "electrical_energy_j": finished.summary.electrical_energy_j,
-        "electrical_cost_of_transport": finished.summary.electrical_cost_of_transport,
-        "mechanical_cost_of_transport": finished.summary.mechanical_cost_of_transport,
+        **costs_of_transport(finished.summary),
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
     }
@@ -211,8 +215,6 @@ class _Hands:
         if not gone:
             return None
         if self.policy == "stop":
-            from snakewalk.controller.run.observer_watch import ADVICE  # noqa: PLC0415
-
             return f"{gone[0]}; {ADVICE}"
         if self._lost is None:
             self._lost = gone[0]
@@ -252,7 +254,6 @@ def _hands(
     if not live and gamepad is None:
         return None
     from rich.columns import Columns  # noqa: PLC0415
-    from rich.console import Console  # noqa: PLC0415
 
     devices: list[Keyboard | Gamepad | PageControls] = []
     keys: list[str] = []
@@ -264,7 +265,7 @@ def _hands(
     if gamepad is not None:
         devices.append(stack.enter_context(Gamepad(gamepad)))
         keys += ["hold LB or RB: it moves", "right stick pressed: torque off"]
-    Console(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
+    PlainConsole(stderr=True, highlight=False).print(Columns([*keys, "Ctrl-C: torque off"]))
     return _Hands(devices, page)
 
 

@@ -51,7 +51,7 @@ def compare(
             LOGGER.warning("%s: %s", log, record.note)
         runs.append(compared_run(record, name))
     if picture is not None:
-        from snakewalk.controller.studies.plots.run_comparison import (  # noqa: PLC0415  an extra
+        from snakewalk.controller.studies.plots.run_comparison import (  # noqa: PLC0415  --picture: an extra
             draw_comparison,
         )
 

@@ -104,7 +104,7 @@ def sweep(
     held = read_table(out) if out.exists() else []
     rows = [asdict(one) for one in digest(held)]
     if picture is not None:
-        from snakewalk.controller.studies.plots.sweep import draw_sweep  # noqa: PLC0415
+        from snakewalk.controller.studies.plots.sweep import draw_sweep  # noqa: PLC0415  --picture: an extra
 
         draw_sweep(held, picture)
     if as_json:

@@ -61,7 +61,7 @@ def walk(
         for spec, name in show_progress(cases, "walks", len(cases))
     ]
     if picture is not None:
-        from snakewalk.controller.studies.plots.walk import draw  # noqa: PLC0415
+        from snakewalk.controller.studies.plots.walk import draw  # noqa: PLC0415  --picture: an extra
 
         draw(results, picture)
     if as_json:

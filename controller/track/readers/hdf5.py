@@ -23,10 +23,10 @@ def load_hdf5(
     try:
         with h5py.File(file, "r") as held:
             sizes: list[int] = []
-            held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
-            elsewhere = held.visititems_links(_other_file)
+            elsewhere = held.visititems_links(_linked_file) or held.visititems(_other_file)
             if elsewhere is not None:
                 raise InputError(f"{file}: {elsewhere}; copy it into this one")
+            held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
             check_expansion(file, file.stat().st_size, sum(sizes))
             if "tracks" in held and "track_occupancy" in held:
                 return load_analysis(file, held, rate_hz, least_score, choice)
@@ -42,7 +42,7 @@ def load_hdf5(
                 for name, data in held.items()
                 if isinstance(data, h5py.Dataset)
             }
-    except (OSError, RuntimeError) as error:
+    except (OSError, RuntimeError, TypeError) as error:  # TypeError: an unknown kind of link
         reason = str(error).splitlines()[0]
         raise InputError(f"{file}: is no HDF5 that can be read: {reason}; known: {KNOWN}") from None
     if not arrays:
@@ -51,9 +51,18 @@ def load_hdf5(
     return track_from_arrays(file, arrays, rate_hz, least_score)
 
 
-def _other_file(name: str, link: object) -> str | None:
-    """What a link to another file says: nobody knows how far that one expands."""
+def _linked_file(name: str, link: object) -> str | None:
+    """Return which link leads to another file, of unknown size and owner."""
     return f"{name} is in {link.filename}" if isinstance(link, h5py.ExternalLink) else None
+
+
+def _other_file(name: str, data: object) -> str | None:
+    """Return which array has its values in other files, by external storage or as a virtual one."""
+    if not isinstance(data, h5py.Dataset):
+        return None
+    if data.external:
+        return f"{name} is in {data.external[0][0]}"
+    return f"{name} is a virtual array of other files" if data.is_virtual else None
 
 
 def _holds_table(group: object) -> bool:

@@ -6,13 +6,13 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.run_comparison import log_names
 from snakewalk.controller.view.live_view import host_and_port
+from snakewalk.controller.view.log_page import LogPage, play
 from snakewalk.drivers.clock import WallClock
 
 _MOST = 2
@@ -38,9 +38,6 @@ def view(
 
     A run is shown while it lasts by --view of run, gait run and play.
     """
-    require_extra("the page needs", "viser")
-    from snakewalk.controller.view.log_page import LogPage, play  # noqa: PLC0415
-
     host, port = host_and_port(view_at)
     if len(logs) > _MOST:
         raise InputError(f"{len(logs)} logs: the page shows one or two; more: snakewalk compare")

@@ -35,7 +35,7 @@ from rasterio.transform import from_origin
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.corrections import Corrections
-from tests.controller.exchange.test_robot_import import SWIMMER
+from tests.controller.exchange.robot_import.test_robot_import import SWIMMER
 from tests.docs.test_commands_in_pages import PAGES, ROOT, printed
 from tests.helpers.command import snakewalk
 from tests.helpers.in_process import work_in_this_process
@@ -104,7 +104,7 @@ class Budget:
 @pytest.fixture
 def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     """Make commands short; what is cut stands in this file's docstring."""
-    from snakewalk.controller.bench.commands import bus
+    from snakewalk.controller.bench.commands import bus_serve
     from snakewalk.controller.cameras import camera_watch
     from snakewalk.controller.console import pool
     from snakewalk.controller.repertoire import crowd_film, repertoire_recording
@@ -167,7 +167,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
             client.write(bytes.fromhex("FFFFFD00FE0300013142"))  # a ping to all
         server.serve(lambda: next(looks) > LOOKS)
 
-    monkeypatch.setattr(bus, "_run", few_looks)
+    monkeypatch.setattr(bus_serve, "_run", few_looks)
     return now
 
 

@@ -17,6 +17,7 @@ from snakewalk.controller.cli import command_line
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.messages import LOGGER, messages
 from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.drivers.fallbacks import report_fallback
 
 LINE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} (DEBUG|INFO|WARNING|ERROR) +(.*)")
 SAID = {
@@ -129,3 +130,18 @@ def test_every_command_that_moves_a_body_may_be_watched() -> None:
     assert {"snakewalk run", "snakewalk repertoire run", "snakewalk policy run"} <= set(movers)
     wanted = {"--view", "--view-at", "--ros"}
     assert {name for name, options in movers.items() if not wanted <= options} == set()
+
+
+def test_a_fallback_reported_at_import_is_shown(
+    mocker: MockerFixture, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mocker.patch.dict("snakewalk.drivers.fallbacks._reported", clear=True)
+    report_fallback("numba", "numba 9: loops count references")
+    report_fallback("numba", "numba 9: again")
+    with messages("warning"):
+        report_fallback("mujoco", "MuJoCo 9: public steps")
+        report_fallback("mujoco", "MuJoCo 9: again")
+    assert capsys.readouterr().err.splitlines() == [
+        "snakewalk: numba 9: loops count references",
+        "snakewalk: MuJoCo 9: public steps",
+    ]

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.figures.path import body_outline_m
 from snakewalk.controller.figures.style import thin
 from snakewalk.controller.metrics.summary import summary
@@ -237,6 +238,39 @@ def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None
 def test_the_foot_says_what_made_the_page(record: RunRecord) -> None:
     html = page(summary(record), [], film="", events=[], config={}, made="Made by <me>")
     assert "Made by &lt;me&gt;" in html
+
+
+FOLDERS = {
+    "/home/ann b/runs/log.mcap": "log.mcap",
+    "--out=/home/ann b/x/": "--out=x",
+    "see /home/ann/x.toml, ~/y/z.csv; at 0.1 rad/s": "see x.toml, z.csv; at 0.1 rad/s",
+    "C:\\Users\\Ann\\x.toml": "x.toml",
+    "/dev/ttyUSB0": "/dev/ttyUSB0",
+    "1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1": "1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1",
+    "socket://pi:5000": "socket://pi:5000",
+    "runs/a/log.mcap and m/s or 1/2": "runs/a/log.mcap and m/s or 1/2",
+    "a\u202eb": "a?b",
+}
+
+
+@pytest.mark.parametrize("text", FOLDERS)
+def test_an_absolute_path_becomes_the_name_of_its_file(text: str) -> None:
+    assert without_folders(text) == FOLDERS[text]
+
+
+def test_a_page_contains_no_folder_of_the_user_unless_it_is_asked_for(record: RunRecord) -> None:
+    secret = "/home/ann b/secret/x.toml"
+    numbers = replace(summary(record), robot=secret, log_note=f"torn: {secret.replace(' ', '')}")
+    words = {
+        "events": [Event(0.0, "info", "map", "map: /home/ann/secret/x.toml: written")],
+        "config": {"run": {"track": secret, "list": [{secret: secret}]}},
+        "made": "Made by snakewalk run /home/ann/secret/x.toml",
+    }
+    html = page(numbers, [], film="", **words)  # type: ignore[arg-type]
+    assert "x.toml" in html
+    assert "secret" not in html
+    assert "/home" not in html
+    assert secret in page(numbers, [], film="", **words, folders=True)  # type: ignore[arg-type]
 
 
 def test_thinning_keeps_the_peaks_and_the_mean() -> None:

@@ -1,5 +1,6 @@
 """A killed run, a cut file, a flipped bit: what comes before the break comes back."""
 
+import json
 import os
 import subprocess
 import sys
@@ -125,3 +126,10 @@ def test_a_warning_is_on_the_disk_at_once(tmp_path: Path) -> None:
     log.event(0.2, "trip", "servo 4: overload", level="error")
     assert part_path(log.path).stat().st_size > before
     log.__exit__(None, None, None)
+
+
+def test_an_event_steers_no_terminal_that_shows_the_log(tmp_path: Path) -> None:
+    rows: list[bytes] = []
+    with RunLog(tmp_path / "run.mcap", lambda topic, row: rows.append(row)) as log:
+        log.event(0.1, "map", "robot \x1b[2J\u202etxt.exe")
+    assert [json.loads(row)["text"] for row in rows] == ["robot ?[2J?txt.exe"]

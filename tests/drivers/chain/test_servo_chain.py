@@ -16,7 +16,13 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.start_up import IDENTITY, inspect
 from snakewalk.drivers.errors import BudgetError, BusError, ChainError, PortError
 from snakewalk.drivers.protocol.control_table import load_control_table
-from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
+from snakewalk.drivers.protocol.packet import (
+    ALERT,
+    Instruction,
+    InstructionPacket,
+    StatusPacket,
+    encode_status,
+)
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.protocol.registers import Alarm
 from snakewalk.drivers.types import JointCommand
@@ -277,6 +283,52 @@ def test_an_alarm_is_read_at_once(line: Recorder, chain: ServoChain) -> None:
     state = chain.read()
     assert state.error[1] & 0x80
     assert state.hardware_error.tolist() == [0, 0x20, 0, 0]
+
+
+def alert_without_alarm(line: Recorder, packets: int) -> None:
+    """Set the alert bit in the next status packets of servo 2, though register 70 is 0."""
+    remaining = [None] * packets
+
+    def tamper(data: bytes) -> list[bytes]:
+        if data[4] != 2 or len(data) < 20 or not remaining:  # replies to the group read
+            return [data]
+        remaining.pop()
+        status = StatusPacket(2, ALERT, data[9:-2])
+        return [encode_status(status)]
+
+    line.tamper = tamper
+
+
+@pytest.mark.parametrize("packets", [1, 2])
+def test_an_alert_without_an_alarm_is_reported_and_read_again(line: Recorder, packets: int) -> None:
+    """One such packet ended the run with "alarm" and no name."""
+    chain = ServoChain(DynamixelBus(line), ROBOT)
+    events: list[str] = []
+    chain.on_event = events.append
+    chain.enable()
+    chain._prepare_reads(fast=False)
+    events.clear()
+    alert_without_alarm(line, packets)
+    for _ in range(packets + 2):
+        line.clock.advance(0.01)
+        state = chain.read()
+        assert state.valid.all()
+        assert not state.error.any()
+    assert len(events) == 1
+    assert "joint pitch_02 (ID 2)" in events[0]
+    assert "Hardware Error Status reads 0" in events[0]
+
+
+def test_an_alert_that_stays_counts_though_there_is_no_alarm(line: Recorder) -> None:
+    chain = ServoChain(DynamixelBus(line), ROBOT)
+    chain.enable()
+    chain._prepare_reads(fast=False)
+    alert_without_alarm(line, 10)
+    errors = []
+    for _ in range(4):
+        line.clock.advance(0.01)
+        errors.append(int(chain.read().error[1]))
+    assert errors == [0, 0, ALERT, ALERT]
 
 
 def test_the_slow_round_comes_every_sixteenth_read(line: Recorder, chain: ServoChain) -> None:

@@ -298,6 +298,58 @@ def test_a_port_that_stays_away_is_given_up(rig: Rig) -> None:
     assert (rig.line.bank["Bus Watchdog"] == 0xFF).all()  # they stopped by themselves
 
 
+def exchange_robots(rig: Rig) -> None:
+    """Plug the port into another robot of the same kind, as a run has left it."""
+    rig.line.settle()
+    firmware, bank = rig.line.firmware, rig.line.bank
+    bank["Torque Enable"][:] = 0
+    bank["Bus Watchdog"][:] = 0
+    firmware.plant.position_rad[:] += 0.2
+    firmware.apply_registers()
+    rig.line.pull(0.5)
+
+
+def test_another_robot_with_the_same_ids_does_not_go_on_where_nobody_can_be_asked(rig: Rig) -> None:
+    """It was taken for the same servos: a port that disappears does not switch torque off."""
+    exchange_robots(rig)
+    with pytest.raises(SafetyTrippedError, match="another robot with the same IDs"):
+        rig.cycles(2)
+    assert rig.torque() == [0] * 4
+    assert not any("the same servos" in line for line in rig.events)
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_the_operator_says_whether_it_is_the_same_robot(*, answer: bool) -> None:
+    asked: list[str] = []
+
+    def confirm(found: str) -> bool:
+        asked.append(found)
+        return answer
+
+    rig = Rig("resume", confirm)
+    rig.cycles(30)
+    exchange_robots(rig)
+    with nullcontext() if answer else pytest.raises(SafetyTrippedError):
+        rig.cycles(2)
+    assert len(asked) == 1
+    assert "another robot with the same IDs" in asked[0]
+    assert rig.torque() == [int(answer)] * 4
+
+
+def test_a_supply_that_was_off_for_all_servos_is_asked_about(rig: Rig) -> None:
+    for servo in range(4):
+        rig.line.firmware.reboot(servo)
+    with pytest.raises(SafetyTrippedError, match="their supply was off"):
+        rig.cycles(20)
+
+
+def test_one_servo_that_keeps_its_torque_shows_that_it_is_the_same_robot(rig: Rig) -> None:
+    for servo in range(3):
+        rig.line.firmware.reboot(servo)
+    rig.cycles(20)
+    assert rig.link.recoveries == 1
+
+
 def test_a_stop_button_ends_the_waiting(rig: Rig) -> None:
     rig.line.pull(1e6)
     rig.link.request_stop("stop button")

@@ -129,8 +129,9 @@ def test_the_quick_check_passes_what_is_at_its_limit_and_nothing_beyond() -> Non
         for value, joint in product(values, range(J)):
             bad = at_limits._replace(**{name: np.where(np.arange(J) == joint, value, healthy)})
             assert np.isnan(_age_max_s(bad, memory(), LIMITS)), (name, joint, value)
-    over = memory()._replace(over_current_since_s=one(NOW - 0.1, 1, np.nan))
-    assert np.isnan(_age_max_s(at_limits, over, LIMITS))
+    for name in ("over_current_since_s", "under_voltage_since_s"):
+        begun = memory()._replace(**{name: one(NOW - 0.1, 1, np.nan)})
+        assert np.isnan(_age_max_s(at_limits, begun, LIMITS))
 
 
 def test_what_one_state_or_one_set_of_limits_kept_says_nothing_of_another() -> None:
@@ -201,3 +202,29 @@ def test_a_joint_that_was_not_read_keeps_its_time_though_none_is_above_the_limit
     unread = state(valid=np.array([True, False, True]))
     assert vetted(now=unread, last=begun).memory.over_current_since_s[1] == NOW - 0.3
     assert np.isnan(vetted(last=begun).memory.over_current_since_s).all()
+
+
+def test_a_supply_that_dips_does_not_end_the_run_and_one_that_stays_low_does() -> None:
+    """The first low reading ended it: a dip of a few milliseconds does no harm."""
+    low = one(9.9, 1, 12.0)
+    first = vetted(now=state(voltage_v=low))
+    assert first.veto is None
+    held = vetted(
+        now=state(time_s=NOW + 1.0, voltage_v=low, slow_age_s=np.full(J, 1.0)),
+        last=first.memory,
+        now_s=NOW + 1.0,
+    )
+    assert held.veto is None  # the same measurement, only older
+    well = vetted(now=state(time_s=NOW + 1.0), last=held.memory, now_s=NOW + 1.0)
+    assert np.isnan(well.memory.under_voltage_since_s).all()
+    for last, is_over in ((held.memory, True), (well.memory, False)):
+        later = vetted(now=state(time_s=NOW + 1.32, voltage_v=low), last=last, now_s=NOW + 1.32)
+        assert (later.veto is not None) == is_over
+        assert "joint yaw_02 (ID 8): 9.9 V: supply too low" in str(later.veto) or not is_over
+
+
+def test_a_state_with_a_dip_is_checked_once() -> None:
+    now = state(voltage_v=one(9.9, 1, 12.0))
+    first = vetted(now=now)
+    assert first.memory.checked_state is not None
+    assert vetted(now=now, last=first.memory).memory.under_voltage_since_s[1] == NOW

@@ -139,3 +139,19 @@ def test_a_file_that_is_no_button_is_not_taken_for_one(own_folder: Path, content
     own_folder.mkdir(mode=0o700)
     (own_folder / "1-x.stop").write_bytes(content)
     assert list(stoppable_runs()) == []
+
+
+@pytest.mark.parametrize("text", ["[" * 2500, '{"ports":' * 270, "[]", "null", '{"ports": 1}', "{"])
+def test_a_damaged_button_of_any_depth_is_no_button(own_folder: Path, text: str) -> None:
+    with StopButton("whole") as whole:
+        damaged = bytearray(whole.path.read_bytes())
+        damaged[1552:1554] = len(text).to_bytes(2, "little")
+        damaged[1554 : 1554 + len(text)] = text.encode()
+        path = own_folder / "9-x.stop"
+        path.write_bytes(damaged)
+        with pytest.raises((ValueError, TypeError, KeyError)):
+            PressedButton(path)
+        runs = list(stoppable_runs())
+        assert [each.run.name for each in runs] == ["whole"]
+        for each in runs:
+            each.close()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from snakewalk.config.errors import ConfigError
-from snakewalk.config.faults import FaultPlan
+from snakewalk.config.faults import FaultPlan, ServoFault
 from snakewalk.config.loader import checked, load
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import (
@@ -279,3 +279,10 @@ def test_a_wrong_file_is_one_clear_line(tmp_path: Path, text: str, said: str) ->
 def test_a_servo_that_is_not_there_is_named() -> None:
     with pytest.raises(ConfigError, match=r"fault.0.mute: no servo has ID 9; the bus has 1, 2"):
         scripted(fault("mute", ids=[9]), joints=2)
+
+
+def test_a_kind_that_the_player_does_not_know_is_not_played_as_another() -> None:
+    unknown = ServoFault.model_construct(kind="melt", ids=(1,), at_s=0.0)
+    line = a_line(2)
+    with pytest.raises(AssertionError, match="melt"):
+        FaultPlayer(line, FaultPlan.model_construct(seed=0, fault=(unknown,)))

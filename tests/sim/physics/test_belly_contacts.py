@@ -12,13 +12,15 @@ from snakewalk.sim.physics.belly_contacts import BellyContacts, links_near
 from snakewalk.sim.physics.layout import StepLayout, step_layout
 from snakewalk.sim.physics.mechanics import Mechanics
 from snakewalk.sim.physics.plant import MujocoPlant
+from snakewalk.sim.physics.step_memory import FUNCTIONS, WHOLE
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
 from tests.helpers.physics import FLAT, ROBOT, Floats
 from tests.helpers.uneven import UNEVEN
 
-LAYOUT = step_layout()
-assert LAYOUT is not None
+_FOUND = step_layout()
+assert isinstance(_FOUND, StepLayout)
+LAYOUT: StepLayout = _FOUND
 RNG = np.random.default_rng(5)
 HILLS = HeightField(0.02 * RNG.normal(size=(81, 81)), 0.05, -2.0, -2.0)
 STEPS = HeightField(np.where(np.arange(81) % 8 < 4, 0.0, 0.04) * np.ones((81, 1)), 0.05, -2.0, -2.0)
@@ -125,9 +127,9 @@ def test_feet_and_obstacles_are_left_to_mujoco() -> None:
 
 
 def test_a_mujoco_without_the_parts_is_stepped_as_a_whole(mocker: MockerFixture) -> None:
-    assert isinstance(LAYOUT, StepLayout)
-    without = {field: getattr(LAYOUT, field) for field in LAYOUT.__slots__} | {"parts": ()}
-    mocker.patch("snakewalk.sim.physics.stepper.step_layout", return_value=StepLayout(**without))
+    whole = {name: LAYOUT.functions[name] for name in FUNCTIONS[:WHOLE]}
+    without = StepLayout(LAYOUT.data, LAYOUT.contact, whole)
+    mocker.patch("snakewalk.sim.physics.stepper.step_layout", return_value=without)
     plant, usual = MujocoPlant(ROBOT, FLAT), a_drive(ROBOT)
     plant.advance(0.1, usual)
     mocker.stopall()

@@ -1,10 +1,13 @@
 """The body on its floor: rest, friction's sign, and equal answers of both step kernels."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
+from snakewalk.sim.physics.body import mjcf
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
@@ -92,3 +95,10 @@ def test_steps_that_a_signal_ended_can_be_gone_on_with(monkeypatch: pytest.Monke
     body.advance(0.02, servo)
     assert body.time_s == pytest.approx(0.02)
     assert len(calls) == 11
+
+
+@pytest.mark.parametrize("name", ['15" snake', "a & b", "<robot>", "it's", "ü 蛇", "]]>", "--"])
+def test_every_name_of_a_robot_makes_a_model(name: str) -> None:
+    robot = RobotConfig(name=name, joint_axes="yy")
+    made = mujoco.MjModel.from_xml_string(mjcf(robot, FLAT, None, 0.002))
+    assert made.names[: len(name.encode())] == name.encode()

@@ -1,8 +1,10 @@
 """``snakewalk repertoire play``: recorded actions by wanted speed and turn."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from snakewalk.config.errors import InputError
@@ -26,10 +28,28 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
-from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule
+from snakewalk.controller.repertoire.schedule_run import (
+    PlayedAction,
+    ScheduleMotion,
+    read_schedule,
+)
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.finish import show_run
 from snakewalk.controller.run.watchers import watched
+
+Speed = Annotated[
+    float | None, typer.Option(help="wanted, m/s; negative: tail first; default: 0.4")
+]
+Turn = Annotated[float | None, typer.Option(help="wanted, rad/s, positive to the left; default: 0")]
+Seconds = Annotated[float | None, typer.Option(help="then it comes to rest; default: 20")]
+Schedule = Annotated[
+    Path | None,
+    typer.Option(help="both over time: TOML, or CSV with time_s,speed_m_s,turn_rad_s"),
+]
+Patience = Annotated[
+    int | None,
+    typer.Option(min=1, help="cycles until an action gives way to another of its kind"),
+]
 
 
 @command(
@@ -41,23 +61,11 @@ from snakewalk.controller.run.watchers import watched
 )
 def play_actions(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
-    speed: Annotated[
-        float | None, typer.Option(help="wanted, m/s; negative: tail first; default: 0.4")
-    ] = None,
-    turn: Annotated[
-        float | None, typer.Option(help="wanted, rad/s, positive to the left; default: 0")
-    ] = None,
-    seconds: Annotated[
-        float | None, typer.Option(help="then it comes to rest; default: 20")
-    ] = None,
-    schedule: Annotated[
-        Path | None,
-        typer.Option(help="both over time: TOML, or CSV with time_s,speed_m_s,turn_rad_s"),
-    ] = None,
-    patience: Annotated[
-        int | None,
-        typer.Option(min=1, help="cycles until an action gives way to another of its kind"),
-    ] = None,
+    speed: Speed = None,
+    turn: Turn = None,
+    seconds: Seconds = None,
+    schedule: Schedule = None,
+    patience: Patience = None,
     robot: Robot = None,
     world: World = None,
     set_: Set = None,
@@ -77,18 +85,9 @@ def play_actions(
     """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
     refuse_to_overwrite([picture], force)
     check_picture(picture)
-    import numpy as np  # noqa: PLC0415  --help stays quick
-
-    given = {"speed_m_s": speed, "turn_rad_s": turn, "duration_s": seconds}
-    changes = {key: value for key, value in given.items() if value is not None}
-    if schedule is not None and (speed is not None or turn is not None):
-        raise InputError("--schedule holds speed and turn: leave out --speed and --turn")
-    asked = ScheduleConfig() if schedule is None else read_schedule(schedule)
-    if seconds is not None and seconds <= 0.0:
-        raise InputError(f"--seconds {seconds:g}: must be over 0")
     prepared = prepare_schedule(
         file,
-        asked.model_copy(update=changes),
+        _asked(schedule, speed, turn, seconds),
         robot=robot,
         world=world,
         patience=patience,
@@ -122,17 +121,43 @@ def play_actions(
         "actions": [names[action.action] for action in played],
     }
     if played:
-        requested, recorded, measured = (
-            np.array([getattr(action, key) for action in played])
-            for key in ("requested", "recorded", "measured")
-        )
-        for key, off in (("choice", recorded - requested), ("body", measured - recorded)):
-            median = np.median(np.abs(off), axis=0)
-            result[f"{key}_error_median_m_s"] = round(float(median[0]), 4)
-            result[f"{key}_error_median_rad_s"] = round(float(median[1]), 4)
+        result |= _errors(played)
         if picture is not None:
-            from snakewalk.controller.repertoire import repertoire_plots as plots  # noqa: PLC0415
+            from snakewalk.controller.repertoire.repertoire_plots import draw_schedule  # noqa: PLC0415  --picture: an extra
 
-            plots.draw_schedule(prepared, played, picture)
+            draw_schedule(prepared, played, picture)
             result["picture"] = str(picture)
     show_run(finished, folder, result, as_json, film=film)
+
+
+def _asked(
+    schedule: Path | None, speed: float | None, turn: float | None, seconds: float | None
+) -> ScheduleConfig:
+    """Return the wanted speeds and turns.
+
+    Raises:
+        InputError: two options contradict each other, or a value is out of range.
+
+    """
+    given = {"speed_m_s": speed, "turn_rad_s": turn, "duration_s": seconds}
+    changes = {key: value for key, value in given.items() if value is not None}
+    if schedule is not None and (speed is not None or turn is not None):
+        raise InputError("--schedule holds speed and turn: leave out --speed and --turn")
+    asked = ScheduleConfig() if schedule is None else read_schedule(schedule)
+    if seconds is not None and seconds <= 0.0:
+        raise InputError(f"--seconds {seconds:g}: must be over 0")
+    return asked.model_copy(update=changes)
+
+
+def _errors(played: Sequence[PlayedAction]) -> dict[str, object]:
+    """Return median errors of the choice of actions, and of the body that carried them out."""
+    requested, recorded, measured = (
+        np.array([getattr(action, key) for action in played])
+        for key in ("requested", "recorded", "measured")
+    )
+    found: dict[str, object] = {}
+    for key, off in (("choice", recorded - requested), ("body", measured - recorded)):
+        median = np.median(np.abs(off), axis=0)
+        found[f"{key}_error_median_m_s"] = round(float(median[0]), 4)
+        found[f"{key}_error_median_rad_s"] = round(float(median[1]), 4)
+    return found

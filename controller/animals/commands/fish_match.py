@@ -1,0 +1,83 @@
+"""``snakewalk fish match``: postures of a fish from film."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.commands.fish_options import Build, Picture, check_npz
+from snakewalk.controller.animals.fish.accuracy import compare
+from snakewalk.controller.animals.fish.fish_matching import MIDLINES, match_footage, read_midlines
+from snakewalk.controller.animals.fish.postures import load_postures, save_postures
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+
+Rate = Annotated[float | None, typer.Option(help="frames a second, instead of what the file says")]
+
+
+@command(
+    "fish match",
+    examples=(
+        "fish match top.mp4 --side side.mp4 -o postures.npz",
+        "fish match tank/top --background tank/top-background.png --picture match.png",
+    ),
+)
+def match(
+    footage: Annotated[
+        Path, typer.Argument(help="video or folder of images from above; or tracked midlines")
+    ],
+    side: Annotated[
+        Path | None, typer.Option(help="the same moments from the side: height and pitch")
+    ] = None,
+    background: Annotated[
+        Path | None, typer.Option(help="picture of the empty scene; default: median of frames")
+    ] = None,
+    side_background: Annotated[Path | None, typer.Option(help="the same of the side view")] = None,
+    build: Build = "carp",
+    rate: Rate = None,
+    length: Annotated[
+        float | None, typer.Option(help="body length, m; without it the unit is the body length")
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(help="known postures to compare with: truth.npz of fish film")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="postures")] = Path("postures.npz"),
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Lay a deformable fish over every frame: head, spine angles, and from the side its pitch."""
+    refuse_to_overwrite([output, picture], force)
+    check_picture(picture)
+    check_npz(output)
+    if length is not None and not 0.0 < length < 1e3:
+        raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
+    known = None if truth is None else load_postures(truth)
+    if footage.suffix.lower() in MIDLINES:
+        if side is not None:
+            raise InputError(f"{footage}: midlines have no side view; --side goes with images")
+        matched = read_midlines(footage, build, rate)
+    else:
+        with ProgressBar("frames", transient=True) as bar:
+            matched = match_footage(
+                footage, side, background, side_background, build=build, rate_hz=rate,
+                length_m=length, on_progress=bar.update,
+            )  # fmt: skip
+    accuracy = None if known is None else compare(matched.postures, known)
+    with atomic_write(output) as part:
+        save_postures(part, matched.postures)
+    if picture is not None:
+        from snakewalk.controller.animals.plots.fish import draw_match  # noqa: PLC0415  --picture: an extra
+
+        draw_match(picture, matched.postures, known, matched.film, footage)
+    facts = matched.facts.to_dict()
+    if accuracy is not None:
+        facts |= accuracy.to_dict()
+    show(facts | {"postures": str(output)}, as_json)

@@ -1,0 +1,29 @@
+"""Options that several ``snakewalk fish`` commands have."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console import completion
+
+Build = Annotated[
+    str,
+    typer.Option(
+        help="carp (A0..A3 behind a rigid head) or eel (8 angles)",
+        autocompletion=completion.words("carp", "eel"),
+    ),
+]
+Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf)")]
+
+
+def check_npz(path: Path) -> None:
+    """Reject a result file of another kind.
+
+    Raises:
+        InputError: its name does not end in .npz.
+
+    """
+    if path.suffix.lower() != ".npz":
+        raise InputError(f"{path}: what is written is an .npz")

@@ -1,0 +1,98 @@
+"""``snakewalk fish synthesise``: new motion from segments of a film."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
+from snakewalk.controller.animals.fish.fish_synthesis import SynthesisOptions, synthesise_motion
+from snakewalk.controller.animals.fish.postures import load_postures
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_picture,
+    refuse_to_overwrite,
+)
+
+
+@command(
+    "fish synthesise",
+    examples=(
+        "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
+        "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
+    ),
+)
+def synthesise(
+    postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
+    through: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="control point X,Y or X,Y,Z from the start, x along the head; give several"
+        ),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=3600.0, help="at least so long, at random")
+    ] = 20.0,
+    seed: Annotated[int, typer.Option(min=0, help="of the random order")] = 0,
+    radius: Annotated[float, typer.Option(min=0.01, help="of a control point, body lengths")] = 0.5,
+    limit: Annotated[
+        float, typer.Option(min=1.0, max=3600.0, help="seconds for all control points")
+    ] = 120.0,
+    mirror: Annotated[
+        bool, typer.Option("--mirror", help="use every segment mirrored too")
+    ] = False,
+    within: Annotated[
+        float, typer.Option(min=0.1, max=45.0, help="degrees from the basic posture")
+    ] = 4.0,
+    merge: Annotated[float, typer.Option(min=0.0, help="degrees below which beats merge")] = 20.0,
+    reference: Annotated[
+        str, typer.Option(help="basic posture: straight, or the commonest of the film")
+    ] = "straight",
+    blend: Annotated[float, typer.Option(min=0.02, help="seconds of the blend of a join")] = 0.25,
+    robot: Annotated[
+        str, typer.Option(help="whose joints are written along", autocompletion=completion.ROBOTS)
+    ] = "yaw16",
+    output: Annotated[Path, typer.Option("--output", "-o", help="track")] = Path("track.npz"),
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Put segments of a film together anew, at random or through control points."""
+    refuse_to_overwrite([output, picture], force)
+    check_picture(picture)
+    options = SynthesisOptions(
+        through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,
+        mirror=mirror, within_deg=within, merge_deg=merge, reference=reference, blend_s=blend,
+        robot=robot,
+    )  # fmt: skip
+    check_npz(output)
+    made = synthesise_motion(load_postures(postures), options)
+    with atomic_write(output) as part:
+        made.save(part)
+    if picture is not None:
+        from snakewalk.controller.animals.plots.fish_path import draw_synthesis  # noqa: PLC0415  --picture: an extra
+
+        draw_synthesis(picture, made, options)
+    show(made.facts.to_dict() | {"track": str(output)}, as_json)
+
+
+def _points(words: list[str]) -> list[tuple[float, ...]]:
+    found: list[tuple[float, ...]] = []
+    for word in words:
+        try:
+            point = tuple(float(part) for part in word.split(","))
+        except ValueError:
+            point = ()
+        if len(point) not in {2, 3} or not all(map(math.isfinite, point)):
+            raise InputError(
+                f"--through {word}: a control point is X,Y, as in 3,-1.5, or X,Y,Z with its height"
+            )
+        found.append(point)
+    if len({len(point) for point in found}) > 1:
+        raise InputError("--through: give the height of all control points, or of none")
+    return found

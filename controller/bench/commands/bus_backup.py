@@ -1,0 +1,32 @@
+"""``snakewalk bus backup``: the EEPROM of all servos in a file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.bench.commands.bus_options import Baud
+from snakewalk.controller.bench.eeprom_backup import back_up_all, backup_text
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import ChainPort, Force, Json, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+
+@command(
+    "bus backup", examples=("bus backup -o servos.json", "bus backup --baud 57600 -o one.json")
+)
+def backup(
+    out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
+    port: ChainPort = None,
+    baud: Baud = 1_000_000,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write the EEPROM of all servos on the bus into a file; changes nothing."""
+    refuse_to_overwrite([out], force)
+    with open_lines(port, baud) as lines:
+        found = back_up_all(lines, lambda step: typer.echo(step, err=True))
+    with atomic_write(out) as part:
+        part.write_text(backup_text(found), encoding="utf-8")
+    show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)

@@ -1,0 +1,37 @@
+"""``snakewalk bus blink``: finds servos by their LED."""
+
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.bench.commands.bus_options import Baud, Ids
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import ChainPort, Json, show
+
+_BLINK_S = 0.3
+"""How long a LED is on, and then off."""
+
+
+@command("bus blink", examples=("bus blink --id 7 --times 10",))
+def blink(
+    servo_id: Ids,
+    port: ChainPort = None,
+    baud: Baud = 1_000_000,
+    times: Annotated[int, typer.Option(min=1, max=1000, help="how often")] = 5,
+    as_json: Json = False,
+) -> None:
+    """Let the LED of servos blink, to find them; nothing moves."""
+    with open_lines(port, baud) as lines:
+        buses = {each: lines.open_servo(each) for each in servo_id}
+        clock = lines.lines[0][0].clock
+        try:
+            for _ in range(times):
+                for on in (1, 0):
+                    for each, bus in buses.items():
+                        bus.write(each, "LED", on)
+                    clock.sleep_until_s(clock.now_s() + _BLINK_S)
+        finally:
+            for each, bus in buses.items():
+                bus.write(each, "LED", 0)
+    show({"blinked": list(buses), "times": times}, as_json)

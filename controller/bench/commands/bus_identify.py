@@ -1,0 +1,76 @@
+"""``snakewalk bus identify``: the servos on a bus, and a robot file to begin with."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.bench import inventory, scan
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import ChainPort, Force, Json, console
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+
+
+@command("bus identify", examples=("bus identify", "bus identify --baud 1000000 -o mine.toml"))
+def bus_identify(
+    port: ChainPort = None,
+    baud: Annotated[
+        list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="a robot's file to begin with (.toml)")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
+    if out is not None and out.suffix != ".toml":
+        raise InputError(f"{out}: a robot's file ends in .toml")
+    refuse_to_overwrite([out], force)
+    scan.check_bauds(baud or ())
+    with open_lines(port, baud[0] if baud else 1_000_000) as lines:
+        entries = [
+            (line.name, entry)
+            for line, _ in lines.lines
+            for entry in inventory.take_inventory(
+                line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
+            )
+        ]
+    if not entries:
+        raise InputError(f"{lines.port}: nobody answers: power? cable? adapter's switch?")
+    for note in lines.misplaced((name, entry.found.servo_id) for name, entry in entries):
+        LOGGER.warning("%s", note)
+    if out is not None:
+        segments = [
+            (line.name, [entry.found.servo_id for name, entry in entries if name == line.name])
+            for line, _ in lines.lines
+        ]
+        text = inventory.robot_skeleton(
+            out.stem, [entry for _, entry in entries], segments if lines.several else ()
+        )
+        with atomic_write(out) as part:
+            part.write_text(text, encoding="utf-8")
+    if as_json:
+        servos = [entry.to_dict() | {"port": name} for name, entry in entries]
+        print(json.dumps({"port": lines.port, "servos": servos, "robot": out and str(out)}))
+        return
+    heads = ("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault")
+    table = Table(*heads, *(["port"] if lines.several else []), box=None)
+    for name, entry in entries:
+        found, state = entry.found, entry.report
+        state_told = ("-",) * 3
+        if state is not None:
+            torque = "on" if state.torque_on else "off"
+            state_told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
+        about = (found.servo_id, found.model, found.firmware, found.baud)
+        table.add_row(
+            *map(str, about), *state_told, entry.fault, *([name] if lines.several else [])
+        )
+    console.print(table)
+    if out is not None:
+        console.print(f"robot {out}: say the axes, then: snakewalk calibrate --robot {out}")

@@ -1,0 +1,32 @@
+"""``snakewalk bus reboot``: restarts servos."""
+
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.bench.commands.bus_options import Baud, Ids, confirmed
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.bench.servo_settings import restart
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import ChainPort, Json, show
+
+
+@command("bus reboot", examples=("bus reboot --id 3 --id 4",))
+def reboot(
+    servo_id: Ids,
+    port: ChainPort = None,
+    baud: Baud = 1_000_000,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="without asking")] = False,
+    as_json: Json = False,
+) -> None:
+    """Restart servos, which clears their alarms; torque goes off: what they hold falls."""
+    facts: dict[str, object] = {}
+    with open_lines(port, baud) as lines:
+        buses = {each: lines.open_servo(each) for each in servo_id}
+        if yes or confirmed(as_json, "torque goes off: what these servos hold falls; reboot them?"):
+            for each, bus in buses.items():
+                before, after = restart(bus, each)
+                facts[f"ID {each}"] = (
+                    f"rebooted; alarm before: {before or 'none'}; now: {after or 'none'}"
+                )
+    show(facts or {"rebooted": "none"}, as_json)

@@ -1,0 +1,63 @@
+"""``snakewalk bus restore``: the values of a backup, where they differ."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.bench.commands.bus_options import Baud, confirmed
+from snakewalk.controller.bench.eeprom_backup import load_backup, plan_restore
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.bench.servo_settings import apply
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import ChainPort, Json, console
+
+
+@command(
+    "bus restore",
+    examples=("bus restore servos.json --dry-run", "bus restore servos.json --id 7 --yes"),
+)
+def restore(
+    file: Annotated[Path, typer.Argument(help="of `snakewalk bus backup`", dir_okay=False)],
+    servo_id: Annotated[
+        list[int] | None, typer.Option("--id", help="only this servo; may be repeated")
+    ] = None,
+    port: ChainPort = None,
+    baud: Baud = 1_000_000,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
+    as_json: Json = False,
+) -> None:
+    """Write a backup's values where they differ; shows them and asks first."""
+    servos = {each.id: each for each in load_backup(file).servos}
+    wanted = servo_id or list(servos)
+    missing = [str(each) for each in wanted if each not in servos]
+    if missing:
+        raise InputError(
+            f"{file}: has no ID {', '.join(missing)}; it has {', '.join(map(str, servos))}"
+        )
+    with open_lines(port, baud) as lines:
+        buses = {each: lines.open_servo(each) for each in wanted}
+        plans = {each: plan_restore(buses[each], servos[each]) for each in wanted}
+        changed = {each: changes for each, changes in plans.items() if changes}
+        if not as_json:
+            table = Table("ID", "register", "now", "then", box=None)
+            for each, changes in changed.items():
+                for change in changes:
+                    table.add_row(str(each), change.register, str(change.before), str(change.after))
+            console.print(table if changed else "nothing to restore")
+        written = bool(changed) and not dry_run and (yes or confirmed(as_json))
+        if written:
+            for each, changes in changed.items():
+                apply(buses[each], each, changes)
+    if as_json:
+        shown = {
+            str(each): {c.register: [c.before, c.after] for c in changes}
+            for each, changes in changed.items()
+        }
+        print(json.dumps({"changes": shown, "written": written}))
+    elif changed:
+        console.print("written and read back" if written else "nothing written")

@@ -1,0 +1,311 @@
+"""``snakewalk bus serve``: simulated servos at a serial device."""
+
+import json
+import math
+import os
+import select
+import signal
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.faults import FaultPlan
+from snakewalk.config.loader import load, load_robot, load_world
+from snakewalk.controller.bench.live_table import LiveScreen, MakeDecoder, Snapshot
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import Force, Json
+from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.drivers.clock import Clock, WallClock
+from snakewalk.drivers.priority import raised_priority
+from snakewalk.sim.ax12.decode import Decoder1
+from snakewalk.sim.ax12.line import Ax12Line
+from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.plant import Mounting
+from snakewalk.sim.serve.bench_line import bench_line
+from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu
+from snakewalk.sim.serve.console import Console
+from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows
+from snakewalk.sim.serve.recorded_line import RecordedLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.motor import motors_of
+from snakewalk.sim.servo.protection import SupplyAndAmbient
+from snakewalk.sim.sniff.decode import Decoder
+from snakewalk.sim.sniff.trace import TraceWriter
+
+if TYPE_CHECKING:
+    from snakewalk.sim.line.wire import Wire
+    from snakewalk.sim.serve.pty import PtyServer
+
+    Served = tuple[ChainSpec, Wire, LiveTable, MakeDecoder, FaultPlayer | None]
+
+REFRESH_S = 0.25
+"""Time between two drawings of the live table."""
+STEP_S = 0.02
+LATE_SHARE = 0.05
+"""Share of the time served; a larger loss is reported at the end (ours)."""
+Servos = Annotated[
+    str | None,
+    typer.Option(help="IDS[:MODEL],... on a bench: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
+]
+SimulatedRobot = Annotated[
+    str | None,
+    typer.Option(
+        help="shipped robot or a TOML file, in MuJoCo on flat ground",
+        autocompletion=completion.ROBOTS,
+    ),
+]
+BenchImu = Annotated[
+    str | None,
+    typer.Option(help="ID[:MODEL] of an IMU beside --servos, level and still: 200:imu_to_dxl"),
+]
+Recorded = Annotated[
+    Path | None,
+    typer.Option(help="give the replies of an exchange that --record wrote, instead of servos"),
+]
+WithConsole = Annotated[
+    bool,
+    typer.Option("--console", help="read set, get, load, fault, pace, quit from standard input"),
+]
+
+
+@command(
+    "bus serve",
+    examples=("bus serve --servos 1-16", "bus serve --robot yaw16 --faults faults.toml --pace 0.5"),
+)
+def serve(
+    servos: Servos = None,
+    robot: SimulatedRobot = None,
+    imu: BenchImu = None,
+    baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
+    pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,
+    faults: Annotated[Path | None, typer.Option(help="TOML file of what goes wrong")] = None,
+    latency: Annotated[float, typer.Option(help="of the USB adapter, ms")] = 0.0,
+    link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
+    record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
+    play: Recorded = None,
+    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    with_console: WithConsole = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Serve simulated servos at a serial device, in real time, with a live table."""
+    try:
+        from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415  not on Windows
+    except ImportError:
+        raise InputError("bus serve: pseudo-terminals are for Linux and macOS") from None
+    if sum(each is not None for each in (servos, robot, play)) > 1:
+        raise InputError("give one of --servos, --robot and --play")
+    if play is not None and (imu is not None or faults is not None):
+        raise InputError("--play: has what was recorded; leave --imu and --faults out")
+    if imu is not None and robot is not None:
+        raise InputError("--imu: with --robot, its file says it: table [imu]")
+    _check_serving(latency, for_s, record, link)
+    refuse_to_overwrite([record], force)
+    refuse_to_overwrite([link], force=True)
+    what, line, traffic, make_decoder, player = _served(
+        play, baud, partial(_simulated, servos, robot, imu, baud, faults)
+    )
+    console = None
+    if with_console:
+        console = _console(line, player, as_json)
+    line.usb_latency_s = latency * 1e-3
+    line.taps.append(traffic)
+    clock = WallClock()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the link goes, the record is whole
+    with raised_priority(), PtyServer(line, clock, pace=pace, link=link) as server:
+        out = record.open("w", encoding="utf-8") if record is not None else None
+        if out is not None:
+            line.taps.append(TraceWriter(out))
+        _announce(server, what, line, as_json)
+        try:
+            ended = lambda: for_s is not None and clock.now_s() >= for_s  # noqa: E731
+            if console is not None:
+                _converse(server, console, ended)
+            else:
+                _run(server, traffic, make_decoder, clock, ended, as_json)
+        except KeyboardInterrupt:
+            print(file=sys.stderr)
+        finally:
+            if out is not None:
+                out.close()
+        late_share = server.missed_s / max(clock.now_s() * pace, 1e-9)
+    if as_json:
+        _print_counts(traffic, server)
+    else:
+        _tell_what_was_lost(late_share, server.output_flushes)
+
+
+def _print_counts(traffic: LiveTable, server: "PtyServer") -> None:
+    counts: dict[str, float] = {
+        "questions": traffic.questions,
+        "answers": traffic.answers,
+        "bytes": traffic.bytes,
+        "missed_s": server.missed_s,
+        "output_flushes": server.output_flushes,
+    }
+    print(json.dumps(counts | {"servos": traffic.registers()}), flush=True)
+
+
+def _check_serving(
+    latency: float, for_s: float | None, record: Path | None, link: Path | None
+) -> None:
+    """Check numbers and names of ``serve``.
+
+    Raises:
+        InputError: one cannot be.
+
+    """
+    if not 0.0 <= latency < math.inf:
+        raise InputError(f"--latency {latency:g}: must not be negative, nor without end")
+    if latency > 1e4:  # no client waits for it (ours)
+        raise InputError(f"--latency {latency:g}: must be at most 10000 ms")
+    if for_s is not None and not for_s > 0.0:
+        raise InputError(f"--for {for_s:g}: must be over 0 s")
+    if record is not None and link is not None and record.absolute() == link.absolute():
+        raise InputError("--record and --link have the same name")
+
+
+def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
+    """Say at the end what the machine or the client did that no real bus does."""
+    if late_share > LATE_SHARE:
+        LOGGER.warning(
+            "time ran %.0f %% slower than --pace: this machine is too slow", late_share * 100
+        )
+    if output_flushes:
+        LOGGER.warning(
+            "a client flushed its output at least %d times: what it had sent less than 5 ms before "
+            "may be lost, as on no UART (docs/bus.md)",
+            output_flushes,
+        )
+
+
+def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served]") -> "Served":
+    """What is served, its line, who looks at it, what puts its packets into words, its faults."""
+    if play is None:
+        return simulated()
+    line = RecordedLine.of(play, baud or 1_000_000)
+    spec = ChainSpec(tuple(line.ids), (f"recording {play}",) * len(line.ids))
+    return spec, line, LiveTable(list), Decoder, None
+
+
+def _simulated(
+    servos: str | None,
+    robot: str | None,
+    imu: str | None,
+    baud: int | None,
+    faults: Path | None,
+) -> "Served":
+    """Simulated servos, as ``_served`` has them."""
+    spec = parse_chain(servos or "1-4")
+    if robot is None:
+        line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
+    else:
+        line = _robot_line(robot, baud)
+        spec = ChainSpec(line.bank.ids, line.bank.models)
+    player = None
+    if faults is not None:
+        player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
+    if isinstance(line, Ax12Line):
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), Decoder1, None
+    models = dict(zip(spec.ids, spec.models, strict=True))
+    decoder = partial(Decoder, spec.kinds[0], models)
+    return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
+
+
+def _robot_line(name: str, baud: int | None) -> SimLine:
+    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415  an extra
+
+    robot = load_robot(name)
+    rate = baud or robot.servo.baud
+    bank = ServoBank(robot.servo_ids, robot.servo_models, rate)
+    plant = MujocoPlant(robot, load_world("flat"))
+    return SimLine(
+        bank,
+        plant,
+        baud=rate,
+        mounting=Mounting.of(robot),
+        motors=motors_of(robot),
+        supply_and_ambient=SupplyAndAmbient.of(robot),
+        imu=plant_imu(robot, plant, rate),
+    )
+
+
+def _announce(server: "PtyServer", what: ChainSpec, line: "Wire", as_json: bool) -> None:
+    ids = ", ".join(map(str, what.ids))
+    if as_json:
+        print(
+            json.dumps(
+                {
+                    "port": server.path,
+                    "model": what.model,
+                    "ids": list(what.ids),
+                    "baud": line.getBaudRate(),
+                }
+            ),
+            flush=True,
+        )
+    else:
+        print(f"port {server.path}", flush=True)
+        print(f"{what.model}: {ids} at {line.getBaudRate()} baud; ^C ends", flush=True)
+
+
+def _run(
+    server: "PtyServer",
+    traffic: LiveTable,
+    make_decoder: MakeDecoder,
+    clock: Clock,
+    stopped: Callable[[], bool],
+    as_json: bool,
+) -> None:
+    """Serve; draw the table on a terminal, nothing elsewhere."""
+    if as_json or not sys.stderr.isatty():
+        server.serve(stopped)
+        return
+
+    with LiveScreen(make_decoder) as screen:
+        due_s = 0.0
+        while not stopped():
+            server.step(STEP_S)
+            now_s = clock.now_s()
+            if now_s >= due_s and screen.ready:
+                due_s = now_s + REFRESH_S
+                counts = (
+                    f"{server.path or 'port gone'}   {traffic.questions} questions, "
+                    f"{traffic.answers} answers, {traffic.bytes} bytes"
+                )
+                if server.missed_s >= REFRESH_S:
+                    counts += f"; {server.missed_s:.1f} s left out, this machine is too slow"
+                screen.show(Snapshot(counts, traffic.registers(), traffic.take_recent()))
+
+
+def _console(line: "Wire", player: FaultPlayer | None, as_json: bool) -> Console:
+    if as_json:
+        raise InputError("--console: is a person's; leave --json out")
+    if not isinstance(line, SimLine):
+        raise InputError("--console: servos of Protocol 2.0 have one")
+    return Console(line, player or FaultPlayer(line, FaultPlan()))
+
+
+def _converse(server: "PtyServer", console: Console, stopped: Callable[[], bool]) -> None:
+    """Serve, and execute the lines of standard input; its end leaves the servos served."""
+    console.set_pace, heard, unread = server.set_pace, sys.stdin.fileno(), ""
+    listening = True
+    while not stopped():
+        server.step(STEP_S)
+        if not listening or not select.select([heard], [], [], 0.0)[0]:
+            continue
+        more = os.read(heard, 4096).decode(errors="replace")
+        listening = bool(more)
+        *lines, unread = (unread + more).split("\n")
+        for text in filter(str.strip, lines):
+            if text.strip() == "quit":
+                return
+            print(console.execute(text), flush=True)

@@ -1,0 +1,83 @@
+"""``snakewalk bus set``: settings of a servo that outlive its power."""
+
+import json
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.controller.bench.commands.bus_options import confirmed
+from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.bench.servo_settings import (
+    SettingChange,
+    SettingsRequest,
+    SettingsResult,
+    apply,
+    plan,
+)
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import ChainPort, Json, console
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.protocol.registers import BAUDS
+
+
+@command(
+    "bus set",
+    examples=(
+        "bus set --id 1 --baud 57600 --new-id 7 --new-baud 1000000 --dry-run",
+        "bus set --id 7 --return-delay 0 --yes",
+    ),
+)
+def bus_set(
+    servo_id: Annotated[int, typer.Option("--id", help="the servo, 0 to 252")],
+    port: ChainPort = None,
+    baud: Annotated[int, typer.Option(help="at which it answers now")] = 1_000_000,
+    new_id: Annotated[int | None, typer.Option(help="0 to 252")] = None,
+    new_baud: Annotated[int | None, typer.Option(help="bit/s")] = None,
+    min_position: Annotated[float | None, typer.Option(help="rad, 0 is straight")] = None,
+    max_position: Annotated[float | None, typer.Option(help="rad, 0 is straight")] = None,
+    current_limit: Annotated[float | None, typer.Option(help="A")] = None,
+    temperature_limit: Annotated[float | None, typer.Option(help="C")] = None,
+    voltage_min: Annotated[float | None, typer.Option(help="V")] = None,
+    voltage_max: Annotated[float | None, typer.Option(help="V")] = None,
+    return_delay: Annotated[float | None, typer.Option(help="us")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
+    as_json: Json = False,
+) -> None:
+    """Change settings of one servo that outlive its power; shows them and asks first."""
+    if baud not in BAUDS:
+        raise ControlTableError(f"--baud {baud}: servos have {', '.join(map(str, BAUDS))}")
+    request = SettingsRequest(
+        new_id=new_id,
+        new_baud=new_baud,
+        min_position_rad=min_position,
+        max_position_rad=max_position,
+        current_limit_a=current_limit,
+        temperature_limit_c=temperature_limit,
+        voltage_min_v=voltage_min,
+        voltage_max_v=voltage_max,
+        return_delay_us=return_delay,
+    )
+    with open_lines(port, baud) as lines:
+        bus = lines.open_servo(servo_id)
+        changes = plan(bus, servo_id, request)
+        if not as_json:
+            _show(servo_id, bus.table.model, changes)
+        written = bool(changes) and not dry_run and (yes or confirmed(as_json))
+        if written:
+            apply(bus, servo_id, changes)
+    if as_json:
+        print(json.dumps(SettingsResult(servo_id, changes, written).to_dict()))
+    elif changes:
+        console.print("written and read back" if written else "nothing written")
+
+
+def _show(servo_id: int, model: str, changes: tuple[SettingChange, ...]) -> None:
+    if not changes:
+        console.print(f"servo {servo_id} ({model}): nothing to change")
+        return
+    table = Table(f"servo {servo_id} ({model})", "now", "then", "", box=None)
+    for change in changes:
+        table.add_row(change.register, str(change.before), str(change.after), change.meaning)
+    console.print(table)

@@ -1,0 +1,59 @@
+"""``snakewalk bus sniff``: an exchange on a bus, packet by packet."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.bench.sniff import receive, stand_between
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Json
+from snakewalk.sim.ax12.decode import Decoder1
+from snakewalk.sim.ax12.table import MODEL as AX12
+from snakewalk.sim.sniff.decode import Decoder
+from snakewalk.sim.sniff.trace import read_trace
+
+
+@command("bus sniff", examples=("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))
+def sniff(
+    source: Annotated[
+        Path, typer.Argument(help="a recording (JSON lines, hex text, raw), or a serial device")
+    ],
+    baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
+    model: Annotated[
+        str, typer.Option(help="of servos whose model no ping has shown; AX-12A: Protocol 1.0")
+    ] = "XM430-W350",
+    through: Annotated[
+        bool, typer.Option("--through", help="stand between a client and the device")
+    ] = False,
+    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    as_json: Json = False,
+) -> None:
+    """Decode a live or recorded exchange packet by packet."""
+    if not source.exists():
+        raise InputError(f"{source}: no such file or device")
+    decoder = Decoder1() if model.upper() == AX12 else Decoder(model)
+    live = source.is_char_device()
+    if through and not live:
+        raise InputError(f"{source}: --through needs a serial device")
+    if not live:
+        pieces = read_trace(source)
+    elif through:
+        pieces = stand_between(str(source), baud, for_s)
+    else:
+        pieces = receive(str(source), baud, for_s)
+    size, packets = 0, 0
+    try:
+        for time_s, data in pieces:
+            size += len(data)
+            for line in decoder.feed(time_s, data):
+                packets += line.kind != "noise"
+                print(json.dumps(line.to_dict()) if as_json else line.text(), flush=live)
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+    if not live and packets == 0:
+        what = f"no packet in {size} bytes" if size else "no exchange"
+        raise InputError(f"{source}: holds {what}; --model AX-12A reads Protocol 1.0")

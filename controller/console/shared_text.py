@@ -1,0 +1,39 @@
+"""Text of a page that is passed on: without the folders of the user who made it."""
+
+import re
+from collections.abc import Mapping
+from typing import Any, Final
+
+from snakewalk.config.plain_text import plain
+
+_FOLDERS: Final = re.compile(
+    r"""(?<![\w.:/\\~-])             # not within a relative path, a URL or a unit
+    (?:~[\w.-]*|[A-Za-z]:)?[/\\](?!dev/)
+    (?:[^/\\'"<>|;:,\s]*[/\\])+""",
+    re.VERBOSE,
+)
+_PATH: Final = re.compile(r"(?:~[\w.-]*|[A-Za-z]:)?[/\\](?!dev/)(?:[^\n]*[/\\])?([^/\\\n]+)[/\\]?")
+
+
+def without_folders(text: str) -> str:
+    """Return a text in which an absolute path is only a file's name; devices keep theirs.
+
+    A text that is one path, or OPTION=PATH, may contain spaces.
+    """
+    text = plain(text)
+    option, equals, value = text.rpartition("=") if "://" not in text else ("", "", text)
+    whole = _PATH.fullmatch(value)
+    if whole is not None and not any(c in option for c in " /\\"):
+        return option + equals + whole[1]
+    return _FOLDERS.sub("", text)
+
+
+def shared(value: Any) -> Any:
+    """Return a value of JSON whose texts, keys too, are ``without_folders``."""
+    if isinstance(value, str):
+        return without_folders(value)
+    if isinstance(value, Mapping):
+        return {without_folders(str(key)): shared(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [shared(one) for one in value]
+    return value

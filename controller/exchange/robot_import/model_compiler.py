@@ -1,0 +1,160 @@
+"""From a model's file to MuJoCo's model: expand xacro, prepare, compile within limits."""
+
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import mujoco
+
+from snakewalk.config.errors import Assumptions, InputError
+from snakewalk.controller.console.child_process import child_environ, run_code
+from snakewalk.controller.exchange.robot_import.mjcf_source import prepare_mjcf
+from snakewalk.controller.exchange.robot_import.model_source import (
+    LineElement,
+    ModelSource,
+    check_parts,
+    parse,
+    with_places,
+)
+from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
+
+_MOST_MEMORY_BYTES, _MOST_CPU_S = 2_000_000_000, 10
+"""Of MuJoCo's compiler and of xacro (ours)."""
+_SAID: Final = 3
+_LIMITS: Final = """
+import sys
+*words, memory_bytes, cpu_s = sys.argv[1:]
+try:
+    import resource
+except ImportError:  # Windows
+    pass
+else:
+    for which, most in (("AS", memory_bytes), ("CPU", cpu_s), ("FSIZE", memory_bytes)):
+        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
+"""
+_COMPILER: Final = f"""{_LIMITS}
+source, made = words
+import mujoco
+try:
+    mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(source), made, None)
+except (ValueError, RuntimeError, MemoryError) as error:
+    print(error or type(error).__name__)
+    sys.exit({_SAID})
+"""
+_XACRO: Final = f"""{_LIMITS}
+import xacro
+sys.argv = words
+xacro.main()
+"""
+
+
+def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelSource]:
+    """Compile a URDF, a xacro or a MuJoCo model.
+
+    Raises:
+        InputError: it cannot be read.
+
+    """
+    root, replaced = parse(path)
+    notes = []
+    if replaced:
+        notes.append(f"{replaced} characters are not UTF-8; names that hold them differ")
+    if any(each.tag.startswith("xacro:") for each in root.iter()):
+        root, _ = parse(path, name="expanded xacro", text=_expanded(path))
+        notes.append("xacro was run with its default arguments; lines are those of its output")
+    check_parts(path, root)
+    if root.tag not in ("robot", "mujoco"):
+        raise InputError(
+            f"{path}: begins with <{root.tag}>, not with <mujoco> (MJCF) or <robot> (URDF)"
+        )
+    if root.tag == "mujoco":
+        source = prepare_mjcf(root, path, assumed)
+        model, fault = _compiled(source)
+    else:
+        copy = _copied(root)
+        source = prepare_urdf(root, path)
+        model, fault = _compiled(source)
+        if model is None and any(mesh.get("filename") for mesh in root.iter("mesh")):
+            source = prepare_urdf(copy, path, meshes=False)  # one that MuJoCo cannot use
+            model, fault = _compiled(source)
+    if model is None:
+        raise InputError(f"{path}: MuJoCo cannot read it: {fault}")
+    source.notes[:0] = notes
+    return model, source
+
+
+def _copied(element: LineElement) -> LineElement:
+    copy = LineElement(element.tag, dict(element.attrib))
+    copy.file, copy.line = element.file, element.line
+    for child in element:
+        assert isinstance(child, LineElement)
+        copy.append(_copied(child))
+    return copy
+
+
+def _expanded(path: Path) -> str:
+    """URDF of a xacro file, by the xacro that is installed.
+
+    Raises:
+        InputError: there is none, or it cannot expand the file.
+
+    """
+    if find_spec("xacro") is not None:
+        limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
+        command = [sys.executable, "-c", _XACRO, "xacro", str(path), *limits]
+    elif (program := shutil.which("xacro")) is not None:
+        command = [program, str(path)]
+    else:
+        raise InputError(
+            f"{path}: is xacro, which needs the program xacro: pip install xacro, or write its "
+            f"URDF elsewhere: xacro {path.name} > FILE.urdf"
+        )
+    try:
+        ended = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False,
+            timeout=6.0 * _MOST_CPU_S, env=child_environ(),
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{path}: xacro does not end") from None
+    if ended.returncode or not ended.stdout.strip():
+        lines = [line for line in ended.stderr.splitlines() if line.strip()]
+        raise InputError(
+            f"{path}: xacro cannot expand it: {lines[-1] if lines else 'no output'}; "
+            "a file with $(find PACKAGE) needs the ROS environment of that package"
+        )
+    return ended.stdout
+
+
+def _compiled(source: ModelSource) -> tuple[mujoco.MjModel | None, str]:
+    """Compiled model, or None and MuJoCo's message with the user's lines."""
+    text, places = source.text()
+    with TemporaryDirectory() as folder:
+        copy, made = Path(folder) / f"model.{source.root.tag}", Path(folder) / "model.mjb"
+        copy.write_text(text, encoding="utf-8")
+        said = compile_model(copy, made)
+        if said is not None:
+            return None, with_places(" ".join(said.split()), places)
+        return mujoco.MjModel.from_binary_path(str(made)), ""
+
+
+def compile_model(source: Path, made: Path) -> str | None:
+    """Let MuJoCo compile a model in a process of its own; its message if it cannot, or None.
+
+    A model may ask for any memory and time, and crash the compiler; that process is limited in all.
+    """
+    limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
+    ended = run_code(
+        _COMPILER, str(source), str(made), *limits, folder=source.parent
+    )  # MuJoCo writes its log there
+    if ended.returncode == _SAID:
+        return ended.stdout
+    if ended.returncode or not made.is_file():
+        return (
+            f"its compiler gave up: {_MOST_MEMORY_BYTES / 1e9:g} GB of memory and {_MOST_CPU_S} s "
+            "are enough for a robot's model"
+        )
+    return None

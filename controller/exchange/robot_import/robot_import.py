@@ -1,0 +1,379 @@
+"""Robot models of other programs as robot files: ``snakewalk robot import``.
+
+MuJoCo reads the model. The joints' axes, order and ranges, and the links' lengths, masses and radii
+are taken from it. Links here are straight, have their joints on one line and their mass spread
+evenly about it: what a model has beyond that is rejected, or reported in a note. An anchor may lie
+anywhere along its own axis, which changes no motion: anchors are moved there to the line.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import Assumptions, ConfigError, InputError
+from snakewalk.config.loader import checked
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.exchange.robot_import.body_tree import (
+    BodyTree,
+    Hinge,
+    body_tree,
+    centre_m,
+)
+from snakewalk.controller.exchange.robot_import.chain_directions import (
+    ChainDirections,
+    chain_directions,
+)
+from snakewalk.controller.exchange.robot_import.leg_pairs import LegPair, leg_pairs
+from snakewalk.controller.exchange.robot_import.link_figures import (
+    ChainFigures,
+    LinkFigures,
+    uneven_notes,
+)
+from snakewalk.controller.exchange.robot_import.model_compiler import load_model
+from snakewalk.controller.exchange.robot_import.model_source import ModelSource
+from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
+from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.servo.models import MODELS
+
+_MOST_RAD: Final = 3.05
+"""Half range of a joint that may turn for ever: a servo in position mode knows one turn."""
+_NEXT_TO_NOTHING_KG: Final = 2e-4
+"""Of what lies between two hinges of one body (ours): physics needs a mass."""
+_POSES: Final = 20
+_TORQUE_N_M, _SPEED_RAD_S = (0.1, 100.0), (0.1, 20.0)
+"""Beyond these, a stated limit is a placeholder (ours)."""
+_HELD_SHARE: Final = 2.0 / 2.3
+"""Of a servo's stall torque, up to which a run goes on: as of its current (ours)."""
+_LENGTH_M, _MASS_KG, _RADIUS_M = (0.0, 1.0), (0.0001, 20.0), (0.002, 0.5)
+"""What a robot file accepts of a link."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedRobot:
+    """A robot that was read from a model of another program."""
+
+    robot: RobotConfig
+    joint_names: tuple[str, ...]
+    """As the model has them, in the order of the servos' IDs."""
+    notes: tuple[str, ...]
+    """What was dropped, changed or assumed."""
+    kinematics_error_m: float
+    """Largest distance of a joint's axis from the model's, in random poses within the ranges."""
+
+
+def import_robot(
+    path: Path,
+    name: str,
+    servo_model: str,
+    *,
+    scale: float = 1.0,
+    reverse: bool = False,
+    assumed: Assumptions | None = None,
+) -> ImportedRobot:
+    """Read a robot; its joints get the IDs 1, 2, 3 ... from the head.
+
+    Args:
+        path: ``.xml`` (MJCF), ``.urdf`` or ``.xacro``.
+        name: of the robot.
+        servo_model: of all joints; a model knows no servos.
+        scale: lengths are multiplied by it, masses by its third power.
+        reverse: the model's first body is the tail.
+        assumed: values that the model does not state.
+
+    Raises:
+        InputError: it is no model, does not state what matters, or holds what a robot's file
+            cannot express.
+
+    """
+    assumed = Assumptions() if assumed is None else assumed
+    try:
+        model, source = load_model(path, assumed)
+        found = _read(model, source, name, servo_model, scale, reverse, assumed)
+        assumed.check_used("keys: LINK.length_m, LINK.mass_kg, MESH.mass_kg, radius_m")
+    except ConfigError as error:
+        raise InputError(f"{path}: {error.faults[0]}") from None
+    except InputError as error:
+        named = [f"{path}: {fault.removeprefix(f'{path}: ')}" for fault in error.faults]
+        raise InputError(named) from None
+    return found
+
+
+def _read(
+    model: mujoco.MjModel,
+    source: ModelSource,
+    name: str,
+    servo_model: str,
+    scale: float,
+    reverse: bool,
+    assumed: Assumptions,
+) -> ImportedRobot:
+    """``import_robot`` of a model that is compiled."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    notes = list(source.notes)
+    tree = body_tree(model, data, source)
+    way_m = centre_m(model, data, tree.groups[-1]) - centre_m(model, data, tree.groups[0])
+    directions = chain_directions(tree.hinges, way_m, reverse, notes)
+    if reverse:
+        tree, directions = _reversed(tree), replace(directions, yaws=directions.yaws[::-1])
+    figures = ChainFigures(model, data, tree, directions, source, assumed)
+    notes += [
+        *figures.notes,
+        *uneven_notes(figures.links, tree.names),
+        *_wheel_notes(figures.wheel_friction(source), tree),
+    ]
+    legs = leg_pairs(model, data, tree, directions, figures.joints_m, figures.links, notes)
+    joints = _joints(model, tree, directions, reverse, notes)
+    _check_size(figures.links, tree.names, scale)
+    keys = _keys(name, servo_model, scale, figures.links, directions.yaws, joints, legs)
+    keys |= _plan_limits(source, {hinge.name for hinge in tree.hinges}, servo_model, notes)
+    robot = checked(RobotConfig, keys, name)
+    worst_m = _kinematics_error_m(model, robot, tree.hinges, directions, scale, reverse=reverse)
+    hinges = [*tree.hinges, *(hinge for pair in legs for hinge in pair.hinges)]
+    notes += assumed.lines
+    return ImportedRobot(robot, tuple(hinge.name for hinge in hinges), tuple(notes), worst_m)
+
+
+def _reversed(tree: BodyTree) -> BodyTree:
+    last = len(tree.groups) - 1
+    return BodyTree(
+        tree.groups[::-1],
+        tree.names[::-1],
+        tree.hinges[::-1],
+        [replace(branch, link=last - branch.link) for branch in tree.branches],
+        tree.wheels,
+    )
+
+
+def _wheel_notes(friction: list[float], tree: BodyTree) -> list[str]:
+    if not tree.wheels:
+        return []
+    states = (
+        f"; they state a friction of {', '.join(f'{each:g}' for each in friction)}: --set "
+        f"world.friction.across={friction[0]:g}"
+        if friction
+        else ""
+    )
+    return [
+        f"{len(tree.wheels)} passive wheels are part of their links, mass and all; how they roll "
+        f"along and hold across is the world's friction (along 0.1, across 0.7 by default){states}"
+    ]
+
+
+def _check_size(links: list[LinkFigures], names: list[str], scale: float) -> None:
+    """Reject what is not of the size of servos, by the model's own names.
+
+    Raises:
+        InputError: a link is too long, heavy or thick, or too small.
+
+    """
+    for link, name in zip(links, names, strict=True):
+        length_m, mass_kg = scale * link.length_m, scale**3 * link.mass_kg
+        for what, value, (low, high), unit in (
+            ("length", length_m, _LENGTH_M, "m"),
+            ("mass", mass_kg, _MASS_KG, "kg"),
+            ("radius", scale * link.radius_m, _RADIUS_M, "m"),
+        ):
+            if value == 0.0 or low < value <= high:
+                continue
+            raise InputError(
+                f"link {name}: its {what} is {value:.3g} {unit}; a link has over {low:g} and at "
+                f"most {high:g} {unit}: add --scale for what is not of the size of servos"
+            )
+
+
+def _keys(
+    name: str,
+    servo_model: str,
+    scale: float,
+    links: list[LinkFigures],
+    yaws: tuple[bool, ...],
+    joints: list[dict[str, object]],
+    legs: list[LegPair],
+) -> dict[str, object]:
+    """Keys of a robot's file."""
+    radius_m = max(link.radius_m for link in links)
+    keys: dict[str, object] = {
+        "name": name,
+        "body_radius_m": round(scale * radius_m, 6),
+        "servo": {"model": servo_model},
+        "joints": [
+            *joints,
+            *(
+                {"sign": sign, "limit_rad": limit}
+                for pair in legs
+                for sign, limit in zip(pair.signs, pair.limits_rad, strict=True)
+            ),
+        ],
+        "links": [_link_keys(link, scale, radius_m) for link in links],
+    }
+    if legs:
+        keys["joint_axes"] = "".join("y" if yaw else "p" for yaw in yaws)
+        keys["limbs"] = [_limb_keys(pair, scale) for pair in legs]
+    return keys
+
+
+def _link_keys(link: LinkFigures, scale: float, radius_m: float) -> dict[str, object]:
+    if not link.mass_kg:
+        return {
+            "length_m": round(scale * link.length_m, 12),
+            "mass_kg": _NEXT_TO_NOTHING_KG,
+            "radius_m": round(scale * radius_m, 6),
+            "shape": "none",
+        }
+    return {
+        "length_m": round(scale * link.length_m, 12),
+        "mass_kg": round(scale**3 * link.mass_kg, 9),
+        "radius_m": round(scale * link.radius_m, 6),
+    }
+
+
+def _limb_keys(pair: LegPair, scale: float) -> dict[str, object]:
+    table = dict(pair.table)
+    for key in ("hip_m", "foot_radius_m"):
+        table[key] = round(scale * float(str(table[key])), 12)
+    segments = table["segments_m"]
+    assert isinstance(segments, list)
+    table["segments_m"] = [round(scale * each, 12) for each in segments]
+    table["segment_mass_kg"] = round(scale**3 * float(str(table["segment_mass_kg"])), 9)
+    return table
+
+
+def _plan_limits(
+    source: ModelSource, joints: set[str], servo_model: str, notes: list[str]
+) -> dict[str, object]:
+    """Torque and speed that a plan may ask, of what the model states for its joints."""
+    keys: dict[str, object] = {}
+    efforts = [value for name, value in source.effort_n_m.items() if name in joints]
+    speeds = [value for name, value in source.speed_rad_s.items() if name in joints]
+    low, high = _TORQUE_N_M
+    if efforts and low <= min(efforts) <= high:
+        torque_n_m, words = min(efforts), ""
+        if servo_model in MODELS:
+            most_n_m = round(_HELD_SHARE * MODELS[servo_model].stall_torque_n_m, 3)
+            if most_n_m < torque_n_m:
+                torque_n_m, words = most_n_m, f"; a {servo_model} holds {most_n_m:g}"
+        keys["torque_limit_n_m"] = torque_n_m
+        notes.append(f"torque of a plan: the model states {min(efforts):g} N m{words}")
+    elif efforts:
+        notes.append(
+            f"torque of a plan: the model states {min(efforts):g} N m, which is no servo's: left "
+            "out"
+        )
+    low, high = _SPEED_RAD_S
+    if speeds and low <= min(speeds) <= high:
+        keys["joint_speed_limit_rad_s"] = min(speeds)
+        notes.append(f"joint speed of a plan: {min(speeds):g} rad/s, as the model states")
+    elif speeds:
+        notes.append(
+            f"joint speed of a plan: the model states {min(speeds):g} rad/s, which is no servo's: "
+            "left out"
+        )
+    return keys
+
+
+def _joints(
+    model: mujoco.MjModel,
+    tree: BodyTree,
+    directions: ChainDirections,
+    reverse: bool,
+    notes: list[str],
+) -> list[dict[str, object]]:
+    """Tables of the spine's joints: axis, sign against the model's, and half range."""
+    endless = [hinge.name for hinge in tree.hinges if not model.jnt_limited[hinge.joint]]
+    if endless:
+        notes.append(
+            f"without a range in the model, {_MOST_RAD:g} rad both ways: {', '.join(endless)}"
+        )
+    tables = []
+    for hinge, yaw in zip(tree.hinges, directions.yaws, strict=True):
+        zero = float(model.qpos0[model.jnt_qposadr[hinge.joint]])
+        low, high = (float(v) - zero for v in model.jnt_range[hinge.joint])
+        if not model.jnt_limited[hinge.joint]:
+            low, high = -_MOST_RAD, _MOST_RAD
+        half = min(-low, high, _MOST_RAD)
+        if half <= 0.05:
+            raise InputError(
+                f"joint {hinge.name}: its range, {low:.3g} to {high:.3g} rad, leaves less than "
+                "0.05 rad on one side of straight"
+            )
+        if abs(low + high) > 1e-6:
+            notes.append(
+                f"joint {hinge.name}: turns from {low:.3g} to {high:.3g} rad in the model; ranges "
+                f"here are even: {half:.3g} rad both ways"
+            )
+        elif half < high:
+            notes.append(
+                f"joint {hinge.name}: its range of {high:.3g} rad is cut to {half:g}: a servo "
+                "knows one turn"
+            )
+        sign = _sign(hinge, yaw, directions, reverse)
+        tables.append({"axis": "y" if yaw else "p", "sign": sign, "limit_rad": half})
+    return tables
+
+
+def _sign(hinge: Hinge, yaw: bool, directions: ChainDirections, reverse: bool) -> int:
+    """1 where the model's angle counts as ours: what is behind turns about down, or to the left."""
+    side = -float(hinge.axis @ directions.up) if yaw else float(hinge.axis @ directions.left)
+    return int(math.copysign(1.0, -side if reverse else side))
+
+
+def _kinematics_error_m(
+    model: mujoco.MjModel,
+    robot: RobotConfig,
+    hinges: list[Hinge],
+    directions: ChainDirections,
+    scale: float,
+    *,
+    reverse: bool,
+) -> float:
+    """Largest distance of the axes of the spine's joints from the model's, over random poses."""
+    rng, data = np.random.default_rng(0), mujoco.MjData(model)
+    signs = np.array(
+        [_sign(h, yaw, directions, reverse) for h, yaw in zip(hinges, directions.yaws, strict=True)]
+    )
+    turn = np.stack([directions.forward, directions.left, directions.up], axis=1)
+    limits = np.array(robot.limit_rad[: len(hinges)])
+    legs = np.zeros(robot.joint_count - len(hinges))
+    worst = 0.0
+    for _ in range(_POSES):
+        joint_rad = rng.uniform(-limits, limits)
+        data.qpos[:] = model.qpos0
+        for hinge, angle in zip(hinges, signs * joint_rad, strict=True):
+            data.qpos[model.jnt_qposadr[hinge.joint]] += angle
+        mujoco.mj_kinematics(model, data)
+        # our head where the model's is: its first link has not moved, or the last one of a reverse
+        pose = BodyPose(0.0, np.zeros(3), np.eye(3))
+        body = body_in_world(robot, pose, np.concatenate([joint_rad, legs]))
+        points = chain_points_m(robot, body)[1:-1]
+        fixed = 0 if not reverse else len(points) - 1
+        ours_at, ours_turn = points[fixed], body.rotation[0 if not reverse else -1]
+        ours = (points - ours_at) @ ours_turn  # seen from the link that the model holds
+        anchors = np.array([data.xanchor[hinge.joint] for hinge in hinges])
+        axes = np.array([data.xaxis[hinge.joint] for hinge in hinges])
+        origin = _on_line_m(hinges, directions, fixed)
+        theirs, axes = scale * (anchors - origin) @ turn, axes @ turn
+        away = ours - theirs
+        # along its axis it may lie anywhere
+        away -= (away * axes).sum(axis=1, keepdims=True) * axes
+        worst = max(worst, float(np.linalg.norm(away, axis=1).max()))
+    return worst
+
+
+def _on_line_m(hinges: list[Hinge], directions: ChainDirections, index: int) -> Floats:
+    """Where the body's line crosses a joint's axis at zero angles."""
+    place = (hinges[index].anchor_m @ directions.forward) * directions.forward
+    for yaw, aside in ((True, directions.left), (False, directions.up)):
+        some = [
+            hinge.anchor_m @ aside
+            for hinge, is_yaw in zip(hinges, directions.yaws, strict=True)
+            if is_yaw == yaw
+        ]
+        if some:
+            place = place + float(np.median(some)) * aside
+    return np.asarray(place)

@@ -1,0 +1,299 @@
+"""URDF prepared for MuJoCo: it floats, repeated elements are resolved, missing meshes are gone."""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.exchange.robot_import.model_source import (
+    LineElement,
+    ModelSource,
+    added,
+    children,
+    counted,
+    numbers,
+    parents_of,
+)
+
+_ONCE: Final = {
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "calibration", "mimic",
+              "safety_controller"),
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry"),
+    "collision": ("origin", "geometry"),
+}  # fmt: skip
+"""Elements that urdfdom reads once: the first counts."""
+_NOT_READ: Final = ("gazebo", "transmission", "ros2_control", "mujoco", "material")
+_MESHES: Final = (".stl", ".obj")
+_SLIVER_KG: Final = 1e-9
+"""Mass that MuJoCo gets for a body that states none."""
+
+
+def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> ModelSource:
+    """Prepare a URDF; the tree is changed.
+
+    Args:
+        root: of the file.
+        path: of the file, next to which meshes are looked for.
+        meshes: use those that are found.
+
+    Raises:
+        InputError: a joint mimics another, no link is the first, or the first is joined to the
+            world by a joint that turns.
+
+    """
+    source = ModelSource(root)
+    for joint in root.iter("joint"):
+        if joint.find("mimic") is not None:
+            raise InputError(
+                f"{path}: joint {joint.get('name')}, {_where(joint)}: mimics another; each joint "
+                "here is a servo"
+            )
+    _drop_repeated(source)
+    driven = _driven(root)
+    source.actuated = driven or None
+    source.friction = _friction(root)
+    _drop_unread(source)
+    first = _first_link(source, path)
+    _choose_shapes(source, path, meshes=meshes)
+    _mend_inertias(source)
+    source.stated_mass_kg, source.part_names = _stated_masses_kg(root)
+    _float(root, first)
+    return source
+
+
+def _where(element: object) -> str:
+    assert isinstance(element, LineElement)
+    return element.where
+
+
+def _drop_repeated(source: ModelSource) -> None:
+    """Keep the first of elements that may occur once, as urdfdom does."""
+    repeated: dict[str, list[str]] = {}
+    for parent in list(source.root.iter()):
+        for tag in _ONCE.get(parent.tag, ()):
+            first, *others = children(parent, tag) or [None]
+            for other in others:
+                assert other is not None
+                assert first is not None
+                parent.remove(other)
+                differs = " with other values" if other.attrib != first.attrib else ""
+                repeated.setdefault(f"{parent.tag} {{}} repeat <{tag}>", []).append(
+                    f"{parent.get('name', '')} ({first.where} and {other.where}{differs})"
+                )
+    for what, places in repeated.items():
+        words = what.format(", ".join(places[:3]) + (", ..." if len(places) > 3 else ""))
+        source.notes.append(f"{words}, {len(places)} in all: the first counts")
+
+
+def _driven(root: LineElement) -> frozenset[str]:
+    """Joints that a transmission or ros2_control names."""
+    return frozenset(
+        str(joint.get("name"))
+        for tag in ("transmission", "ros2_control")
+        for driver in root.findall(tag)
+        for joint in driver.iter("joint")
+        if joint.get("name")
+    )
+
+
+def _drop_unread(source: ModelSource) -> None:
+    dropped = []
+    for parent, child in parents_of(source.root):
+        if child.tag in _NOT_READ:
+            parent.remove(child)
+            if parent is source.root:
+                dropped.append(child.tag)
+    for joint in source.root.findall("joint"):
+        for key, stated in (("effort", source.effort_n_m), ("velocity", source.speed_rad_s)):
+            limit = joint.find("limit")
+            value = None if limit is None else numbers(limit.get(key), 1)
+            if value is not None:
+                stated[str(joint.get("name"))] = value[0]
+    if dropped:
+        source.notes.append(f"left out of the URDF: {counted(dropped)}")
+
+
+def _first_link(source: ModelSource, path: Path) -> str:
+    """Name of the link on which all hang; a ``world`` that only holds it is dropped.
+
+    Raises:
+        InputError: there is none, there are several, or it is bolted to the world.
+
+    """
+    root = source.root
+    joints = root.findall("joint")
+    names = {end: [_end(joint, end) for joint in joints] for end in ("parent", "child")}
+    for link in children(root, "link"):
+        alone = link.get("name") not in names["parent"] + names["child"]
+        if alone and link.find("inertial") is None and len(root.findall("link")) > 1:
+            root.remove(link)
+            source.notes.append(f"link {link.get('name')} is dropped: nothing joins it")
+    first = [
+        str(link.get("name"))
+        for link in root.findall("link")
+        if link.get("name") not in names["child"]
+    ]
+    if len(first) != 1:
+        listed = ", ".join(first) or "each hangs on another"
+        raise InputError(f"{path}: one link must be the first, on which all hang: {listed}")
+    here = first[0]
+    if here != "world":
+        return here
+    holding = [joint for joint in children(root, "joint") if _end(joint, "parent") == here]
+    turning = [j for j in holding if j.get("type") not in ("fixed", "floating", "planar")]
+    if turning:
+        raise InputError(
+            f"{path}: joint {turning[0].get('name')}, {turning[0].where}: bolts the robot to the "
+            f"link world by a {turning[0].get('type')} joint; a robot here moves freely: join its "
+            "first link by a fixed or floating joint, or leave the link world out"
+        )
+    if len(holding) != 1:
+        held = ", ".join(str(_end(joint, "child")) for joint in holding) or "nothing"
+        raise InputError(f"{path}: link world holds {held}; one robot is read at a time")
+    root.remove(holding[0])
+    root.remove(next(link for link in root.findall("link") if link.get("name") == here))
+    held, kind = _end(holding[0], "child"), holding[0].get("type")
+    source.notes.append(
+        f"link world is dropped: it holds {held} by the {kind} joint {holding[0].get('name')}"
+    )
+    return str(held)
+
+
+def _end(joint: object, end: str) -> str | None:
+    assert isinstance(joint, LineElement)
+    found = joint.find(end)
+    return None if found is None else found.get("link")
+
+
+def _choose_shapes(source: ModelSource, path: Path, *, meshes: bool) -> None:
+    """Keep the collision shapes of a link, else the drawn ones; meshes only if they are there."""
+    missing: list[str] = []
+    used: set[str] = set()
+    for link in children(source.root, "link"):
+        for shape in children(link, "visual", "collision"):
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            name = mesh.get("filename", "")
+            file = _mesh_file(name, path) if meshes else None
+            if file is None:
+                link.remove(shape)
+                missing.append(name)
+            else:
+                mesh.set("filename", str(file))
+                used.add(name)
+        if children(link, "collision"):
+            for drawn in children(link, "visual"):
+                link.remove(drawn)
+    if missing:
+        names = ", ".join(sorted(set(missing))[:3])
+        kinds = len(set(missing))
+        source.notes.append(
+            f"{len(missing)} shapes are left out: "
+            + (f"{kinds} mesh files are missing or unreadable: " if kinds > 1 else "mesh file ")
+            + names
+            + (", ..." if kinds > 3 else "" if kinds > 1 else " is missing or unreadable")
+        )
+    if used:
+        source.notes.append(f"meshes read: {len(used)}")
+
+
+def _mesh_file(name: str, path: Path) -> Path | None:
+    """File of a mesh: next to the URDF, or in the folder of its package around the URDF."""
+    relative = name.removeprefix("file://")
+    if "://" in relative:
+        scheme, _, relative = relative.partition("://")
+        if scheme not in ("package", "model"):
+            return None
+    if Path(relative).suffix.lower() not in _MESHES or not relative:
+        return None
+    inside = Path(relative)
+    behind = Path(*inside.parts[1:]) if len(inside.parts) > 1 else inside
+    for folder in path.resolve().parents:
+        for candidate in (folder / inside, folder / behind):
+            if candidate.is_file():
+                return candidate
+    return None
+
+
+def _mend_inertias(source: ModelSource) -> None:
+    """Replace inertias that no body can have by those of a small ball: only the mass is used."""
+    wrong = []
+    for link in children(source.root, "link"):
+        inertial = link.find("inertial")
+        if inertial is None:
+            continue
+        mass = numbers(getattr(inertial.find("mass"), "attrib", {}).get("value"), 1)
+        inertia = inertial.find("inertia")
+        if mass is None or inertia is None or mass[0] <= 0.0:
+            continue
+        xx, xy, xz, yy, yz, zz = (
+            (numbers(inertia.get(key, "0"), 1) or [np.nan])[0]
+            for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        )
+        matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if not np.isfinite(matrix).all():
+            continue  # MuJoCo names the number
+        values = np.linalg.eigvalsh(matrix)
+        if values[0] <= 0.0 or values[0] + values[1] < values[2] * (1.0 - 1e-6):
+            wrong.append(str(link.get("name")))
+            ball = repr(0.4 * mass[0] * 1e-4)
+            inertia.attrib.update(
+                ixx=ball, iyy=ball, izz=ball, ixy="0", ixz="0", iyz="0"
+            )  # of 1 cm
+    if wrong:
+        source.notes.append(
+            f"inertia of {len(wrong)} links is that of no body ({', '.join(wrong[:3])}"
+            f"{', ...' if len(wrong) > 3 else ''}): only their mass is used"
+        )
+
+
+def _friction(root: LineElement) -> dict[str, float]:
+    """Gazebo's ``mu1`` by link."""
+    found = {}
+    for gazebo in root.findall("gazebo"):
+        value = numbers(gazebo.findtext("mu1"), 1) or numbers(gazebo.findtext("mu"), 1)
+        if value is not None and gazebo.get("reference"):
+            found[str(gazebo.get("reference"))] = value[0]
+    return found
+
+
+def _stated_masses_kg(root: LineElement) -> tuple[dict[str, float], dict[str, str]]:
+    """Mass that each moving link states with the links fixed to it, and the heaviest of them."""
+    parent = {
+        str(_end(joint, "child")): str(_end(joint, "parent"))
+        for joint in root.findall("joint")
+        if joint.get("type") == "fixed"
+    }
+    masses: dict[str, float] = {}
+    heaviest: dict[str, tuple[float, str]] = {}
+    for link in root.findall("link"):
+        own = name = str(link.get("name"))
+        steps = 0
+        while name in parent and steps < len(parent):
+            name, steps = parent[name], steps + 1
+        stated = link.find("inertial/mass")
+        value = numbers(None if stated is None else stated.get("value"), 1) or [0.0]
+        masses[name] = masses.get(name, 0.0) + value[0]
+        if value[0] > heaviest.get(name, (0.0, ""))[0]:
+            heaviest[name] = value[0], own
+    return masses, {name: part for name, (_, part) in heaviest.items()}
+
+
+def _float(root: LineElement, first: str) -> None:
+    """Join the first link to MuJoCo's world by a floating joint; bodies without mass compile."""
+    names = {each.get("name") for each in root.iter()}
+    ground = next(name for name in ("_ground", "_ground_", "_ground__") if name not in names)
+    options = added(root, "mujoco")
+    sliver = repr(_SLIVER_KG)
+    added(
+        options, "compiler", fusestatic="true", discardvisual="false", strippath="false",
+        balanceinertia="true", boundmass=sliver, boundinertia=sliver,
+    )  # fmt: skip
+    added(root, "link", name=ground)
+    floating = added(root, "joint", name=f"{ground}_floats", type="floating")
+    added(floating, "parent", link=ground)
+    added(floating, "child", link=first)

@@ -1,0 +1,112 @@
+"""``snakewalk policy trials``: policies compared with gaits."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import FirstSeed, Json, console
+from snakewalk.controller.console.progress import show_progress
+from snakewalk.controller.learning import policy_trials as study
+from snakewalk.controller.learning.policy_trials import PolicyTrial, PolicyTrialResult
+
+
+@command(
+    "policy trials",
+    examples=(
+        "policy trials wave-cma wave-ppo lateral-undulation --first-seed 1000",
+        "policy trials mine.toml wave-cma --world flat --world flat-friction-3 --json",
+    ),
+)
+def policy_trials(
+    motions: Annotated[
+        list[str],
+        typer.Argument(
+            help="policies, gaits, sets of parameters, or their files",
+            metavar="MOTION...",
+            autocompletion=completion.POLICIES_OR_GAITS,
+        ),
+    ],
+    world: Annotated[
+        list[str] | None,
+        typer.Option(help="may be given again; default: flat", autocompletion=completion.WORLDS),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 10,
+    first_seed: FirstSeed = 0,
+    seconds: Annotated[float, typer.Option(min=5.0, max=3600.0, help="of each run")] = 12.0,
+    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Compare policies with gaits: the same seeds move start, friction and supply of all."""
+    require_extra("trials need", "mujoco")
+    rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
+    rows = list(dict.fromkeys(rows))  # what is given twice is run once
+    planned = [
+        PolicyTrial(motion, ground, seed, seconds)
+        for motion, ground in rows
+        for seed in range(first_seed, first_seed + seeds)
+    ]
+    some = study.policy_trials(planned, workers)
+    found = list(show_progress(some, "trials", len(planned)))
+    table = [
+        _row(*row, [each for each in found if (each[0].motion, each[0].world) == row])
+        for row in rows
+    ]
+    if as_json:
+        trials = [asdict(trial) | asdict(result) for trial, result in found]
+        print(json.dumps({"table": [asdict(row) for row in table], "trials": trials}))
+        return
+    grid = Table(box=None, pad_edge=False)
+    for title in (
+        "motion",
+        "world",
+        "m/s",
+        "sd",
+        "lengths\na cycle",
+        "J/m",
+        "course\nrad",
+        "trips",
+    ):
+        grid.add_column(title, justify="left" if title in {"motion", "world"} else "right")
+    for row in table:
+        grid.add_row(*["-" if value is None else str(value) for value in asdict(row).values()])
+    console.print(grid)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """Means over the runs that did not trip; None where all have."""
+
+    motion: str
+    world: str
+    speed_m_s: float | None
+    speed_sd_m_s: float | None
+    body_lengths_cycle: float | None
+    energy_j_m: float | None
+    course_rad: float | None
+    """Root of the mean square: how far off x they went."""
+    trips: int
+
+
+def _row(motion: str, world: str, found: list[tuple[PolicyTrial, PolicyTrialResult]]) -> _Row:
+    whole = [result for _, result in found if result.tripped is None]
+    speeds = [result.speed_m_s for result in whole]
+    if not whole:
+        return _Row(motion, world, None, None, None, None, None, len(found))
+    return _Row(
+        Path(motion).stem,
+        world,
+        round(fmean(speeds), 4),
+        round(stdev(speeds), 4) if len(speeds) > 1 else None,
+        round(fmean(result.body_lengths_cycle for result in whole), 3),
+        round(fmean(result.energy_j_m for result in whole), 2),
+        round(fmean(result.course_rad**2 for result in whole) ** 0.5, 3),
+        len(found) - len(whole),
+    )

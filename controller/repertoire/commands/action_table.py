@@ -1,0 +1,55 @@
+"""The actions of a repertoire as a table and as a picture."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.controller.console.options import console
+from snakewalk.controller.repertoire.repertoire import Repertoire
+
+Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
+
+
+def draw_picture(repertoire: Repertoire, picture: Path) -> None:
+    """Draw the displacements of all actions."""
+    from snakewalk.controller.repertoire.repertoire_plots import draw_actions  # noqa: PLC0415  --picture: an extra
+
+    draw_actions(repertoire, picture)
+
+
+def show_actions(file: Path, repertoire: Repertoire, as_json: bool) -> None:
+    """Print speed, turn and closure error of each action."""
+    rows = [
+        {
+            "name": segment.name,
+            "kind": segment.kind,
+            "frames": segment.frames,
+            "cycle_s": round(segment.duration_s, 3),
+            "speed_m_s": round(segment.speed_m_s, 4),
+            "turn_rad_cycle": round(segment.turn_rad_s * segment.duration_s, 4),
+            "closure_mm": round(1e3 * segment.closure_m, 3),
+            "closure_mrad": round(1e3 * segment.closure_rad, 3),
+        }
+        for segment in repertoire.segments
+    ]
+    if as_json:
+        about = {"file": str(file), "robot": repertoire.robot, "world": repertoire.world}
+        print(json.dumps(about | {"actions": rows}))
+        return
+    heads = {
+        "cycle_s": "cycle\ns",
+        "speed_m_s": "speed\nm/s",
+        "turn_rad_cycle": "turn, rad\na cycle",
+    }
+    heads |= {"closure_mm": "closure\nmm", "closure_mrad": "closure\nmrad"}
+    table = Table(box=None, pad_edge=False)
+    for key in rows[0]:
+        name = key == "name"
+        table.add_column(heads.get(key, key), justify="left" if name else "right", no_wrap=name)
+    for row in rows:
+        table.add_row(*(str(value) for value in row.values()))
+    console.print(f"{file}: {repertoire.robot} on {repertoire.world}")
+    console.print(table)

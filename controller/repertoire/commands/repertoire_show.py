@@ -1,0 +1,32 @@
+"""``snakewalk repertoire show``: the actions of a repertoire."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json
+from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.repertoire.commands.action_table import (
+    Picture,
+    draw_picture,
+    show_actions,
+)
+from snakewalk.controller.repertoire.repertoire import load_repertoire
+
+
+@command("repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",))
+def show_file(
+    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Show the actions of a repertoire: speed, turn and closure error of a cycle."""
+    refuse_to_overwrite([picture], force)
+    check_picture(picture)
+    repertoire = load_repertoire(file)
+    if picture is not None:
+        draw_picture(repertoire, picture)
+    show_actions(file, repertoire, as_json)

@@ -1,0 +1,38 @@
+"""``snakewalk gait list``: the gaits and their shipped parameters."""
+
+import json
+
+from rich.table import Table
+
+from snakewalk.config.loader import load_gait, shipped
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Json, console
+from snakewalk.controller.gaits.registry import GAITS
+from snakewalk.controller.run.commands.gait_options import needed_joints
+
+
+@command("gait list", examples=("gait list --json",))
+def list_gaits(as_json: Json = False) -> None:
+    """List the gaits, what joints they need, and the shipped sets of their parameters."""
+    sets = [load_gait(name) for name in shipped("gaits")]
+    if as_json:
+        rows = [
+            {"name": g.name, "title": g.title, "needs": needed_joints(g), "source": g.source}
+            for g in GAITS.values()
+        ]
+        print(json.dumps({"gaits": rows, "sets": [s.model_dump() for s in sets]}))
+        return
+    table = Table(box=None, pad_edge=False)
+    for title in ("gait", "needs", ""):
+        table.add_column(title, no_wrap=title != "")
+    for gait in GAITS.values():
+        table.add_row(gait.name, ", ".join(needed_joints(gait)), gait.title)
+    console.print(table)
+    if sets:
+        table = Table(box=None, pad_edge=False)
+        for title in ("set", "gait", "robot"):
+            table.add_column(title)
+        for each in sets:
+            table.add_row(each.name, each.gait, each.robot)
+        console.print()
+        console.print(table)

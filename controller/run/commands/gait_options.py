@@ -1,0 +1,29 @@
+"""Options that several ``snakewalk gait`` commands have, and what they show of a gait."""
+
+from typing import Annotated, Any
+
+import typer
+
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.options import key_values
+from snakewalk.controller.gaits.gait import Gait
+
+Name = Annotated[
+    str,
+    typer.Argument(
+        help="gait, shipped set of parameters, or a SET.toml", autocompletion=completion.GAITS
+    ),
+]
+Param = Annotated[
+    list[str] | None, typer.Option("--param", "-p", help="NAME=VALUE; may be given again")
+]
+
+
+def parameters(given: list[str] | None) -> dict[str, Any]:
+    """Read NAME=VALUE pairs; the gait's model says what a value must be."""
+    return key_values("--param", given, "NAME=VALUE")
+
+
+def needed_joints(gait: type[Gait]) -> list[str]:
+    """Return the kinds of joints that a gait needs."""
+    return [name for name in ("yaw", "pitch", "legs", "wheels") if getattr(gait.needs, name)]

@@ -1,0 +1,133 @@
+"""The job of ``snakewalk run``: from the values of its options to a log, a report and a film."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.options import key_values, show
+from snakewalk.controller.console.progress import in_real_time
+from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.factory import changed, prepare_job, with_compliance, with_map
+from snakewalk.controller.run.film_look import check_look
+from snakewalk.controller.run.finish import arrivals, exit_code, write_artifacts
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.progress_bar import progress_bar
+from snakewalk.controller.run.watchers import watched
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """Values of the options of ``snakewalk run``."""
+
+    run: str
+    robot: str | None
+    world: str | None
+    track: str | None
+    seed: int | None
+    motion: str | None
+    pose: str | None
+    map_source: str | None
+    keys: list[str] | None
+    """``KEY=VALUE`` each."""
+    compliance: bool | None
+    port: str | None
+    out: Path | None
+    force: bool
+    live: bool
+    view: bool
+    view_at: str
+    """HOST:PORT of the page."""
+    ros: bool
+    observe: list[str] | None
+    shadow: bool
+
+    def carry_out(self, *, film: bool, look: str, as_json: bool) -> Finished:
+        """Run the job and show its result.
+
+        Raises:
+            InputError: a value is unknown, or two of them contradict each other.
+
+        """
+        check_look(look)
+        if self.live and not self.view:
+            raise InputError("--live: waypoints are set in the page: add --view")
+        prepared = self._prepared()
+        name = self._name(prepared)
+        with run_folder(name, self.out) as folder:
+            finished = self._execute(prepared, folder)
+        outcome = finished.outcome
+        artifacts = write_artifacts(finished.record, folder, finished.summary, film=film, look=look)
+        show(
+            {
+                "run": name,
+                "waypoints": outcome.waypoints,
+                **arrivals(finished),
+                "duration_s": round(outcome.duration_s, 2),
+                "tripped": outcome.tripped,
+                "advance_alarms": outcome.alarms,
+                **finished.pose.facts(),
+                **finished.map.facts(),
+                "log": str(finished.log),
+                "summary": str(folder / "summary.json"),
+                **artifacts.to_dict(),
+            },
+            as_json,
+        )
+        return finished
+
+    @staticmethod
+    def exit_code(finished: Finished, accept_dead_reckoning: bool) -> int:
+        """Return the exit code of the command."""
+        return exit_code(finished, accept_dead_reckoning)
+
+    def _prepared(self) -> PreparedRun:
+        prepared = prepare_job(
+            self.run, keys=key_values("--set", self.keys), seed=self.seed, motion=self.motion,
+            robot=self.robot, world=self.world, track=self.track, pose=self.pose,
+        )  # fmt: skip
+        run = with_map(with_compliance(prepared.run, self.compliance), self.map_source)
+        return changed(prepared, run=run)
+
+    def _name(self, prepared: PreparedRun) -> str:
+        """Return the name of the run: its file, and the values that replace those of the file."""
+        run = prepared.run
+        replaced = [
+            Path(each).stem for each in (self.robot, self.world, self.track) if each is not None
+        ]
+        parts = [run.name, *replaced, run.motion, f"seed{run.seed}"]
+        if run.pose is not None:
+            parts.append(f"pose-{run.pose}")
+        if run.mapping is not None:
+            parts.append(f"map-{run.mapping.source}")
+        return "-".join(parts)
+
+    def _execute(self, prepared: PreparedRun, folder: Path) -> Finished:
+        with (
+            watched(self.view, self.view_at, self.ros, self.observe) as watchers,
+            progress_bar(prepared) as bar,
+        ):
+            page = watchers.page if watchers is not None and self.live else None
+            if page is not None:
+                page.on_course()
+            paced = watchers is not None and not self.port
+            return execute(
+                prepared,
+                folder,
+                self.port,
+                force=self.force,
+                view=watchers,
+                shadow=self.shadow,
+                confirm=_confirm if sys.stdin.isatty() else None,
+                waypoint_commands=None if page is None else page.pressed,
+                on_progress=in_real_time(bar.on_progress) if paced else bar.on_progress,
+                on_event=bar.on_event,
+            )
+
+
+def _confirm(found: str) -> bool:
+    """Ask whether an interrupted chain may go on; the servos hold meanwhile."""
+    return typer.confirm(f"{found}; go on?", err=True)

@@ -1,0 +1,55 @@
+"""Alarms: Hardware Error Status(70) of the servos whose status packets carry an alert."""
+
+from collections.abc import Collection
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.chain.joint_codec import Readings
+from snakewalk.drivers.errors import BusError
+
+_ALERT_READS = 3
+"""Reads in a row with an alert, but without an alarm in register 70, that end a run (ours)."""
+
+
+class AlarmReader:
+    """Reads an alarm as soon as there is an alert; an alert without an alarm is read again."""
+
+    def __init__(self, bus: ChainBus, robot: RobotConfig, readings: Readings) -> None:
+        self._bus, self._robot, self._readings = bus, robot, readings
+        self._counts: dict[int, int] = {}
+        """Reads in a row in which a joint had an alert, but no alarm."""
+
+    def clear(self) -> None:
+        """Forget the alerts so far."""
+        self._counts.clear()
+
+    def update(self, alerted: Collection[int]) -> list[str]:
+        """Read the alarms of joints whose newest reply carries an alert; returns lines to report.
+
+        Call it after every group read of the state, also without an alert.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        if self._counts:
+            self._counts = {j: count for j, count in self._counts.items() if j in alerted}
+        return [line for joint in alerted if (line := self._read(joint)) is not None]
+
+    def _read(self, joint: int) -> str | None:
+        try:
+            alarm = self._bus.read(self._robot.servo_ids[joint], "Hardware Error Status")
+        except BusError:
+            return None  # the error byte carries the alert; read again in the next cycle
+        self._readings.update_alarm(joint, alarm)
+        if alarm:
+            return None
+        count = self._counts[joint] = self._counts.get(joint, 0) + 1
+        if count < _ALERT_READS:
+            self._readings.dismiss_alert(joint)
+        if count > 1:
+            return None
+        return (
+            f"{self._robot.joint_label(joint)}: its status packet carries an alert, but Hardware "
+            "Error Status reads 0; it is read again before the run ends"
+        )

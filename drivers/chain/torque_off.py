@@ -1,0 +1,138 @@
+"""Torque off on every servo of a chain, asked for until each servo confirms it."""
+
+from collections.abc import Iterable, Sequence
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.clock import Clock
+from snakewalk.drivers.errors import BusError, PortError
+
+_GROUP_ROUNDS = 8
+"""Group reads in which the servos may confirm that their torque is off (ours)."""
+_ASK_S = 1.0
+"""How long servos that do not confirm are asked one by one, s (ours): longer than a line may be
+disturbed before the state is stale, and some tenths of a second more."""
+_PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
+"""How long torque off waits for a port that is gone, and the time between tries, s (ours)."""
+
+
+class TorqueOff:
+    """Switches torque off, then the watchdogs."""
+
+    def __init__(self, bus: ChainBus, robot: RobotConfig, clock: Clock, watchdog_s: float) -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            bus: the servos' bus.
+            robot: their robot.
+            clock: the port's clock.
+            watchdog_s: time after which an armed watchdog stops a servo, for the messages.
+
+        """
+        self._bus, self._robot, self._clock = bus, robot, clock
+        self._watchdog_s = watchdog_s
+
+    def send(self) -> None:
+        """Switch torque off on every servo, also where others fail, and then the watchdogs.
+
+        Servos that do not confirm it in a group read are asked one by one, repeatedly for a limited
+        time: their watchdogs may be disarmed. If one of several ports is gone, the servos on the
+        other ports are off before it is waited for.
+
+        Raises:
+            BusError: servos did not confirm; their watchdog stays armed and stops them.
+            PortError: a port is gone and does not come back; the watchdog stops its servos.
+
+        """
+        give_up_s = self._clock.now_s() + _PORT_PATIENCE_S
+        joints_on = {part: self._joints_on(part) for part in self._bus.parts}
+        gone: list[DynamixelBus] = []
+        for part, joints in joints_on.items():
+            try:
+                part.sync_write(self._ids_of(joints), "Torque Enable", 0)
+            except PortError:
+                gone.append(part)
+        silent: list[int] = []
+        faults: list[PortError] = []
+        for part in sorted(joints_on, key=gone.__contains__):
+            try:
+                if part in gone:
+                    self._wait_to_send(part, joints_on[part], give_up_s)
+                silent += self._unconfirmed(part, joints_on[part])
+            except PortError as error:
+                faults.append(error)
+        self._report(sorted(silent), faults, ports=len(joints_on))
+
+    def _report(self, silent: Sequence[int], faults: Sequence[PortError], ports: int) -> None:
+        """Raise the error of what could not be switched off; nothing if all servos are off."""
+        names = ", ".join(map(self._robot.joint_label, silent))
+        if faults:
+            which = "its servos: a servo" if ports > 1 else "a servo"
+            text = (
+                f"{'; '.join(map(str, faults))}; torque is not off: {which} that has torque holds "
+                f"where its bus watchdog ({self._watchdog_s:.3g} s) stops it: switch the servo "
+                "power off"
+            )
+            if ports > len(faults) and not silent:
+                text += "; on the other ports torque is off"
+            raise PortError(f"{text}; {names}: not confirmed" if names else text) from faults[0]
+        if names:
+            raise BusError(
+                f"{names}: torque off is not confirmed; if a joint still holds, switch the servo "
+                "power off"
+            )
+
+    def _joints_on(self, part: DynamixelBus) -> list[int]:
+        """Joints whose servos are on one of the ports."""
+        ids = self._robot.servo_ids
+        return [joint for joint, i in enumerate(ids) if self._bus.port_of(i) is part.port]
+
+    def _ids_of(self, joints: Iterable[int]) -> list[int]:
+        return [self._robot.servo_ids[joint] for joint in joints]
+
+    def _wait_to_send(self, part: DynamixelBus, joints: Sequence[int], give_up_s: float) -> None:
+        """Send torque off, unconfirmed, to a port that is gone and may come back soon."""
+        while True:
+            is_late = self._clock.now_s() >= give_up_s
+            try:
+                part.reopen()
+                part.sync_write(self._ids_of(joints), "Torque Enable", 0)
+            except PortError:
+                if is_late:
+                    raise
+                self._clock.sleep_until_s(self._clock.now_s() + _REOPEN_S)
+            else:
+                return
+
+    def _unconfirmed(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
+        """Joints that do not confirm that their torque is off; the others' watchdogs are off."""
+        ids, joints = self._robot.servo_ids, list(on_it)
+        for _ in range(_GROUP_ROUNDS):
+            asked = self._ids_of(joints)
+            reply = bus.block(asked, "Torque Enable", "Torque Enable", fast=False).read()
+            off = reply.valid & (reply.data[:, 0] == 0)
+            joints = [joint for joint, done in zip(joints, off, strict=True) if not done]
+            if not joints:
+                break
+            bus.sync_write(self._ids_of(joints), "Torque Enable", 0)
+        give_up_s = self._clock.now_s() + _ASK_S
+        silent = joints  # servos behind a silent one stay silent in a group read
+        while silent and self._clock.now_s() < give_up_s:
+            silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
+        confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
+        if confirmed:
+            bus.sync_write(confirmed, "Bus Watchdog", 0)
+            # the port may be closed directly afterwards: a reply shows that the packet has arrived
+            bus.block(confirmed, "Bus Watchdog", "Bus Watchdog", fast=False).read()
+        return silent
+
+    def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
+        """Ask one servo to switch its torque off; whether it confirms that, in time."""
+        if self._clock.now_s() >= give_up_s:
+            return False
+        try:
+            bus.write(servo_id, "Torque Enable", 0, tries=1)
+        except BusError:
+            return False
+        return True

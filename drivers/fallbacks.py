@@ -1,0 +1,38 @@
+"""Private interfaces of dependencies that snakewalk uses for speed, and their public fallbacks.
+
+Each is wrapped in one module, which checks it once per process. If the check fails, the module
+uses the slower public interface and reports it here, once.
+
+| name | wrapped in | fallback |
+| --- | --- | --- |
+| ``numba`` | ``drivers.compiling`` (option ``_nrt``) | loops count references to their arrays |
+| ``mujoco`` | ``sim.physics.layout`` (memory of ``mjData``) | ``sim.physics.public_steps`` |
+
+The environment variable ``SNAKEWALK_FALLBACK`` forces fallbacks: names, separated by commas.
+"""
+
+import logging
+import os
+from typing import Final, Literal
+
+ENVIRONMENT: Final = "SNAKEWALK_FALLBACK"
+Interface = Literal["numba", "mujoco"]
+
+_reported: dict[Interface, str] = {}
+
+
+def is_forced(name: Interface) -> bool:
+    """Whether the environment asks for the public fallback of an interface."""
+    return name in os.environ.get(ENVIRONMENT, "").replace(" ", "").split(",")
+
+
+def report_fallback(name: Interface, text: str) -> None:
+    """Log one warning per process that the fallback of an interface is used."""
+    if name not in _reported:
+        _reported[name] = text
+        logging.getLogger("snakewalk").warning(text)
+
+
+def fallbacks_in_use() -> tuple[str, ...]:
+    """Return the warnings so far: some are older than the handlers of a command."""
+    return tuple(_reported.values())

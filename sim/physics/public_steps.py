@@ -1,0 +1,92 @@
+"""The steps of a plant through MuJoCo's public interface: slower than the compiled ones, same bits.
+
+The forces are the compiled ones of ``step_forces``; contacts and constraint forces are copied from
+MuJoCo's arrays in every step.
+"""
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from snakewalk.config.arrays import Floats
+from snakewalk.sim.physics.friction import make_lanes
+from snakewalk.sim.physics.mechanics import Mechanics
+from snakewalk.sim.physics.step_forces import apply_forces, has_friction, settle
+from snakewalk.sim.physics.step_state import (
+    Body,
+    Chain,
+    ContactFields,
+    Contacts,
+    Gears,
+    Geoms,
+    Law,
+    Links,
+    Motors,
+    Shafts,
+    State,
+)
+from snakewalk.sim.plant import ServoDrive
+
+_AT = ContactFields(size=9, dist=0, place=1, normal=4, geom=14, row=16)
+"""Fields of a copied contact; geoms and row are integers in its last two words."""
+
+_apply = njit(cache=True, error_model="numpy")(apply_forces)
+
+_settle = njit(cache=True, error_model="numpy")(settle)
+
+
+class PublicSteps:
+    """Drive, friction and MuJoCo's step, with Python between them."""
+
+    def __init__(self, mechanics: Mechanics) -> None:
+        self._mechanics = mechanics
+        model, data, links = mechanics.model, mechanics.data, mechanics.joint_count + 1
+        self._state = State(data.qpos, data.qvel, data.qfrc_applied)
+        self._chain = Chain(data.xipos, data.xmat, data.xanchor, data.xaxis, model.body_parentid)
+        self._links = Links(
+            *(np.zeros((links, 3)), np.zeros((links, 3)), np.zeros((links, 6)), np.zeros(links)),
+            *(mechanics.before_m, mechanics.load_n, mechanics.link_mass_kg, mechanics.water),
+        )
+        self._geoms = Geoms(model.geom_bodyid, mechanics.contact_role)
+        self._gears = Gears(
+            *(mechanics.gears, model.dof_frictionloss, data.qfrc_bias, data.qfrc_constraint)
+        )
+        self._rubs = has_friction(mechanics.gears)
+        self._work = np.zeros((2, links - 1))
+        self._lanes = make_lanes(2 * mechanics.joint_count)
+
+    def run(self, steps: int, drive: ServoDrive) -> float:
+        """Advance ``steps`` steps; return MuJoCo's time then."""
+        mechanics, data = self._mechanics, self._mechanics.data
+        body, shafts = self._body(), Shafts(Motors(*drive.columns()), self._gears, self._work)
+        for _ in range(steps):
+            mechanics.planes.lay(data)
+            mujoco.mj_step1(mechanics.model, data)
+            contacts = self._contacts()
+            _apply(body, shafts, contacts, self._lanes)
+            mujoco.mj_step2(mechanics.model, data)
+            _settle(body, shafts, contacts, self._forces_n(), self._rubs)
+        return float(data.time)
+
+    def _body(self) -> Body:
+        m = self._mechanics
+        along, across, back = (float(value) for value in m.mu)
+        law = Law((along, across, back), float(m.radius_m), m.step_s, m.spine_links)
+        return Body(self._state, self._chain, self._links, self._geoms, law, m.totals)
+
+    def _contacts(self) -> Contacts:
+        """Copy the present contacts; make room for their friction."""
+        found = self._mechanics.data.contact
+        count = len(found.dist)
+        reals = np.zeros((count, _AT.size))
+        reals[:, _AT.dist], reals[:, 1:4], reals[:, 4:7] = found.dist, found.pos, found.frame[:, :3]
+        integers = reals.view(np.int32)
+        integers[:, _AT.geom : _AT.geom + 2] = found.geom
+        integers[:, _AT.row] = found.efc_address
+        if count > len(self._lanes[1]):
+            self._lanes = make_lanes(count)
+        return Contacts(reals.ravel(), integers.ravel(), count, _AT)
+
+    def _forces_n(self) -> Floats:
+        """MuJoCo's constraint forces, of which there is none in the air."""
+        return np.ascontiguousarray(self._mechanics.data.efc_force)

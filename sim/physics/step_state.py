@@ -1,0 +1,143 @@
+"""Arrays that the forces of a step read and write, by name, for compiled code."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats
+
+Lanes = tuple[Floats, NDArray[np.int64]]
+"""``friction.make_lanes``."""
+
+
+class State(NamedTuple):
+    """Generalised coordinates (7 + J,), velocities and applied forces (6 + J,)."""
+
+    qpos: Floats
+    qvel: Floats
+    force: Floats
+
+
+class Chain(NamedTuple):
+    """Where the B bodies are: row 0 is the world, row 1 + i is link i."""
+
+    centre: Floats
+    """(B, 3) centres of mass."""
+    rotation: Floats
+    """(B, 9) rows of their matrices."""
+    anchor: Floats
+    """(L, 3) points on the joints' axes; row 0 is the head's free joint."""
+    axis: Floats
+    """(L, 3) directions of the joints' axes."""
+    parents: NDArray[np.int32]
+    """(B,) bodies that they hang on."""
+
+
+class Links(NamedTuple):
+    """Quantities of the L links."""
+
+    velocity: Floats
+    """(L, 3) of the centres, in the last step."""
+    spin: Floats
+    """(L, 3)"""
+    wrench: Floats
+    """(L, 6) force, and torque about the world's origin."""
+    depth: Floats
+    """(L,) sum over the link's contacts."""
+    before: Floats
+    """(L, 3) centres at the start of the last step."""
+    load: Floats
+    """(L,) force that the ground bore in the last step."""
+    mass_kg: Floats
+    water: Floats
+    """(L, 7) ``sim.physics.water.water_constants``."""
+
+
+class Geoms(NamedTuple):
+    """Body and contact role of each geom."""
+
+    body: NDArray[np.int32]
+    role: NDArray[np.int32]
+
+
+class Motors(NamedTuple):
+    """Columns of a ``ServoDrive``, in its order."""
+
+    on: Floats
+    goal: Floats
+    gain: Floats
+    pwm_limit: Floats
+    supply: Floats
+    ohm: Floats
+    k_t: Floats
+    k_e: Floats
+    current_limit: Floats
+    current: Floats
+    torque: Floats
+    pwm: Floats
+    drawn_j: Floats
+    returned_j: Floats
+    heat_j: Floats
+    work_j: Floats
+
+
+class Gears(NamedTuple):
+    """Friction of the gears: terms (12, J), and MuJoCo's arrays (6 + J,)."""
+
+    terms: Floats
+    friction: Floats
+    bias: Floats
+    constraint: Floats
+
+
+class Law(NamedTuple):
+    """Constants of ground friction."""
+
+    mu: tuple[float, float, float]
+    """Coefficients of sliding forward, across and back."""
+    radius_m: float
+    step_s: float
+    spine: int
+    """Links of the spine."""
+
+
+class Body(NamedTuple):
+    """The body and its ground."""
+
+    state: State
+    chain: Chain
+    links: Links
+    geoms: Geoms
+    law: Law
+    totals: Floats
+    """(3,) ``Mechanics.totals``."""
+
+
+class Shafts(NamedTuple):
+    """What turns the joints."""
+
+    motors: Motors
+    gears: Gears
+    work: Floats
+    """(2, J) speed before the step, and the ground's torque."""
+
+
+class ContactFields(NamedTuple):
+    """Places of a contact's fields: in words of eight bytes, the last two in words of four."""
+
+    size: int
+    dist: int
+    place: int
+    normal: int
+    geom: int
+    row: int
+
+
+class Contacts(NamedTuple):
+    """The present contacts, as numbers and, in the same memory, as integers."""
+
+    reals: Floats
+    integers: NDArray[np.int32]
+    count: int
+    at: ContactFields

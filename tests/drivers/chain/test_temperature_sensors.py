@@ -1,0 +1,106 @@
+"""Temperatures that cannot be the motors' are reported, once, and no others."""
+
+import numpy as np
+import pytest
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.chain.temperature_sensors import (
+    COOLING_S,
+    EXPECTED_RISE_K,
+    RISE_S_PER_K,
+    TemperatureSensors,
+)
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+J = 4
+STALL_A = 2.0
+NAMES = [f"joint yaw_{k + 1:02d} (ID {k + 1})" for k in range(J)]
+STEP_S = 0.32
+HALF_A = STALL_A / np.sqrt(2.0)
+"""Warms by 1 K in 4 s."""
+
+
+def sensors() -> TemperatureSensors:
+    return TemperatureSensors(NAMES, np.full(J, STALL_A))
+
+
+def warm_up(
+    rise_k: list[float], seconds: float, amps: float = HALF_A, start_c: float = 25.0
+) -> list[str]:
+    """Lines that are reported while readings rise evenly by ``rise_k`` (J,)."""
+    found, lines = sensors(), []
+    for time_s in np.arange(0.0, seconds, STEP_S):
+        reading = np.rint(start_c + np.array(rise_k) * time_s / seconds)
+        lines += found.update(reading, np.full(J, amps), float(time_s))
+    return lines
+
+
+def test_a_temperature_of_zero_is_reported_at_once_and_once() -> None:
+    found = sensors()
+    reading = np.array([25.0, 0.0, 26.0, 25.0])
+    (line,) = found.update(reading, np.zeros(J), 0.0)
+    assert line.startswith("joint yaw_02 (ID 2): temperature reads 0 C")
+    assert found.update(reading, np.zeros(J), STEP_S) == []
+
+
+def test_a_temperature_that_does_not_rise_with_the_others_is_reported() -> None:
+    (line,) = warm_up([10.0, 10.0, 0.0, 8.0], 60.0)
+    assert line.startswith("joint yaw_03 (ID 3): temperature has read 25 C since the start")
+
+
+def test_where_no_temperature_changes_all_are_reported() -> None:
+    assert len(warm_up([0.0] * J, 60.0)) == J
+
+
+@pytest.mark.parametrize(
+    ("rise_k", "seconds", "amps"),
+    [
+        ([10.0] * J, 60.0, HALF_A),
+        ([1.0] * J, 60.0, HALF_A),  # warm at the start: near its equilibrium
+        ([1.0, 1.0, 0.0, -1.0], 60.0, HALF_A),
+        ([0.0] * J, 600.0, 0.05 * STALL_A),  # not enough current to warm it
+        ([0.0] * J, 12.0, HALF_A),  # not long enough
+    ],
+)
+def test_temperatures_that_may_be_true_are_not_reported(
+    rise_k: list[float], seconds: float, amps: float
+) -> None:
+    assert warm_up(rise_k, seconds, amps) == []
+
+
+def test_the_expected_rise_is_that_of_the_current_and_of_the_cooling() -> None:
+    found = sensors()
+    for time_s in np.arange(0.0, 3000.0, 1.0):
+        found.update(np.full(J, 25.0), np.full(J, 0.1 * STALL_A), float(time_s))
+    steady_k = 0.01 / RISE_S_PER_K * COOLING_S
+    assert found.expected_rise_k == pytest.approx(np.full(J, steady_k), rel=1e-3)
+    assert steady_k < EXPECTED_RISE_K
+
+
+def test_a_temperature_that_was_not_read_and_a_current_that_was_not_are_no_evidence() -> None:
+    found = sensors()
+    for time_s in np.arange(0.0, 60.0, STEP_S):
+        assert found.update(np.full(J, np.nan), np.full(J, HALF_A), float(time_s)) == []
+    found = sensors()
+    for time_s in np.arange(0.0, 60.0, STEP_S):
+        assert found.update(np.full(J, 25.0), np.full(J, np.nan), float(time_s)) == []
+
+
+ROBOT = RobotConfig(name="two", joint_axes="yy")
+
+
+def test_a_run_reports_a_sensor_that_reads_zero() -> None:
+    line = SimLine(ServoBank(ROBOT.servo_ids), BenchPlant(2))
+    line.firmware.protection.temperature_c[1] = 0.0
+    chain = ServoChain(DynamixelBus(line), ROBOT)
+    events: list[str] = []
+    chain.on_event = events.append
+    chain.enable()
+    assert (
+        len([each for each in events if "joint yaw_02 (ID 2): temperature reads 0 C" in each]) == 1
+    )
+    assert not any("joint 1" in each for each in events)
