@@ -50,15 +50,19 @@ class RobotConfig(JointValues):
                 else f"joints: {len(self.joints)} of them, but spine and legs have "
                 f"{self.joint_count}"
             )
-        for number, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True), 1):
+        for k, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True)):
+            label = self.joint_label(k)
             if joint.axis not in (None, axis):
-                raise ValueError(
-                    f"joints: axis of joint {number} is {joint.axis}, joint_axes says {axis}"
-                )
+                raise ValueError(f"joints: {label}: axis is {joint.axis}, joint_axes says {axis}")
             if joint.current_limit_a is not None and axis != "p":
-                raise ValueError(
-                    f"joints: current_limit_a of joint {number}: only pitch joints have one"
-                )
+                raise ValueError(f"joints: {label}: current_limit_a: only pitch joints have one")
+        return self
+
+    @model_validator(mode="after")
+    def _joint_names_differ(self) -> Self:
+        twice = [name for name, count in Counter(self.joint_names).items() if count > 1]
+        if twice:
+            raise ValueError(f"joints: {twice[0]} is the name of two joints; names must differ")
         return self
 
     @model_validator(mode="after")
@@ -230,8 +234,8 @@ class RobotConfig(JointValues):
             beyond = limit_rad + abs(self.zeros_rad[joint])
             if beyond > most_rad:
                 raise ValueError(
-                    f"{self.joint_name(joint)}: zero_rad {self.zeros_rad[joint]:g} with a limit of "
-                    f"{limit_rad:g} rad leaves the servo's turn by {beyond - most_rad:.3f} rad: "
+                    f"{self.joint_label(joint)}: zero_rad {self.zeros_rad[joint]:g} with a limit "
+                    f"of {limit_rad:g} rad leaves the servo's turn by {beyond - most_rad:.3f} rad: "
                     "mount the horn nearer to the servo's centre, or lower limit_rad"
                 )
         return self

@@ -4,13 +4,14 @@ import math
 from functools import cache
 from typing import TypeVar
 
+from snakewalk.config.joint_names import default_joint_names, joint_label
 from snakewalk.config.motor import MotorConfig
 from snakewalk.config.robot.keys import parsed
 from snakewalk.config.robot.link_values import LinkValues
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.config.servo_model import ServoModel
 
-N = TypeVar("N", int, float)
+N = TypeVar("N", int, float, str)
 
 
 class JointValues(LinkValues):
@@ -106,19 +107,21 @@ class JointValues(LinkValues):
         own = (getattr(joint, key) for joint in self.joints)
         return tuple(u if o is None else o for o, u in zip(own, usual, strict=True))
 
-    def joint_name(self, joint: int) -> str:
-        """Name of a joint in all messages: its number from the head, which is 1, and its servo ID.
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Name of each joint, in the order of the bus; names are unique and valid in ROS."""
+        usual = default_joint_names(self.all_axes, [each.side for each in self.limb_joints])
+        return self._own("name", usual)
 
-        The name of a leg's joint includes its side and the link of the spine; that of a robot with
-        several ports includes the port.
-        """
+    def joint_label(self, joint: int) -> str:
+        """Text by which every message calls a joint: name, servo ID, and port of a segment."""
         servo_id = self.servo_ids[joint]
-        on = "".join(f" on {each.port}" for each in self.ports if servo_id in each.ids)
-        name = f"joint {joint + 1} (ID {servo_id}{on})"
-        if joint < len(self.joint_axes):
-            return name
-        limb = self.limb_joints[joint - len(self.joint_axes)]
-        return f"{name} of the {limb.side} leg at link {self.limbs[limb.pair].link}"
+        port = next((each.port for each in self.ports if servo_id in each.ids), None)
+        return joint_label(self.joint_names[joint], servo_id, port)
+
+    def label_of_servo(self, servo_id: int) -> str:
+        """Text of ``joint_label`` for the joint of a servo."""
+        return self.joint_label(self.servo_ids.index(servo_id))
 
     @property
     def yaw_joints(self) -> tuple[int, ...]:

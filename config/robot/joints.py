@@ -3,15 +3,23 @@
 import math
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from snakewalk.config.base import Strict
+from snakewalk.config.joint_names import JOINT_NAME_PATTERN
 from snakewalk.config.robot.servo import LAST_ID
 
 
 class JointConfig(Strict):
     """Values of one joint, `[[joints]]` from the head; the other joints have those of the chain."""
 
+    name: str | None = Field(
+        None,
+        max_length=60,
+        pattern=JOINT_NAME_PATTERN,
+        description="in messages, tables and ROS: letters, digits and _; default: axis and place "
+        "from the head, such as yaw_03",
+    )
     axis: Literal["y", "p"] | None = Field(
         None, description="y = yaw, p = pitch; required for every joint unless joint_axes is given"
     )
@@ -48,3 +56,11 @@ class JointConfig(Strict):
     gear_drag_n_m_s: float | None = Field(
         None, ge=0.0, le=10.0, description="default: servo.gear_drag_n_m_s"
     )
+
+    @model_serializer(mode="wrap")
+    def _without_a_default_name(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Leave out a name that is not set: the configuration in a log keeps its bytes."""
+        keys: dict[str, object] = handler(self)
+        if self.name is None:
+            keys.pop("name", None)
+        return keys

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
+from snakewalk.config.joint_names import default_joint_names
 from snakewalk.config.robot.joint_values import JointValues
 from snakewalk.config.robot.joints import JointConfig
 from snakewalk.config.robot.limbs import LimbsConfig
@@ -64,9 +65,12 @@ def canonical_joints(robot: JointValues) -> dict[str, Any]:
     if not robot.joints:
         return {}
     axes, spine = robot.all_axes, len(robot.joint_axes)
+    usual = default_joint_names(axes, [each.side for each in robot.limb_joints])
     rows: list[dict[str, Any]] = [
-        {"sign": sign, "zero_rad": zero_rad}
-        for sign, zero_rad in zip(robot.signs, robot.zeros_rad, strict=True)
+        {"sign": sign, "zero_rad": zero_rad, "name": None if name == default else name}
+        for sign, zero_rad, name, default in zip(
+            robot.signs, robot.zeros_rad, robot.joint_names, usual, strict=True
+        )
     ]
     pitch = [k for k, axis in enumerate(axes) if axis == "p"]
     others = [k for k, axis in enumerate(axes) if axis != "p"]

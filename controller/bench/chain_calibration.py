@@ -16,6 +16,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import JointConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
@@ -201,7 +202,8 @@ def calibrate(
         )
         if not 0 <= bend.joint < like.joint_count or bend.joint in seen:
             raise InputError(
-                f"ID {servo_id}: joint {bend.joint + 1} is not one of the joints that are left"
+                f"ID {servo_id}: the joint that moved, number {bend.joint + 1} from the head, is "
+                f"known already or not of {like.name}"
             )
         seen[bend.joint], signs[bend.joint] = row, bend.direction
     on_progress("straight")
@@ -212,7 +214,8 @@ def calibrate(
     if sweep:
         with bench.straight(straight) as push:
             for joint, row in enumerate(rows):
-                on_progress(f"ID {unknown.servo_ids[row]}: range of joint {joint + 1}")
+                label = joint_label(like.joint_names[joint], unknown.servo_ids[row])
+                on_progress(f"range of {label}")
                 reach_rad = like.limit_rad[joint] + BEYOND_RAD
                 high = push(row, signs[joint], reach_rad)
                 low = push(row, -signs[joint], reach_rad)
@@ -359,7 +362,8 @@ def _found(
     joints, faults, notes = [], [], []
     stopless = [k for k, r in enumerate(ranges) if r.low_rad is None or r.high_rad is None]
     for joint, row in enumerate(rows):
-        limit, said = like.limit_rad[joint], f"joint {joint + 1} (ID {unknown.servo_ids[row]})"
+        limit = like.limit_rad[joint]
+        said = joint_label(like.joint_names[joint], unknown.servo_ids[row])
         if ranges:
             stops = [
                 abs(stop)

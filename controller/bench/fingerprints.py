@@ -87,7 +87,7 @@ def differences(
 ) -> list[str]:
     """Old and new value of every register that differs, one line each, by joint."""
     return [
-        f"{robot.joint_name(joint)}: {name}: {known.get(servo_id, {}).get(name, 'unknown')} -> "
+        f"{robot.joint_label(joint)}: {name}: {known.get(servo_id, {}).get(name, 'unknown')} -> "
         f"{value}"
         for joint, servo_id in enumerate(robot.servo_ids)
         for name, value in found.get(servo_id, {}).items()

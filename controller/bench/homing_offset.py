@@ -53,7 +53,7 @@ def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ..
                 else f"with its limit of {robot.limit_rad[joint]:g} rad it leaves the servo's turn"
             )
             faults.append(
-                f"{robot.joint_name(joint)}: needs Homing Offset {after}: {why}; mount its horn "
+                f"{robot.joint_label(joint)}: needs Homing Offset {after}: {why}; mount its horn "
                 "nearer to the servo's centre, or leave the zeros in the robot's file"
             )
     if faults:

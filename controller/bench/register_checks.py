@@ -192,7 +192,8 @@ class _Checks:
         bad = [servo.servo_id for servo in self._servos if is_bad(servo)]
         if not bad:
             return None
-        return Finding(check, grade, f"{shown_subject(bad, verb)} {what}", remedy)
+        subject = shown_subject(bad, verb, self._robot.label_of_servo)
+        return Finding(check, grade, f"{subject} {what}", remedy)
 
     def _bits(
         self, check: str, register: str, bits: int, verb: str, remedy: str = _BY_A_RUN
@@ -222,7 +223,7 @@ class _Checks:
         """Servos that were other joints in the last run, as far as they have had power since."""
         robot = self._robot
         others = [
-            f"servo {servo.servo_id} was {robot.joint_name(servo.values[IDENTITY] - 1)}"
+            f"{robot.joint_label(servo.joint)} was {robot.joint_label(servo.values[IDENTITY] - 1)}"
             for servo in self._servos
             if identity_fault(robot, servo.joint, servo.values.get(IDENTITY, 0)) is not None
         ]
@@ -233,7 +234,8 @@ class _Checks:
 
     def _secondary(self) -> Finding | None:
         shadows = [
-            f"servo {servo.servo_id} obeys ID {servo.values['Secondary(Shadow) ID']} as well"
+            f"{self._robot.joint_label(servo.joint)} obeys ID "
+            f"{servo.values['Secondary(Shadow) ID']} as well"
             for servo in self._servos
             if servo.values.get("Secondary(Shadow) ID", 255) <= SECONDARY_ID_LIMIT
         ]
@@ -259,7 +261,7 @@ class _Checks:
     def _homing(self) -> Finding | None:
         step_rad = self._units.rad_per_position
         moved = [
-            f"servo {servo.servo_id} by {offset * step_rad[servo.joint]:+.2f} rad"
+            f"{self._robot.joint_label(servo.joint)} by {offset * step_rad[servo.joint]:+.2f} rad"
             for servo in self._servos
             if (offset := servo.values.get("Homing Offset", 0))
         ]
@@ -279,7 +281,7 @@ class _Checks:
                 if check == "operating mode":
                     usual |= {POSITION_MODE, CURRENT_POSITION_MODE}
                 if value is not None and value not in usual:
-                    found.append(f"servo {servo.servo_id}: {name} {value}")
+                    found.append(f"{self._robot.joint_label(servo.joint)}: {name} {value}")
         return Finding(check, "warn", "; ".join(found), _BY_A_RUN) if found else None
 
     def _settings(self, servo: ServoRegisters) -> tuple[ChainSetting, ...]:

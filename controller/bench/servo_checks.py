@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.probe import Probe
 from snakewalk.drivers.chain.start_up import ServoReport
@@ -169,12 +170,14 @@ def return_delay(servos: Sequence[ServoReport]) -> Finding:
     )
 
 
-def alarms(servos: Sequence[ServoReport]) -> Finding:
+def alarms(servos: Sequence[ServoReport], robot: RobotConfig) -> Finding:
     """Hardware Error Status(70)."""
     bad = [s for s in servos if s.hardware_error]
     if not bad:
         return Finding("alarms", "ok", "none")
-    found = ", ".join(f"servo {s.servo_id}: {alarm_names(s.hardware_error)}" for s in bad)
+    found = ", ".join(
+        f"{robot.label_of_servo(s.servo_id)}: {alarm_names(s.hardware_error)}" for s in bad
+    )
     return Finding("alarms", "fail", found, "remove the cause, then switch the servo power off, on")
 
 
@@ -206,10 +209,11 @@ def supply(servos: Sequence[ServoReport], low_v: float, high_v: float) -> Findin
     return Finding("supply", "ok", shown)
 
 
-def heat(servos: Sequence[ServoReport], limit_c: float) -> Finding:
+def heat(servos: Sequence[ServoReport], robot: RobotConfig, limit_c: float) -> Finding:
     """Temperatures at rest."""
     hottest = max(servos, key=lambda s: s.temperature_c)
-    found = f"servo {hottest.servo_id} is the warmest: {hottest.temperature_c:.0f} C"
+    label = robot.label_of_servo(hottest.servo_id)
+    found = f"{label} is the warmest: {hottest.temperature_c:.0f} C"
     if hottest.temperature_c > limit_c:
         return Finding("temperature", "fail", found, "let it cool down")
     if hottest.temperature_c > _HOT_C:

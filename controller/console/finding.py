@@ -1,6 +1,6 @@
 """One line of the doctor's report."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -41,11 +41,18 @@ def shown_ids(servo_ids: Sequence[int]) -> str:
     return f"servo{'s' if len(numbers) > 1 else ''} {', '.join(shown)}"
 
 
-def shown_subject(servo_ids: Sequence[int], verb: str) -> str:
-    """``servo 3 answers``, ``servos 1 to 4 answer``; ``verb`` is the plural."""
+def shown_subject(
+    servo_ids: Sequence[int], verb: str, label: Callable[[int], str] | None = None
+) -> str:
+    """``servo 3 answers``, ``servos 1 to 4 answer``; ``verb`` is the plural.
+
+    ``label`` returns the text for a single servo whose joint is known.
+    """
     irregular = {
         **{"have": "has", "are": "is", "reply": "replies", "switch": "switches"},
         **{"do not reply": "does not reply", "cannot": "cannot"},
     }
     one = irregular.get(verb, f"{verb}s")
-    return f"{shown_ids(servo_ids)} {verb if len(servo_ids) > 1 else one}"
+    if len(servo_ids) > 1:
+        return f"{shown_ids(servo_ids)} {verb}"
+    return f"{shown_ids(servo_ids) if label is None else label(servo_ids[0])} {one}"

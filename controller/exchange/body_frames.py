@@ -35,11 +35,6 @@ class BodyFrames:
     """(T, L, 4) as x, y, z, w."""
 
 
-def joint_names(robot: RobotConfig) -> tuple[str, ...]:
-    """Names of all joints: ``joint0`` is next to the head."""
-    return tuple(f"joint{k}" for k in range(robot.joint_count))
-
-
 def body_frames(record: RunRecord) -> BodyFrames:
     """Frames at every pose of a log; where no pose was logged, at every cycle, head at the origin.
 

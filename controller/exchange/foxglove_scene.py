@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
-from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
+from snakewalk.controller.exchange.body_frames import WORLD, body_frames
 from snakewalk.controller.exchange.foxglove_schema import foxglove_schema
 from snakewalk.controller.exchange.imu_readings import imu_readings
 from snakewalk.controller.exchange.remaining_fields import TIME, Shown, remaining_fields
@@ -189,7 +189,7 @@ def _imu(record: RunRecord) -> Iterator[Row]:
 
 
 def _joints(record: RunRecord) -> Iterator[Row]:
-    rows, names = record.cycle, joint_names(record.header.robot)
+    rows, names = record.cycle, record.header.robot.joint_names
     effort_n_m = rows.current_a * record.header.torque_constant_n_m_a
     measured = np.stack([rows.measured_rad, rows.velocity_rad_s, effort_n_m], axis=2)
     for time_s, states, goals in zip(

@@ -55,7 +55,7 @@ def urdf_text(robot: RobotConfig, ros2_control: Ros2Control | None = None) -> st
     for joint, axis in enumerate(robot.joint_axes):
         limit = robot.limit_rad[joint]
         back = -(0.5 if joint == 0 else 1.0) * robot.link_lengths_m[joint]
-        hinge = ET.SubElement(root, "joint", name=f"joint{joint}", type="revolute")
+        hinge = ET.SubElement(root, "joint", name=robot.joint_names[joint], type="revolute")
         ET.SubElement(hinge, "origin", xyz=f"{back!r} 0 0", rpy="0 0 0")
         ET.SubElement(hinge, "parent", link=f"link{joint}")
         ET.SubElement(hinge, "child", link=f"link{joint + 1}")
@@ -95,7 +95,7 @@ def _add_ros2_control(root: ET.Element, robot: RobotConfig, kind: Ros2Control) -
     )
     for joint, (limit, number, facts, gain) in enumerate(rows):
         senses = facts.measures_current
-        each = ET.SubElement(system, "joint", name=f"joint{joint}")
+        each = ET.SubElement(system, "joint", name=robot.joint_names[joint])
         command = ET.SubElement(each, "command_interface", name="position")
         _add_params(command, {"min": repr(-limit), "max": repr(limit)})
         for what in ("position", "velocity", *(("effort",) if senses else ())):
@@ -122,7 +122,7 @@ def _dynamixel_params(robot: RobotConfig) -> dict[str, str]:
     for joint, zero in enumerate(robot.zeros_rad):
         if zero:
             raise InputError(
-                f"{robot.name}: {robot.joint_name(joint)} has zero_rad {zero:g}, which "
+                f"{robot.name}: {robot.joint_label(joint)} has zero_rad {zero:g}, which "
                 "dynamixel_hardware_interface does not know: write it into Homing Offset "
                 "(snakewalk calibrate), or give --ros2-control topic"
             )

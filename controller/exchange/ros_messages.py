@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.exchange.body_frames import WORLD, body_frames, joint_names
+from snakewalk.controller.exchange.body_frames import WORLD, body_frames
 from snakewalk.controller.exchange.imu_readings import imu_readings
 from snakewalk.controller.exchange.remaining_fields import Shown, remaining_fields
 from snakewalk.controller.runlog.column import Column
@@ -117,7 +117,7 @@ class RosMessages:
 
     def joints(self, record: RunRecord) -> Iterator[Row]:
         """What was measured, and what was sent, in every cycle."""
-        cycle, names = record.cycle, list(joint_names(record.header.robot))
+        cycle, names = record.cycle, list(record.header.robot.joint_names)
         effort_n_m = cycle.current_a * record.header.torque_constant_n_m_a
         none = np.zeros(0)
         if not np.isfinite(record.header.torque_constant_n_m_a):
@@ -250,7 +250,7 @@ class RosMessages:
         slow, robot = record.slow, record.header.robot
         return [
             self.status(
-                f"joint{joint}",
+                robot.joint_names[joint],
                 ERROR if slow.hardware_error[k, joint] else OK,
                 f"hardware error 0x{slow.hardware_error[k, joint]:02X}"
                 if slow.hardware_error[k, joint]

@@ -1,7 +1,7 @@
 """One look for all figures: colours that colour-blind people tell apart, thin grey frames."""
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -122,6 +122,12 @@ def legend_above(axes: Axes, columns: int = 6) -> None:
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1,
         handlelength=1.6, columnspacing=1.4,
     )  # fmt: skip
+
+
+def name_joints(axes: Axes, names: Sequence[str]) -> None:
+    """Label the vertical axis with the names of some joints; the first joint is at 0."""
+    places = range(0, len(names), max(1, -(-len(names) // 5)))
+    axes.set_yticks(places, [names[k] for k in places])
 
 
 def mark_waypoints(panels: list[Axes], times_s: Floats) -> None:

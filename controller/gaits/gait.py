@@ -150,7 +150,7 @@ class Gait(ABC):
         if len(beyond):
             worst = int(beyond[np.argmax((reach - limit)[beyond])])
             raise InputError(
-                f"gait {self.name}: {robot.joint_name(worst)} would bend to {reach[worst]:.2f} "
+                f"gait {self.name}: {robot.joint_label(worst)} would bend to {reach[worst]:.2f} "
                 f"rad; its limit is {limit[worst]:.2f}"
             )
 

@@ -28,7 +28,7 @@ class Difference:
     first_column: int | None
     """Joint, or axis, that differs there."""
     first_name: str = ""
-    """What people call it: ``joint 5 (ID 5)``, ``y``; empty where nothing differs."""
+    """What people call it: ``joint yaw_05 (ID 5)``, ``y``; empty where nothing differs."""
     decides: bool = True
     """Whether it has a tolerance; else it is reported only."""
 
@@ -109,7 +109,7 @@ def compare(
     a, b = original.cycle, replay.cycle
     names = ("asked_rad", "sent_rad", "measured_rad", "velocity_rad_s", "current_a")
     robot = original.header.robot
-    joints = tuple(map(robot.joint_name, range(robot.joint_count)))
+    joints = tuple(map(robot.joint_label, range(robot.joint_count)))
     pairs: list[tuple[str, tuple[str, ...], Floats, Floats, Floats]] = [
         (name, joints, a.deadline_s, getattr(a, name), getattr(b, name)) for name in names
     ]

@@ -48,7 +48,7 @@ class Recorded:
             frame = int(np.argmin(np.abs(time_s - moment)))
             least = np.floor(100.0 * limit[joint] / reach[joint]) / 100.0
             raise InputError(
-                f"recording: {robot.joint_name(joint)} bends to {reach[joint]:.2f} rad in frame "
+                f"recording: {robot.joint_label(joint)} bends to {reach[joint]:.2f} rad in frame "
                 f"{frame}; its limit is {limit[joint]:.2f}: make the whole motion smaller (--scale "
                 f"{least:.2f}), or clip joints to their limits (--clip)"
             )

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.joint_names import numbered_joint_names
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.motion.command import POINTS_MAX, JointTrajectory
 from snakewalk.controller.motion.refusals import NAME_MAX
@@ -57,10 +58,10 @@ class JointLimits:
         )
 
     def numbers(self, names: Sequence[str], what: str) -> JointNumbers:
-        """(K,) numbers of the joints named.
+        """(K,) numbers of the joints named; ``joint0`` is accepted for the joint next to the head.
 
         Raises:
-            InputError: none is named, one is named twice, or is none of the robot's.
+            InputError: there is no name, a joint is named twice, or a name is unknown.
 
         """
         if not names:
@@ -69,15 +70,18 @@ class JointLimits:
             raise InputError(
                 f"{what}: names {len(names)} joints; {self.robot} has {len(self.names)}"
             )
-        unknown = [name for name in names if name not in self.names]
+        numbers = {name: k for k, name in enumerate(numbered_joint_names(len(self.names)))}
+        numbers |= {name: k for k, name in enumerate(self.names)}
+        unknown = [name for name in names if name not in numbers]
         if unknown:
             raise InputError(
                 f"{what}: {unknown[0][:NAME_MAX]} is no joint of {self.robot}; they are "
                 f"{self.names[0]} to {self.names[-1]}"
             )
-        if len(set(names)) < len(names):
+        joints = [numbers[name] for name in names]
+        if len(set(joints)) < len(joints):
             raise InputError(f"{what}: names a joint twice")
-        return np.array([self.names.index(name) for name in names], dtype=np.intp)
+        return np.array(joints, dtype=np.intp)
 
     def check_angles(self, angle_rad: Floats, joints: JointNumbers, what: str) -> None:
         """Refuse angles (N, K) that are no numbers, or that the joints (K,) do not bend to.

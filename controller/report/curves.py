@@ -5,6 +5,7 @@ import gzip
 import json
 from collections.abc import Sequence
 from functools import cache
+from html import escape
 from typing import Any, Final
 
 import numpy as np
@@ -39,7 +40,7 @@ def curves_html(record: RunRecord) -> str:
     panels, constant = _panels(record)
     spec = json.dumps(_figure(record, panels))
     joints = "".join(
-        f"<option value='{k}'>joint {k + 1}</option>"
+        f"<option value='{k}'>{escape(record.header.robot.joint_label(k))}</option>"
         for k in range(record.cycle.asked_rad.shape[1])
     )
     step = _step(len(record.cycle.time_s))

@@ -101,7 +101,7 @@ def allowed(
         return UNLIMITED
     reached = unit.format(values[joint])
     most = unit.format(np.full(len(rates), limit)[joint]).removesuffix(" from its goal")
-    return Allowed(rate, f"{robot.joint_name(joint)} at {reached}, limit {most}")
+    return Allowed(rate, f"{robot.joint_label(joint)} at {reached}, limit {most}")
 
 
 def _lag_limits_rad(safety: SafetyConfig, robot: RobotConfig) -> Floats:

@@ -276,7 +276,7 @@ def margin_faults(plan: Forecast, robot: RobotConfig) -> list[str]:
         ("hold", "N m", plan.joint_torque_n_m, np.full(joints, robot.torque_limit_n_m), 1.0),
     )
     return [
-        f"plan: {robot.joint_name(int(j))} would {verb} {asked[j]:.2f} {unit}; "
+        f"plan: {robot.joint_label(int(j))} would {verb} {asked[j]:.2f} {unit}; "
         f"its limit is {limit[j]:.2f}"
         for verb, unit, asked, limit, headroom in checks
         for j in np.flatnonzero(asked > headroom * limit + _ROUNDING)

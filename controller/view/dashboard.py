@@ -40,7 +40,7 @@ class Dashboard:
         self._limit_c = safety.temperature_limit_c
         self._volts = safety.voltage_limits_v(header.robot.servo)
         self._stale_s = safety.stale_limit_s
-        self._names = [header.robot.joint_name(k) for k in range(header.robot.joint_count)]
+        self._names = [header.robot.joint_label(k) for k in range(header.robot.joint_count)]
         self._gui = gui = server.gui
         self._picture: viser.GuiImageHandle | None = None
         self._state = gui.add_html("")

@@ -50,6 +50,6 @@ class AlarmReader:
         if count > 1:
             return None
         return (
-            f"{self._robot.joint_name(joint)}: its status packet carries an alert, but Hardware "
+            f"{self._robot.joint_label(joint)}: its status packet carries an alert, but Hardware "
             "Error Status reads 0; it is read again before the run ends"
         )

@@ -46,7 +46,7 @@ def fingerprint_faults(
     robot: RobotConfig, joint: int, before: Fingerprint, now: Fingerprint, rad_per_position: float
 ) -> list[str]:
     """Lines on the registers of a joint's servo that have changed."""
-    name = robot.joint_name(joint)
+    name = robot.joint_label(joint)
     return [
         f"{name}: {register_change(register, value, now[register], rad_per_position)}"
         for register, value in before.items()

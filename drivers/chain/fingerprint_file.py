@@ -136,7 +136,7 @@ def changes(
             mask = REVERSE if name == "Drive Mode" else -1
             if (old[name] ^ new[name]) & mask:
                 change = register_change(name, old[name], new[name], rad_per_position)
-                lines.append(f"{robot.joint_name(joint)}: {change}")
+                lines.append(f"{robot.joint_label(joint)}: {change}")
     return lines
 
 

@@ -133,14 +133,14 @@ class GoalCheck:
         first = self._differences[joints[0]]
         reason = explain(joints[0])
         if reason is not None:
-            return f"{self._robot.joint_name(joints[0])}: {reason}"
+            return f"{self._robot.joint_label(joints[0])}: {reason}"
         if first.is_foreign:
             cause = _SECOND_MASTER
         elif first.is_constant:
             cause = "it ignores sync writes, or another program writes goals"
         else:
             cause = "writes to it get lost"
-        names = ", ".join(map(self._robot.joint_name, joints))
+        names = ", ".join(map(self._robot.joint_label, joints))
         return f"{names}: Goal Position is {first.value}, not {sent[joints[0]]}: {cause}"
 
 

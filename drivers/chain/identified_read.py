@@ -80,7 +80,7 @@ def check_stillness(
     if np.nanmax(moved_rad, initial=0.0) <= most_rad and not np.isnan(moved_rad).any():
         return
     joint = int(np.argmax(np.where(np.isnan(moved_rad), np.inf, moved_rad)))
-    name = robot.joint_name(joint)
+    name = robot.joint_label(joint)
     if np.isnan(moved_rad[joint]):
         text = f"{name}: its servo does not tell that it is this joint's: two servos with one ID?"
     else:

@@ -69,7 +69,7 @@ class JointUnits:
         for joint, (axis, servo) in enumerate(zip(robot.all_axes, servos, strict=True)):
             if axis == "p" and not servo.limits_current and math.isnan(servo.stall_current_a):
                 raise ControlTableError(
-                    f"{robot.joint_name(joint)}: {robot.servo_models[joint]} has no current-based "
+                    f"{robot.joint_label(joint)}: {robot.servo_models[joint]} has no current-based "
                     "position control, so its output is limited as a share of the stall current; "
                     "its file gives none: docs/how-to/add-a-servo-model.md"
                 )

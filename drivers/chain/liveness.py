@@ -138,7 +138,7 @@ class LivenessCheck:
             other = identity_fault(self._robot, joint, value)
             if other is not None:
                 raise BusError(other)
-        names = ", ".join(map(self._robot.joint_name, differing))
+        names = ", ".join(map(self._robot.joint_label, differing))
         raise BusError(f"{names}: {self._difference(check, joint, value)}")
 
     def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:

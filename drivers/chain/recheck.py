@@ -93,11 +93,11 @@ def recheck(
         old = known.get(servo.servo_id, servo)
         if servo.firmware != old.firmware:
             text = (
-                f"{robot.joint_name(joint)}: firmware {servo.firmware}, was {old.firmware}: "
+                f"{robot.joint_label(joint)}: firmware {servo.firmware}, was {old.firmware}: "
                 "another servo?"
             )
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
-        name = robot.joint_name(joint)
+        name = robot.joint_label(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:
             text = f"{name}: off by {turns:+d} turns: its turn count is lost"
@@ -125,5 +125,5 @@ def recheck(
         for part in bus.parts
         if lost.issuperset(i for i in robot.servo_ids if bus.port_of(i) is part.port)
     )
-    names = tuple(map(robot.joint_name, reset))
+    names = tuple(map(robot.joint_label, reset))
     return Recheck(tuple(faults), tuple(reset), names, moved, here_rad, unidentified)

@@ -109,7 +109,7 @@ class ServoChain:
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
-        names = [robot.joint_name(joint) for joint in range(robot.joint_count)]
+        names = [robot.joint_label(joint) for joint in range(robot.joint_count)]
         self._sensors = TemperatureSensors(names, np.array(stall_a))
         self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)
         self._armed = False
@@ -269,7 +269,7 @@ class ServoChain:
         )  # IDs may have been exchanged since
         for joint in np.flatnonzero(held != goals).tolist():
             raise BusError(
-                f"{self.robot.joint_name(joint)}: Goal Position is {held[joint]:.0f} after "
+                f"{self.robot.joint_label(joint)}: Goal Position is {held[joint]:.0f} after "
                 f"{goals[joint]} was written to all"
             )
         ticks = self._watchdog_ticks
@@ -442,7 +442,7 @@ class ServoChain:
         differing, _ = check.compare(ask_again=self._bus)
         for joint, got in differing.items():
             raise BusError(
-                f"{self.robot.joint_name(joint)}: {name} is {got} after {expected[joint]} was "
+                f"{self.robot.joint_label(joint)}: {name} is {got} after {expected[joint]} was "
                 "written to all"
             )
 
@@ -452,5 +452,5 @@ class ServoChain:
             if state.valid.all() and state.slow_age_s.max() <= _SLOW_S:
                 return state
             self._reads = 0  # so that the slow state is read again, too
-        silent = [str(i) for i, v in zip(self.robot.servo_ids, state.valid, strict=True) if not v]
-        raise BusError(f"servo {', '.join(silent) or 'group'}: group read fails, pings do not")
+        silent = ", ".join(map(self.robot.joint_label, np.flatnonzero(~state.valid).tolist()))
+        raise BusError(f"{silent or 'all servos'}: group read fails, pings do not")

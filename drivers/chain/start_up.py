@@ -126,7 +126,7 @@ def inspect(
             faults.append(ChainFault(FaultCause.NO_ANSWER, text))
     servos = []
     for servo_id, servo in found.items():
-        joint = robot.joint_name(robot.servo_ids.index(servo_id))
+        joint = robot.joint_label(robot.servo_ids.index(servo_id))
         table = bus.table_of(servo_id)
         name = table.model
         if servo.model_number != table.model_number:
@@ -289,7 +289,7 @@ def _configure_joint(
     found: dict[str, int],
     on_event: Callable[[str], None],
 ) -> ServoSettings:
-    name, pwm_limit = robot.joint_name(joint), found["PWM Limit"]
+    name, pwm_limit = robot.joint_label(joint), found["PWM Limit"]
     full = int(units.full_pwm[joint])
     if pwm_limit == 0:
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {full}")
@@ -305,7 +305,7 @@ def _configure_joint(
     before = found.get(IDENTITY, 0)
     if identity_fault(robot, joint, before) is not None:
         on_event(
-            f"{name}: its servo was {robot.joint_name(before - 1)} in the run before: have IDs "
+            f"{name}: its servo was {robot.joint_label(before - 1)} in the run before: have IDs "
             "been exchanged since?"
         )
     offset = values["Homing Offset"]
@@ -328,7 +328,7 @@ def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
     if value == identity(joint) or not 1 <= value <= robot.joint_count:
         return None
     return (
-        f"{robot.joint_name(joint)}: its servo was {robot.joint_name(value - 1)}: exchanged IDs; "
+        f"{robot.joint_label(joint)}: its servo was {robot.joint_label(value - 1)}: exchanged IDs; "
         "put them right: snakewalk bus set"
     )
 
@@ -356,7 +356,7 @@ def _apply(
         BusError: one does not hold what it should; or the servo does not answer, or refuses.
 
     """
-    servo_id, name = robot.servo_ids[joint], robot.joint_name(joint)
+    servo_id, name = robot.servo_ids[joint], robot.joint_label(joint)
     own = [setting for setting in settings if setting.register in found]
     now = found
     for setting in own:
@@ -394,8 +394,9 @@ def _current_setting(
     if goal > limit_raw:
         own = bool(robot.joints) and robot.joints[joint].current_limit_a is not None
         raise ChainError(
-            f"{robot.joint_name(joint)}: {'' if own else 'pitch_'}current_limit_a = {current_a:g}: "
-            f"the servo's Current Limit is {limit_raw * abs(units.a_per_current[joint]):.2f} A"
+            f"{robot.joint_label(joint)}: {'' if own else 'pitch_'}current_limit_a = "
+            f"{current_a:g}: the servo's Current Limit is "
+            f"{limit_raw * abs(units.a_per_current[joint]):.2f} A"
         )
     return ChainSetting("Goal Current", goal)
 
@@ -436,7 +437,7 @@ def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
 def pose_faults(robot: RobotConfig, position_rad: NDArray[np.float64]) -> list[str]:
     """Joints that stand well beyond their limits, one line each."""
     return [
-        f"{robot.joint_name(joint)}: stands at {angle:.2f} rad, beyond its "
+        f"{robot.joint_label(joint)}: stands at {angle:.2f} rad, beyond its "
         f"limit of {limit:g}: bend it back by hand; if it is straight, its turn count or zero "
         "position is wrong: reboot it, check Homing Offset"
         for joint, (angle, limit) in enumerate(zip(position_rad, robot.limit_rad, strict=True))

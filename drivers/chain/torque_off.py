@@ -66,7 +66,7 @@ class TorqueOff:
 
     def _report(self, silent: Sequence[int], faults: Sequence[PortError], ports: int) -> None:
         """Raise the error of what could not be switched off; nothing if all servos are off."""
-        names = ", ".join(map(self._robot.joint_name, silent))
+        names = ", ".join(map(self._robot.joint_label, silent))
         if faults:
             which = "its servos: a servo" if ports > 1 else "a servo"
             text = (

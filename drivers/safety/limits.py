@@ -24,7 +24,7 @@ class SafetyLimits:
     """Limits of one robot; a value at its limit is allowed."""
 
     joint_names: tuple[str, ...]
-    """J names for messages: ``joint 5 (ID 5)``."""
+    """J names for messages: ``joint yaw_05 (ID 5)``."""
     limit_rad: Floats
     """(J,) half range of the goals."""
     limit_slack_rad: float
@@ -62,7 +62,7 @@ class SafetyLimits:
         """Limits from the robot's and the run's configuration."""
         voltage_min_v, voltage_max_v = safety.voltage_limits_v(robot.servo)
         return SafetyLimits(
-            joint_names=tuple(map(robot.joint_name, range(robot.joint_count))),
+            joint_names=tuple(map(robot.joint_label, range(robot.joint_count))),
             limit_rad=np.array(robot.limit_rad),
             limit_slack_rad=LIMIT_SLACK_RAD,
             goal_rate_rad_s=safety.goal_rate_rad_s,

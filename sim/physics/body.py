@@ -253,7 +253,7 @@ def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
         back = robot.link_lengths_m[j] / (2.0 if j == 0 else 1.0)
         text = (
             f'<body name="link{j + 1}" pos="{-back!r} 0 0">'
-            f'<joint name="joint{j}" axis="{axis}" range="{-stop!r} {stop!r}" '
+            f'<joint name="{robot.joint_names[j]}" axis="{axis}" range="{-stop!r} {stop!r}" '
             f'armature="{robot.armatures_kg_m2[j]!r}"/>'
             f"{_link(robot, j + 1, balls=balls)}{text}{_limbs(robot, j + 1)}</body>"
         )
@@ -278,6 +278,7 @@ def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str
     """One leg, ``side`` 1 to the left; its segments are thin rods, its foot a ball at the end."""
     text, limits = "", robot.limit_rad
     for k in reversed(range(len(pair.joint_axes))):
+        name = robot.joint_names[first + k - 1]
         axis = f"0 0 {-side!r}" if pair.joint_axes[k] == "y" else f"{side!r} 0 0"
         stop = limits[first + k - 1] + STOP_MARGIN_RAD
         along = -0.5 * robot.link_lengths_m[pair.link] if pair.link > 0 else 0.0
@@ -293,7 +294,7 @@ def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str
         )
         text = (
             f'<body name="link{first + k}" pos="{at[0]!r} {at[1]!r} 0">'
-            f'<joint name="joint{first + k - 1}" axis="{axis}" range="{-stop!r} {stop!r}" '
+            f'<joint name="{name}" axis="{axis}" range="{-stop!r} {stop!r}" '
             f'armature="{robot.armatures_kg_m2[first + k - 1]!r}"/>'
             f'<inertial pos="0 {0.5 * side * length!r} 0" mass="{mass!r}" '
             f'diaginertia="{across!r} {mass * r**2 / 2.0!r} {across!r}"/>{foot}{text}</body>'

@@ -142,7 +142,7 @@ class ChangeWatch:
         joints, register = change
         # of exchanged servos, registers are another joint's, too
         whats = ("exchanged", "another program") if register == IDENTITY else (register,)
-        names = map(ROBOT.joint_name, joints)
+        names = map(ROBOT.joint_label, joints)
         return any(name in line for name in names) and any(what in line for what in whats)
 
     def _changed(self) -> set[Change]:

@@ -17,9 +17,9 @@ def test_the_salamanders_joints_are_spine_then_legs() -> None:
     assert robot.all_axes == "yyyyyyyy" + "yr" * 4
     assert robot.limit_rad[7:10] == (1.5, 1.2, 1.5)
     assert robot.link_parents[8:] == (7, 5, 9, 5, 11, 1, 13, 1, 15)
-    assert robot.joint_name(7) == "joint 8 (ID 8)"
-    assert robot.joint_name(8) == "joint 9 (ID 9) of the left leg at link 5"
-    assert robot.joint_name(15) == "joint 16 (ID 16) of the right leg at link 1"
+    assert robot.joint_label(7) == "joint yaw_08 (ID 8)"
+    assert robot.joint_label(8) == "joint left_yaw_09 (ID 9)"
+    assert robot.joint_label(15) == "joint right_roll_16 (ID 16)"
 
 
 def test_a_snake_is_what_it_was() -> None:

@@ -55,7 +55,7 @@ def test_a_joint_says_what_is_its_own(tmp_path: Path) -> None:
     assert robot.current_limits_a == (float("inf"), 0.4, float("inf"))
     assert robot.armatures_kg_m2 == (0.045, 0.002, 0.045)
     assert robot.gear_drags_n_m_s == (0.03, 0.006, 0.03)
-    assert robot.joint_name(1) == "joint 2 (ID 7)"
+    assert robot.joint_label(1) == "joint pitch_02 (ID 7)"
     # a log keeps the robot as JSON, and gives back the same
     assert RobotConfig.model_validate_json(robot.model_dump_json()) == robot
 
@@ -74,7 +74,10 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
     ("keys", "said"),
     [
         ({"joint_axes": "yy", "joints": [{}]}, "joints: 1 of them, but joint_axes has 2"),
-        ({"joint_axes": "y", "joints": [{"axis": "p"}]}, "axis of joint 1 is p, joint_axes says y"),
+        (
+            {"joint_axes": "y", "joints": [{"axis": "p"}]},
+            "joint yaw_01 (ID 1): axis is p, joint_axes says y",
+        ),
         ({"joints": [{"axis": "y"}, {}]}, "joint_axes: is required"),
         ({"joints": 3}, "joints: must be a list"),
         (
@@ -83,7 +86,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
         ),
         (
             {"joint_axes": "y", "joints": [{"current_limit_a": 1.0}]},
-            "current_limit_a of joint 1: only pitch joints have one",
+            "joint yaw_01 (ID 1): current_limit_a: only pitch joints have one",
         ),
         ({"joint_axes": "y", "links": [{}]}, "a spine of 1 joints has 2"),
         ({"joint_axes": "y", "links": [{"length_m": 0.0}, {}]}, "of the head and of the tail must"),
@@ -118,7 +121,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
         ({"joint_axes": "y", "links": [{"length_m": 0.003}, {}]}, "length_m: 0, or over 0.005"),
         (
             {"joint_axes": "yy", "joints": [{}, {"zero_rad": -2.0}]},
-            "joint 2 (ID 2): zero_rad -2 with a limit of 1.5 rad leaves the servo's turn",
+            "joint yaw_02 (ID 2): zero_rad -2 with a limit of 1.5 rad leaves the servo's turn",
         ),
         ({"joint_axes": "y", "joints": [{"sign": 0}]}, "sign: must be 1 or -1"),
         (

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.bench import chain_calibration
 from snakewalk.controller.bench.chain_calibration import SeenBend
@@ -93,7 +95,7 @@ def calibrate(
         found = chain_calibration.calibrate(
             line,
             like,
-            _Person(like.joint_axes),
+            _Person(like),
             name=out.stem,
             latency_s=line.latency_s,
             current_a=current,
@@ -143,8 +145,8 @@ def _confirmed(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
 class _Person:
     """Asks at the terminal."""
 
-    def __init__(self, axes: str) -> None:
-        self._axes = axes
+    def __init__(self, robot: RobotConfig) -> None:
+        self._axes, self._names = robot.joint_axes, robot.joint_names
 
     def which(
         self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
@@ -157,11 +159,13 @@ class _Person:
                 continue
             joint = int(answer) - 1
             if joint in known:
-                typer.echo(f"joint {answer} is ID {known[joint]} already", err=True)
+                label = joint_label(self._names[joint], known[joint])
+                typer.echo(f"{label}: its servo is known already", err=True)
                 continue
             yaw = self._axes[joint] == "y"
             asked = "to the left or right (l, r)" if yaw else "up or down (u, d)"
-            side = _ask(f"joint {answer}: the head side went first {asked}, a = again: ").lower()
+            label = joint_label(self._names[joint], servo_id)
+            side = _ask(f"{label}: the head side went first {asked}, a = again: ").lower()
             if side[:1] in ("l", "r") if yaw else side[:1] in ("u", "d"):
                 return SeenBend(joint, 1 if side[0] in "lu" else -1)
 
@@ -183,10 +187,10 @@ def _show(
     robot: "RobotConfig", notes: "Sequence[str]", facts: dict[str, object], as_json: bool
 ) -> None:
     if not as_json:
-        rows = zip(robot.servo_ids, robot.signs, robot.zeros_rad, robot.limit_rad, strict=True)
-        for joint, (servo_id, sign, zero, limit) in enumerate(rows, 1):
+        rows = zip(robot.signs, robot.zeros_rad, robot.limit_rad, strict=True)
+        for joint, (sign, zero, limit) in enumerate(rows):
             console.print(
-                f"joint {joint}: ID {servo_id}, sign {sign:+d}, zero {zero:+.3f} rad, "
+                f"{robot.joint_label(joint)}: sign {sign:+d}, zero {zero:+.3f} rad, "
                 f"limit {limit:g} rad"
             )
         for note in notes:

@@ -126,7 +126,7 @@ def _accept(
     known = file.read() or {}
     with open_lines(port, robot.servo.baud) as lines:
         found = read_all(lines, robot)
-    silent = [robot.joint_name(j) for j, i in enumerate(robot.servo_ids) if i not in found]
+    silent = [robot.joint_label(j) for j, i in enumerate(robot.servo_ids) if i not in found]
     if silent:
         raise BusError(f"{', '.join(silent)}: no reply; nothing is written")
     changed = differences(robot, known, found)

@@ -14,7 +14,12 @@ from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
-from snakewalk.controller.exchange.flat_table import flat_tables, write_csv, write_parquet
+from snakewalk.controller.exchange.flat_table import (
+    flat_tables,
+    with_joint_numbers,
+    write_csv,
+    write_parquet,
+)
 from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
 from snakewalk.controller.runlog.reader import read_log
@@ -27,6 +32,7 @@ from snakewalk.controller.runlog.reader import read_log
         "export runs/flat-square-walk-seed0/log.mcap --csv tables",
         "export LOG --parquet tables --foxglove body.mcap",
         "export LOG --ros2 bag.mcap --json",
+        "export LOG --csv tables --joint-numbers",
     ),
 )
 def export(
@@ -44,6 +50,9 @@ def export(
         Path | None,
         typer.Option(dir_okay=False, help="for Foxglove in 3-D, FILE.mcap", metavar="FILE"),
     ] = None,
+    joint_numbers: Annotated[
+        bool, typer.Option("--joint-numbers", help="name joints by number, as older versions did")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -52,15 +61,16 @@ def export(
     record = read_log(log)
     if record.note:
         LOGGER.warning("%s: %s", log, record.note)
-    tables = flat_tables(record)
+    tables = flat_tables(record, joint_numbers=joint_numbers)
+    named = with_joint_numbers(record) if joint_numbers else record
     writers: dict[Path, Callable[[Path], int | dict[str, int]]] = {}
     for folder, ending, write in ((csv, "csv", write_csv), (parquet, "parquet", write_parquet)):
         if folder is not None:
             writers |= {folder / f"{t.name}.{ending}": partial(write, t) for t in tables}
     if ros2 is not None:
-        writers[ros2] = partial(write_ros_bag, record)
+        writers[ros2] = partial(write_ros_bag, named)
     if foxglove is not None:
-        writers[foxglove] = partial(write_foxglove_scene, record)
+        writers[foxglove] = partial(write_foxglove_scene, named)
     folders = {folder for folder in (csv, parquet) if folder is not None and not folder.exists()}
     files = [file for file in writers if file.parent not in folders]
     refuse_to_overwrite([*sorted(folders), *files], force)

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.figures.style import ANGLES, canvas
+from snakewalk.controller.figures.style import ANGLES, canvas, name_joints
 from snakewalk.controller.runlog.record import RunRecord
 
 _COLUMNS = 1400
@@ -23,7 +23,7 @@ def joints_figure(record: RunRecord) -> Figure | None:
     figure, panels = canvas(3, height)
     grid = np.linspace(cycle.time_s[0], cycle.time_s[-1], min(_COLUMNS, len(cycle.time_s)))
     rows = np.searchsorted(cycle.time_s, grid).clip(0, len(cycle.time_s) - 1)
-    extent = (float(grid[0]), float(grid[-1]), joints + 0.5, 0.5)
+    extent = (float(grid[0]), float(grid[-1]), joints - 0.5, -0.5)
     for axes, values, title, limit in zip(
         panels,
         (asked, measured, gap),
@@ -36,14 +36,13 @@ def joints_figure(record: RunRecord) -> Figure | None:
             interpolation="nearest",
         )  # fmt: skip
         axes.set_title(title)
-        axes.set_ylabel("joint")
         axes.grid(visible=False)
         axes.set_facecolor("#c9d1d8")
-        axes.set_yticks(range(1, joints + 1, max(1, -(-joints // 5))))
+        name_joints(axes, record.header.robot.joint_names)
         bar = figure.colorbar(image, ax=axes, pad=0.01, aspect=12)
         bar.set_label("rad")
         bar.outline.set_visible(False)
-    panels[-1].set_xlabel("time (s)      joint 1 is behind the head; grey: no answer in that cycle")
+    panels[-1].set_xlabel("time (s)      the head is at the top; grey: no reply in that cycle")
     return figure
 
 

@@ -14,6 +14,7 @@ from snakewalk.controller.figures.style import (
     RED,
     canvas,
     legend_above,
+    name_joints,
 )
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -62,7 +63,7 @@ def _raster(axes: Axes, record: RunRecord) -> None:
         cycle.time_s[rows], columns, marker=".", s=14, color=GREY, label=f"no answer ({len(rows)})"
     )
     axes.set_ylim(cycle.valid.shape[1] - 0.5, -0.5)
-    axes.set_ylabel("joint")
+    name_joints(axes, record.header.robot.joint_names)
     axes.set_title("Commands changed by safety, and reads that failed")
     legend_above(axes)
 

@@ -24,7 +24,6 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.exchange.body_frames import joint_names
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.ros.ros_link import open_ros
 from snakewalk.controller.ros.ros_options import RosOptions
@@ -102,7 +101,7 @@ def ros(
         prepared = prepare_commanded(
             lambda body, on_event: Commanded(
                 body,
-                joint_names(body),
+                body.joint_names,
                 link.commands,
                 on_event,
                 timeout_s=timeout,

@@ -75,7 +75,7 @@ class PlaybackRun(PathlessRun):
         frame, joint = (int(k) for k in np.unravel_index(np.argmax(past), past.shape))
         return (
             f"joints clipped to their limits in {int((past > 0.0).any(axis=1).sum())} of "
-            f"{len(past)} frames, most by {past.max():.2f} rad: {self.robot.joint_name(joint)} in "
+            f"{len(past)} frames, most by {past.max():.2f} rad: {self.robot.joint_label(joint)} in "
             f"frame {frame}"
         )
 

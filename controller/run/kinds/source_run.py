@@ -76,7 +76,7 @@ class SourceRun(PathlessRun):
             worst = int(np.argmax(reach / most))
             if reach[worst] > most[worst] * _SLACK:
                 faults.append(
-                    f"the motion source: {self.robot.joint_name(worst)} {what} {reach[worst]:.2f} "
+                    f"the motion source: {self.robot.joint_label(worst)} {what} {reach[worst]:.2f} "
                     f"{unit}; its limit is {most[worst]:.2f}"
                 )
         if faults:

@@ -133,7 +133,7 @@ class NamedCause:
         value = self.values[0]
         if self.cause == "load":
             return f"a load: link {self.at} of the body (0 is the head) weighs {value:.2f} kg more"
-        joint = robot.joint_name(self.at)
+        joint = robot.joint_label(self.at)
         if self.cause == "weaker servo":
             return f"a weaker servo: {joint} has {value:.2f} of its model's torque for a current"
         return f"a slipped horn: {joint} is bent by {value:+.2f} rad more than its servo says"
@@ -161,7 +161,7 @@ class Diagnosis:
         if named is None:
             return (
                 "nothing differs from the shadow more than between robots that are well; most "
-                f"does {robot.joint_name(most)}, by {self.residual_a[most]:.3f} A"
+                f"does {robot.joint_label(most)}, by {self.residual_a[most]:.3f} A"
             )
         return (
             f"what differs from the shadow is explained by {named.text(robot)} "

@@ -73,7 +73,7 @@ class ShadowAlarm:
         found = [int(j) for j in np.argsort(-over) if over[j] > 1.0 and int(j) not in self.named]
         self.named.update(found)
         return tuple(
-            f"{self.robot.joint_name(j)} differs from its shadow: its current by "
+            f"{self.robot.joint_label(j)} differs from its shadow: its current by "
             f"{apart_a[j]:.3f} A, its angle by {apart_rad[j]:.3f} rad (over the last seconds)"
             for j in found
         )

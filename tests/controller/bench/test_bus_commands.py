@@ -62,7 +62,7 @@ def test_doctor(
     assert (code, found["worst"]) == (1, "fail")
     code, out, _ = call(monkeypatch, capsys, "doctor", "--port", device)
     assert code == 1
-    assert "servo 5: overload" in out
+    assert "joint yaw_05 (ID 5): overload" in out
     assert "-> remove the cause" in out
 
 

@@ -155,7 +155,9 @@ def test_a_chain_is_found_out_completely_and_then_walks(
     assert limits[BROKEN] == pytest.approx(STOP_RAD - 0.1, abs=0.03)
     assert (np.delete(limits, BROKEN) == 1.5).all()
     (note,) = found.notes
-    assert note.startswith(f"joint {BROKEN + 1} (ID {truth.servo_ids[BROKEN]}): stops at -0.6")
+    assert note.startswith(
+        f"joint yaw_{BROKEN + 1:02d} (ID {truth.servo_ids[BROKEN]}): stops at -0.6"
+    )
     assert not bench.line.bank["Torque Enable"].any()
     assert np.abs(bench.line.bank["Goal Current"]).max() <= round(0.3 / 2.69e-3)
 
@@ -283,7 +285,7 @@ def trio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trio:
 def test_a_person_answers_at_the_terminal(trio: Trio) -> None:
     result = trio()
     assert result.exit_code == 0, result.output
-    assert "joint 1 is ID 9 already" in result.output
+    assert "joint yaw_01 (ID 9): its servo is known already" in result.output
     found = load_robot(str(trio.out))
     assert found.name == "mine"
     assert found.servo_ids == trio.robot.servo_ids
@@ -370,8 +372,12 @@ def test_offsets_that_a_servo_would_ignore_or_that_leave_its_turn_are_refused(tr
     with pytest.raises(InputError) as refused:
         plan_homing(DynamixelBus(trio.line, robot.models_by_id), robot)
     ignored, beyond = refused.value.faults
-    assert ignored.startswith("joint 2 (ID 30): needs Homing Offset -1108: beyond 1024 the servo")
-    assert beyond.startswith("joint 3 (ID 4): needs Homing Offset 993: with its limit of 1.7 rad")
+    assert ignored.startswith(
+        "joint pitch_02 (ID 30): needs Homing Offset -1108: beyond 1024 the servo"
+    )
+    assert beyond.startswith(
+        "joint yaw_03 (ID 4): needs Homing Offset 993: with its limit of 1.7 rad"
+    )
 
 
 def test_offsets_are_put_back_where_one_servo_does_not_do_as_the_manual_says(trio: Trio) -> None:

@@ -64,14 +64,19 @@ def test_a_healthy_bus_passes_every_check_and_is_not_written_to(line: Recorder) 
 
 SICK = [
     ("return delay", "warn", "servo 3 waits", {"Return Delay Time": (2, 250)}),
-    ("alarms", "fail", "servo 2: overheating, overload", {"Hardware Error Status": (1, 0x24)}),
+    (
+        "alarms",
+        "fail",
+        "joint pitch_02 (ID 2): overheating, overload",
+        {"Hardware Error Status": (1, 0x24)},
+    ),
     ("torque", "warn", "on at servo 4", {"Torque Enable": (3, 1)}),
     ("firmware", "warn", "servo 1 has no fast sync read", {"Firmware Version": (0, 44)}),
     ("firmware", "warn", "mixed: 46, 48", {"Firmware Version": (0, 46)}),
     (
         "model",
         "fail",
-        "joint 2 (ID 2): is a XM430-W210, not a XM430-W350",
+        "joint pitch_02 (ID 2): is a XM430-W210, not a XM430-W350",
         {"Model Number": (1, 1030)},
     ),
     ("servo IDs", "fail", "no answer from servo 3", {"ID": (2, 3), "Baud Rate": (2, 99)}),

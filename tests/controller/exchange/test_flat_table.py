@@ -56,10 +56,11 @@ def test_units_stand_in_the_names(record: RunRecord) -> None:
     tables = {table.name: table for table in flat_tables(record)}
     assert set(tables) == {table.topic.table_name for table in TABLES}
     columns = [name for table in tables.values() for name in table.columns]
-    flags = [f"{of}_joint{k}" for of in ("valid", "error", "hardware_error") for k in range(16)]
+    names = record.header.robot.joint_names
+    flags = [f"{of}_{name}" for of in ("valid", "error", "hardware_error") for name in names]
     assert {c for c in columns if not c.endswith(UNITS)} == UNITLESS | set(flags)
     np.testing.assert_array_equal(
-        tables["cycle"].columns["measured_joint2_rad"], record.cycle.measured_rad[:, 2]
+        tables["cycle"].columns["measured_yaw_03_rad"], record.cycle.measured_rad[:, 2]
     )
     np.testing.assert_array_equal(
         tables["imu"].columns["rate_z_rad_s"], record.imu.rate_rad_s[:, 2]
@@ -72,5 +73,5 @@ def test_units_stand_in_the_names(record: RunRecord) -> None:
     np.testing.assert_array_equal(waypoints["number"], [1, 1, 2])
     np.testing.assert_array_equal(waypoints["point_y_m"], [1.0, 1.0, 3.0])
     np.testing.assert_array_equal(
-        tables["shadow"].columns["current_joint4_a"], record.shadow.current_a[:, 4]
+        tables["shadow"].columns["current_yaw_05_a"], record.shadow.current_a[:, 4]
     )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snakewalk.controller.exchange.body_frames import body_frames, joint_names
+from snakewalk.controller.exchange.body_frames import body_frames
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import ImuTable
@@ -61,7 +61,7 @@ def test_joints(bag: Messages, record: RunRecord) -> None:
     cycle = record.cycle
     for k, (time_ns, state) in enumerate(bag["/joint_states"]):
         assert time_ns == stamp_ns(state.header.stamp) == round(cycle.time_s[k] * 1e9)
-        assert tuple(state.name) == joint_names(record.header.robot)
+        assert tuple(state.name) == record.header.robot.joint_names
         np.testing.assert_array_equal(state.position, cycle.measured_rad[k])
         np.testing.assert_array_equal(state.velocity, cycle.velocity_rad_s[k])
         np.testing.assert_allclose(state.effort, 1.78 * cycle.current_a[k])

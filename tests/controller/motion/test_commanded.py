@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, PPoly
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
@@ -21,7 +22,7 @@ from snakewalk.controller.motion.command import (
 )
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
-from snakewalk.controller.motion.trajectory import _quintics
+from snakewalk.controller.motion.trajectory import JointLimits, _quintics
 from snakewalk.drivers.types import BodyPose
 
 ROBOT = load_robot("alternating16")
@@ -282,3 +283,13 @@ def test_an_impossible_command_is_one_short_line_and_moves_nothing(command: Comm
     ((kind, text),) = bench.events
     assert kind == "refused"
     assert len(text) <= 300
+
+
+def test_joints_have_the_robots_names_and_those_of_older_versions() -> None:
+    robot = load_robot("alternating16")
+    limits = JointLimits.of(robot, robot.joint_names)
+    assert limits.numbers(["pitch_02", "joint0"], "joint goals").tolist() == [1, 0]
+    with pytest.raises(InputError, match="names a joint twice"):
+        limits.numbers(["yaw_01", "joint0"], "joint goals")
+    swapped = JointLimits.of(robot, ("joint1", "joint0", *robot.joint_names[2:]))
+    assert swapped.numbers(["joint1"], "joint goals").tolist() == [0]  # its own name comes first

@@ -329,6 +329,6 @@ def test_a_recording_faster_than_the_robot_is_slowed_and_a_bad_one_refused() -> 
     with pytest.raises(InputError, match="must grow"):
         Recorded(robot, time_s[::-1], joints)
     with pytest.raises(
-        InputError, match=r"joint \d+ \(ID \d+\) bends to .* in frame \d+; its limit"
+        InputError, match=r"joint \w+ \(ID \d+\) bends to .* in frame \d+; its limit"
     ):
         Recorded(robot, time_s, 5.0 * joints)

@@ -30,7 +30,6 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from snakewalk.config.loader import load_robot, load_run, load_world
-from snakewalk.controller.exchange.body_frames import joint_names
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.ros.ros_link import _decoded
 from snakewalk.controller.ros.ros_node import (
@@ -105,7 +104,7 @@ class Graph:
             next(script, None)
 
         prepared = prepare_commanded(
-            lambda body, on_event: Commanded(body, joint_names(body), self.commands, on_event),
+            lambda body, on_event: Commanded(body, body.joint_names, self.commands, on_event),
             robot=robot,
             seconds=20.0,
             name="ros",
@@ -165,7 +164,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
         while not (states and sent and poses):
             yield
             client.spin()
-        while newest()["joint3"] < 0.45:
+        while newest()["yaw_04"] < 0.45:
             if graph.cycles % 20 == 0:
                 goals.publish(JointState(name=["joint3"], position=[0.5]))
                 arrived()
@@ -194,7 +193,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
             yield
         for _ in range(30):
             yield
-        client.until(lambda: newest()["joint1"] > 0.15)
+        client.until(lambda: newest()["yaw_02"] > 0.15)
         for text in ("rolling", "lateral-undulation frequency_hz", "x.toml", "", "anguilliform"):
             gaits.publish(String(data=text))
             arrived()
@@ -217,7 +216,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
     refused = [event.text for event in finished.record.events if event.kind == "refused"]
     for text, why in zip(
         [
-            "joint goals: joint3: 9.00 rad; its limit is 1.50",
+            "joint goals: yaw_04: 9.00 rad; its limit is 1.50",
             "joint goals: no positions; velocities and efforts alone are not taken",
             r"joint goals: stamped \d+.\d s ago; at most 1 s is taken, and 0 for now",
             "trajectory: 501 points; 1 to 500 are taken",
@@ -249,7 +248,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
     )
     stamps_ns = np.array([s.header.stamp.sec * 10**9 + s.header.stamp.nanosec for s in states])
     assert (np.diff(stamps_ns) >= 0).all()
-    servos = [status for status in told[-1].status if status.name == "joint15"]
+    servos = [status for status in told[-1].status if status.name == "yaw_16"]
     assert servos[0].hardware_id == "XM430-W350 ID 16"
     assert {value.key for value in servos[0].values} == {"temperature_c", "voltage_v"}
 
@@ -275,7 +274,7 @@ def test_a_dds_of_other_people_sees_the_run_and_commands_it(graph: Graph, tmp_pa
     finished = graph.run(tmp_path / "run", _then_stop(graph, script()), "alternating16-imu")
     assert finished.outcome.tripped == "stop requested by the test"
     assert seen[-1].position[2] > 0.25
-    assert list(seen[-1].name) == [f"joint{k}" for k in range(16)]
+    assert list(seen[-1].name) == list(load_robot("alternating16").joint_names)
     assert len(seen[-1].velocity) == len(seen[-1].effort) == 16
     attitude = imu.read(timeout=10.0)
     assert attitude.header.frame_id.startswith("link")

@@ -221,7 +221,7 @@ def test_a_real_servo_that_dies_stops_the_simulated_ones_as_well(
     dies = {"seed": 1, "fault": [{"kind": "mute", "ids": [12], "at_s": 2.5, "for_s": 60.0}]}
     FaultPlayer(bench.lines[1], checked(FaultPlan, dies, "faults"))
     gait = prepare_gait("lateral-undulation", seconds=3.0)
-    name = f"joint 12 (ID 12 on {bench.paths[1]})"
+    name = f"joint yaw_12 (ID 12 on {bench.paths[1]})"
     with pytest.raises(BusError, match="torque off is not confirmed") as silent:
         execute(gait, tmp_path, f"1-8=sim,9-16={bench.paths[1]}", stoppable=False)
     assert str(silent.value).startswith(name)  # and nobody else: the simulated ones confirm it

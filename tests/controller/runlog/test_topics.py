@@ -112,6 +112,7 @@ def test_a_log_of_before_loads(tmp_path: Path) -> None:
     record = read_log(OLD_LOG)
     assert record.complete
     assert record.header.robot.servo_ids == (7, 3, 5)
+    assert record.header.robot.joint_names == ("yaw_01", "pitch_02", "yaw_03")
     assert record.cycle.yield_rad[0].tolist() == [0.0, -0.25, 0.0]
     assert record.cycle.valid[2].tolist() == [True, False, True]
     assert record.cycle.joints[1] == (2,)

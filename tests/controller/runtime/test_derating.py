@@ -52,9 +52,9 @@ def test_what_was_not_read_yet_limits_nothing() -> None:
 @pytest.mark.parametrize(
     ("found", "reason"),
     [
-        (state(celsius=66.0), "joint 2 (ID 2) at 66 C, limit 70 C"),
-        (state(amps=1.8), "joint 2 (ID 2) at 1.80 A, limit 2.00 A"),
-        (state(volts=10.5), "joint 1 (ID 1) at 10.5 V, limit 10.0 V"),
+        (state(celsius=66.0), "joint yaw_02 (ID 2) at 66 C, limit 70 C"),
+        (state(amps=1.8), "joint yaw_02 (ID 2) at 1.80 A, limit 2.00 A"),
+        (state(volts=10.5), "joint yaw_01 (ID 1) at 10.5 V, limit 10.0 V"),
     ],
 )
 def test_near_a_limit_it_slows_down_and_names_joint_value_and_limit(
@@ -93,7 +93,7 @@ def test_it_says_once_that_it_slows_and_once_that_it_is_back() -> None:
             now = derating.update(found, STILL, 0.02)
             assert abs(now - before) < 0.05, "the rate itself has no step"
             before = now
-    assert said == ["slowing down: joint 2 (ID 2) at 67 C, limit 70 C", "at full rate again"]
+    assert said == ["slowing down: joint yaw_02 (ID 2) at 67 C, limit 70 C", "at full rate again"]
     assert derating.rate == 1.0
     assert derating.least < 0.5
 
@@ -127,7 +127,7 @@ def test_a_joint_that_lags_slows_the_motion_down_before_it_trips() -> None:
         assert (rate == 1.0) == (share == 0.5)
     assert rate == pytest.approx(LEAST, abs=0.01)
     (line,) = said
-    assert line.startswith("slowing down: joint 3 (ID 3) at ")
+    assert line.startswith("slowing down: joint yaw_03 (ID 3) at ")
     assert line.endswith(f" rad from its goal, limit {limit_rad:.2f} rad")
     lifting = Derating(SAFETY, RobotConfig(name="pitch", joint_axes="yypy"))
     for _ in range(100):

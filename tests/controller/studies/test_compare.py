@@ -33,8 +33,8 @@ def test_the_first_time_and_joint_are_named(record: RunRecord, name: str) -> Non
     assert bad[0].largest == pytest.approx(0.5)
     said = result.lines()[1]
     assert said.startswith(f"{name}: differs first at {record.cycle.deadline_s[700]:.3f} s")
-    assert f", {record.header.robot.joint_name(11)};" in said
-    assert bad[0].first_name.startswith("joint 12 (ID ")
+    assert f", {record.header.robot.joint_label(11)};" in said
+    assert bad[0].first_name.startswith("joint yaw_12 (ID ")
 
 
 def test_tolerance(record: RunRecord) -> None:

@@ -426,7 +426,7 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
     with run(tmp_path, *words) as child, browsed(child) as page:
         button = page.get_by_role("button", name="E-STOP")
         page.get_by_text("lateral-undulation").wait_for()
-        page.get_by_text("joint 4 (ID 4)").wait_for()
+        page.get_by_text("joint yaw_04 (ID 4)").wait_for()
         assert bus["Torque Enable"].tolist() == [1] * 4
         page.get_by_role("tab", name="gait").click()
         page.get_by_role("slider").first.focus()

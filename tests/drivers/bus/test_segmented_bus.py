@@ -236,7 +236,9 @@ def test_a_silent_servo_is_told_with_its_port(segments: Body) -> None:
         cycles(segments, link, 3)
         segments.lines[1].directory.mute[1] = True
         segments.lines[1].refresh_ids()
-        with pytest.raises(SafetyTrippedError, match=r"^joint 4 \(ID 4 on B\): not read for 0\.1"):
+        with pytest.raises(
+            SafetyTrippedError, match=r"^joint pitch_04 \(ID 4 on B\): not read for 0\.1"
+        ):
             cycles(segments, link, 20)
         segments.settle()
         assert not any(line.firmware.drive.torque_on.any() for line in segments.lines)

@@ -87,7 +87,7 @@ def test_what_another_program_left_is_set_and_told(
     rig.alter(register, 2, left)
     rig.link.enable()
     assert rig.registers(register)[2] == then
-    expected = f"joint 3 (ID 3): {register} was {left}, is {then} now"
+    expected = f"joint yaw_03 (ID 3): {register} was {left}, is {then} now"
     assert (expected in rig.events) == told
 
 
@@ -109,9 +109,13 @@ def test_a_secondary_id_is_cleared_before_a_joint_can_take_the_settings_of_anoth
 @pytest.mark.parametrize(
     ("register", "value", "line"),
     [
-        ("Homing Offset", 200, "joint 3 (ID 3): Homing Offset is 200: its zero is moved by +0.31"),
-        ("Drive Mode", 1, "joint 3 (ID 3): Drive Mode is reverse"),
-        ("PWM Limit", 300, "joint 3 (ID 3): PWM Limit is 300 of 885"),
+        (
+            "Homing Offset",
+            200,
+            "joint yaw_03 (ID 3): Homing Offset is 200: its zero is moved by +0.31",
+        ),
+        ("Drive Mode", 1, "joint yaw_03 (ID 3): Drive Mode is reverse"),
+        ("PWM Limit", 300, "joint yaw_03 (ID 3): PWM Limit is 300 of 885"),
     ],
 )
 def test_what_may_be_meant_stays_and_is_told(register: str, value: int, line: str) -> None:
@@ -125,7 +129,7 @@ def test_what_may_be_meant_stays_and_is_told(register: str, value: int, line: st
 def test_a_servo_that_cannot_move_is_refused() -> None:
     rig = Rig()
     rig.alter("PWM Limit", 2, 0)
-    with pytest.raises(ChainError, match=r"joint 3 \(ID 3\): PWM Limit is 0: it cannot move"):
+    with pytest.raises(ChainError, match=r"joint yaw_03 \(ID 3\): PWM Limit is 0: it cannot move"):
         rig.link.enable()
     assert rig.registers("Torque Enable") == [0] * 4
 
@@ -197,7 +201,7 @@ def test_a_servo_that_is_not_as_it_was_set_stops_the_run(change: Callable[[Rig],
     rig.link.enable()
     rig.cycles(20)
     change(rig)
-    with pytest.raises(SafetyTrippedError, match=r"joint 2 \(ID 2\): .* has it rebooted"):
+    with pytest.raises(SafetyTrippedError, match=r"joint pitch_02 \(ID 2\): .* has it rebooted"):
         rig.cycles(49)
     assert rig.registers("Torque Enable") == [0] * 4
 
@@ -273,7 +277,7 @@ def test_ids_exchanged_in_motion_stop_the_run_for_good(policy: Policy) -> None:
     rig.alter("ID", 2, 1)
     rig.line.refresh_ids()
     with pytest.raises(
-        SafetyTrippedError, match=r"joint 1 \(ID 1\): its servo was joint 3 \(ID 3\)"
+        SafetyTrippedError, match=r"joint yaw_01 \(ID 1\): its servo was joint yaw_03 \(ID 3\)"
     ):
         rig.cycles(17)
     assert rig.registers("Torque Enable") == [0] * 4

@@ -66,7 +66,7 @@ def test_a_servo_that_differs_from_the_last_start_is_refused_before_torque(
     with pytest.raises(ChainError) as raised:
         start(line, file)
     (text,) = raised.value.faults
-    assert text.startswith(f"{file.path}: joint 3 (ID 3): {said}")
+    assert text.startswith(f"{file.path}: joint yaw_03 (ID 3): {said}")
     assert "snakewalk doctor --accept --robot" in text
     assert not line.bank["Torque Enable"].any()
     assert file.read() != {}

@@ -87,7 +87,7 @@ def test_a_second_master_is_named_within_two_rounds(rig: Rig, joints: list[int])
 def test_a_servo_that_ignores_sync_writes_is_named(rig: Rig) -> None:
     rig.ignore_sync_writes(1)
     assert rig.swing(2 * SLOW_EVERY) < 2 * SLOW_EVERY
-    assert str(rig.link.tripped).startswith("joint 2 (ID 2): Goal Position is ")
+    assert str(rig.link.tripped).startswith("joint yaw_02 (ID 2): Goal Position is ")
     assert "it ignores sync writes" in str(rig.link.tripped)
 
 
@@ -101,7 +101,7 @@ def test_writes_that_get_lost_are_named(rig: Rig) -> None:
 
     rig.disturb = lag
     assert rig.swing(3 * SLOW_EVERY, 0.2) < 3 * SLOW_EVERY
-    assert "joint 4 (ID 4)" in str(rig.link.tripped)
+    assert "joint yaw_04 (ID 4)" in str(rig.link.tripped)
     assert "writes to it get lost" in str(rig.link.tripped)
 
 
@@ -136,7 +136,7 @@ def test_a_servo_that_refuses_goals_is_named_with_the_register_that_is_the_reaso
     rig.line.bank["Max Position Limit"][1] = 2000
     rig.line.firmware.apply_registers()
     assert rig.swing(2 * SLOW_EVERY) < 2 * SLOW_EVERY
-    assert "joint 2 (ID 2): Max Position Limit is 2000" in str(rig.link.tripped)
+    assert "joint yaw_02 (ID 2): Max Position Limit is 2000" in str(rig.link.tripped)
 
 
 @pytest.mark.parametrize(

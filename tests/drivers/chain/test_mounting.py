@@ -136,7 +136,9 @@ def test_a_servo_of_another_model_than_the_joint_says_is_told() -> None:
     other = MIXED.joints[1].model_copy(update={"model": "XM430-W350"})
     robot = MIXED.model_copy(update={"joints": (MIXED.joints[0], other, *MIXED.joints[2:])})
     chain = ServoChain(DynamixelBus(line, robot.models_by_id), robot)
-    with pytest.raises(ChainError, match=r"joint 2 \(ID 11\): is a XL330-M288, not a XM430-W350"):
+    with pytest.raises(
+        ChainError, match=r"joint pitch_02 \(ID 11\): is a XL330-M288, not a XM430-W350"
+    ):
         chain.enable()
 
 

@@ -1,6 +1,7 @@
 """Start-up order, faults at start, held values and the slow round of the chain."""
 
 import re
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -181,7 +182,7 @@ def test_a_setting_that_a_servo_takes_and_does_not_keep_is_told(
 
     line.bank["Profile Velocity"][0] = 30
     monkeypatch.setattr(DynamixelBus, "write", forgetful)
-    what = r"joint 1 \(ID 1\): Profile Velocity: wrote 0, reads back 1"
+    what = r"joint yaw_01 \(ID 1\): Profile Velocity: wrote 0, reads back 1"
     with pytest.raises(BusError, match=what):
         chain.enable()
     assert line.bank["Torque Enable"].tolist() == [0] * 4
@@ -228,14 +229,14 @@ def test_all_faults_of_a_chain_at_once(line: Recorder, chain: ServoChain) -> Non
         chain.enable()
     text = "\n".join(info.value.faults)
     assert "no answer from servo 2 of 1 to 4 at 1000000 baud" in text
-    assert "joint 3 (ID 3): is a XM430-W210, not a XM430-W350" in text
-    assert "joint 4 (ID 4): alarm: overheating, overload" in text
+    assert "joint yaw_03 (ID 3): is a XM430-W210, not a XM430-W350" in text
+    assert "joint pitch_04 (ID 4): alarm: overheating, overload" in text
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
 
 def test_a_pose_beyond_the_limits_is_refused() -> None:
     line = Recorder(ServoBank(ROBOT.servo_ids), [0.0, 0.0, 1.9, 0.0])
-    with pytest.raises(ChainError, match=r"joint 3 \(ID 3\): stands at 1\.9"):
+    with pytest.raises(ChainError, match=r"joint yaw_03 \(ID 3\): stands at 1\.9"):
         ServoChain(DynamixelBus(line), ROBOT).enable()
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
@@ -314,7 +315,7 @@ def test_an_alert_without_an_alarm_is_reported_and_read_again(line: Recorder, pa
         assert state.valid.all()
         assert not state.error.any()
     assert len(events) == 1
-    assert "joint 2 (ID 2)" in events[0]
+    assert "joint pitch_02 (ID 2)" in events[0]
     assert "Hardware Error Status reads 0" in events[0]
 
 
@@ -466,7 +467,9 @@ def test_a_joint_whose_servo_tells_another_joint_is_not_gone_on_with(
     state = chain.enable()
     found = chain.recheck(state.position_rad)
     line.bank[IDENTITY][2] = 1  # what a servo tells that had another ID when it was set up
-    with pytest.raises(ChainError, match=r"joint 3 \(ID 3\): its servo does not tell that it is"):
+    with pytest.raises(
+        ChainError, match=r"joint yaw_03 \(ID 3\): its servo does not tell that it is"
+    ):
         chain.resume(found)
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
@@ -491,7 +494,7 @@ def test_torque_does_not_come_on_where_ids_were_exchanged_or_joints_moved_behind
 
     chain._send_goals = send_and_disturb  # type: ignore[method-assign]
     with pytest.raises(
-        ChainError, match=r"joint 1 \(ID 1\): (its servo does not tell|read \+0.30)"
+        ChainError, match=r"joint yaw_01 \(ID 1\): (its servo does not tell|read \+0.30)"
     ):
         chain.enable()
     assert (64, b"\x01") not in [(address, data) for address, _, data in line.writes()]
@@ -515,7 +518,9 @@ def test_a_joint_that_is_read_elsewhere_than_it_was_set_to_hold_is_not_gone_on_w
         return reply._replace(data=data)
 
     chain._cycle.read = read_another  # type: ignore[method-assign]
-    with pytest.raises(ChainError, match=r"joint 2 \(ID 2\): read \+0.20 rad from where it was"):
+    with pytest.raises(
+        ChainError, match=r"joint pitch_02 \(ID 2\): read \+0.20 rad from where it was"
+    ):
         chain.resume(found)
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
@@ -535,7 +540,7 @@ def test_disable_reaches_the_others_when_one_is_gone(chain: ServoChain, line: Re
     chain.enable()
     line.bank["ID"][0] = 99
     line.setBaudRate(line.getBaudRate())
-    with pytest.raises(BusError, match=r"joint 1 \(ID 1\): torque off is not confirmed"):
+    with pytest.raises(BusError, match=r"joint yaw_01 \(ID 1\): torque off is not confirmed"):
         chain.disable()
     assert line.bank["Torque Enable"][1:].tolist() == [0] * 3
 
@@ -550,7 +555,7 @@ def test_torque_goes_off_again_when_the_start_fails_half_way(
         sync_write(self, few, name, value)
 
     monkeypatch.setattr(DynamixelBus, "sync_write", lame)
-    with pytest.raises(BusError, match=r"joint 3 \(ID 3\): Torque Enable is 0 after 1"):
+    with pytest.raises(BusError, match=r"joint yaw_03 \(ID 3\): Torque Enable is 0 after 1"):
         chain.enable()
     assert line.bank["Torque Enable"].tolist() == [0] * 4
 
@@ -615,7 +620,7 @@ def test_torque_off_is_sent_to_all_and_silent_servos_are_named_in_bounded_time(
     line.mute(np.array(silent), True)
     line.refresh_ids()
     begin_s = line.clock.now_s()
-    names = ", ".join(f"joint {k + 1} (ID {k + 1})" for k in silent)
+    names = ", ".join(map(chain.robot.joint_label, silent))
     with pytest.raises(BusError, match=re.escape(f"{names}: torque off is not confirmed")):
         chain.disable()
     assert line.clock.now_s() - begin_s < 1.2
@@ -738,9 +743,8 @@ def test_ids_that_are_exchanged_between_two_runs_are_told_at_the_start(
     chain.on_event = events.append
     chain.enable()
     assert [event for event in events if "exchanged" in event] == [
-        f"joint {a} (ID {a}): its servo was joint {b} (ID {b}) in the run before: have IDs been "
-        "exchanged since?"
-        for a, b in ((2, 3), (3, 2))
+        f"{a}: its servo was {b} in the run before: have IDs been exchanged since?"
+        for a, b in permutations(("joint pitch_02 (ID 2)", "joint yaw_03 (ID 3)"))
     ]
     chain.disable()
     events.clear()

@@ -18,7 +18,7 @@ from snakewalk.sim.servo.bench import BenchPlant
 
 J = 4
 STALL_A = 2.0
-NAMES = [f"joint {k + 1} (ID {k + 1})" for k in range(J)]
+NAMES = [f"joint yaw_{k + 1:02d} (ID {k + 1})" for k in range(J)]
 STEP_S = 0.32
 HALF_A = STALL_A / np.sqrt(2.0)
 """Warms by 1 K in 4 s."""
@@ -43,13 +43,13 @@ def test_a_temperature_of_zero_is_reported_at_once_and_once() -> None:
     found = sensors()
     reading = np.array([25.0, 0.0, 26.0, 25.0])
     (line,) = found.update(reading, np.zeros(J), 0.0)
-    assert line.startswith("joint 2 (ID 2): temperature reads 0 C")
+    assert line.startswith("joint yaw_02 (ID 2): temperature reads 0 C")
     assert found.update(reading, np.zeros(J), STEP_S) == []
 
 
 def test_a_temperature_that_does_not_rise_with_the_others_is_reported() -> None:
     (line,) = warm_up([10.0, 10.0, 0.0, 8.0], 60.0)
-    assert line.startswith("joint 3 (ID 3): temperature has read 25 C since the start")
+    assert line.startswith("joint yaw_03 (ID 3): temperature has read 25 C since the start")
 
 
 def test_where_no_temperature_changes_all_are_reported() -> None:
@@ -100,5 +100,7 @@ def test_a_run_reports_a_sensor_that_reads_zero() -> None:
     events: list[str] = []
     chain.on_event = events.append
     chain.enable()
-    assert len([each for each in events if "joint 2 (ID 2): temperature reads 0 C" in each]) == 1
+    assert (
+        len([each for each in events if "joint yaw_02 (ID 2): temperature reads 0 C" in each]) == 1
+    )
     assert not any("joint 1" in each for each in events)

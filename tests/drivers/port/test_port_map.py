@@ -54,7 +54,7 @@ def a_robot(ports: list) -> RobotConfig:
 
 def test_a_file_says_it_and_messages_name_the_port() -> None:
     robot = a_robot(TWO)
-    assert robot.joint_name(2) == "joint 3 (ID 3 on socket://host:5000)"
+    assert robot.joint_label(2) == "joint yaw_03 (ID 3 on socket://host:5000)"
     assert '[[ports]]\nport = "/dev/ttyUSB0"\nids = [1, 2]\n' in robot_toml(robot)
 
 

@@ -161,12 +161,12 @@ def test_a_joint_without_power_behind_healthy_registers_stops_the_run(
     """At 0.36 rad and below it was silent: the error stays under the limit of 0.4 rad."""
     tripped = swing("limp", joint, amplitude_rad=amplitude_rad).tripped
     assert tripped is not None
-    assert f"joint {joint + 1} (ID {joint + 1})" in tripped
+    assert ("joint yaw_01 (ID 1)", "joint pitch_02 (ID 2)")[joint] in tripped
     assert "its motor does not push" in tripped
 
 
 def test_a_blocked_joint_stops_the_run() -> None:
-    assert "joint 1 (ID 1)" in str(swing("stuck", 0).tripped)
+    assert "joint yaw_01 (ID 1)" in str(swing("stuck", 0).tripped)
 
 
 STALL_A, LIMIT_A = 2.0, 0.1

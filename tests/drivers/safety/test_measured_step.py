@@ -212,7 +212,7 @@ def test_one_forged_answer_moves_nothing_and_stops_nothing() -> None:
 def test_an_angle_that_stays_unbelievable_stops_the_run_for_good() -> None:
     link, step, _ = run(1000)
     assert link.tripped is not None
-    assert "joint 2 (ID 2): measured -1.07 rad" in link.tripped
+    assert "joint yaw_02 (ID 2): measured -1.07 rad" in link.tripped
     assert "exchanged IDs" in link.tripped
     assert link.recoveries == 0
     assert step < 0.01

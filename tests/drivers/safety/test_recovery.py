@@ -186,9 +186,9 @@ def test_a_servo_that_reboots_is_noticed_and_set_up_again(rig: Rig) -> None:
     rig.cycles(16)
     assert rig.link.recoveries == 1
     assert rig.events[0] == (
-        "interrupted: joint 2 (ID 2): torque is off: has it rebooted?; the servos hold"
+        "interrupted: joint pitch_02 (ID 2): torque is off: has it rebooted?; the servos hold"
     )
-    assert rig.events[1].endswith("to be set up again: joint 2 (ID 2)")
+    assert rig.events[1].endswith("to be set up again: joint pitch_02 (ID 2)")
     assert rig.torque() == [1] * 4
     assert rig.line.bank["Goal Current"][1] == round(0.6 / 2.69e-3)
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
@@ -216,7 +216,7 @@ def test_a_tripped_watchdog_is_noticed_though_the_host_talks(rig: Rig) -> None:
     rig.line.bank["Bus Watchdog"][2] = 0xFF
     rig.line.firmware.apply_registers()
     rig.cycles(16)
-    assert "joint 3 (ID 3): its bus watchdog has stopped it" in rig.events[0]
+    assert "joint yaw_03 (ID 3): its bus watchdog has stopped it" in rig.events[0]
     assert rig.line.bank["Bus Watchdog"].tolist() == [10] * 4
 
 
@@ -258,17 +258,20 @@ def test_without_an_operator_confirm_means_no() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda r: r.alter("Model Number", 1, 1030), "joint 2 (ID 2): is a XM430-W210"),
+        (lambda r: r.alter("Model Number", 1, 1030), "joint pitch_02 (ID 2): is a XM430-W210"),
         (
             lambda r: r.alter("Firmware Version", 2, 47),
-            "joint 3 (ID 3): firmware 47, was 48: another",
+            "joint yaw_03 (ID 3): firmware 47, was 48: another",
         ),
-        (lambda r: r.alter("Hardware Error Status", 0, 4), "joint 1 (ID 1): alarm: overheating"),
+        (
+            lambda r: r.alter("Hardware Error Status", 0, 4),
+            "joint yaw_01 (ID 1): alarm: overheating",
+        ),
         (lambda r: r.alter("ID", 3, 44), "no answer from servo 4"),
-        (lambda r: r.limp("Homing Offset", 0, 400), "joint 1 (ID 1): moved by +0.6"),
-        (lambda r: r.limp("Drive Mode", 0, 1), "joint 1 (ID 1): Drive Mode is 1, was 0"),
-        (lambda r: r.limp("Homing Offset", 0, 100), "joint 1 (ID 1): Homing Offset is 100"),
-        (lambda r: r.limp("Homing Offset", 1, 4096), "joint 2 (ID 2): off by +1 turns"),
+        (lambda r: r.limp("Homing Offset", 0, 400), "joint yaw_01 (ID 1): moved by +0.6"),
+        (lambda r: r.limp("Drive Mode", 0, 1), "joint yaw_01 (ID 1): Drive Mode is 1, was 0"),
+        (lambda r: r.limp("Homing Offset", 0, 100), "joint yaw_01 (ID 1): Homing Offset is 100"),
+        (lambda r: r.limp("Homing Offset", 1, 4096), "joint pitch_02 (ID 2): off by +1 turns"),
     ],
 )
 def test_what_is_not_as_it_was_does_not_go_on(
@@ -429,10 +432,10 @@ def test_an_overloaded_servo_is_rebooted_set_up_again_and_goes_on_slowly(patient
     assert np.abs(patient.position - held).max() < 0.02
     first, *_, last = patient.events
     assert first == (
-        "joint 2 (ID 2): alarm: overload: its servo is rebooted, the others hold; 1 more after "
-        "this one"
+        "joint pitch_02 (ID 2): alarm: overload: its servo is rebooted, the others hold; "
+        "1 more after this one"
     )
-    assert "to be set up again: joint 2 (ID 2)" in patient.events[1]
+    assert "to be set up again: joint pitch_02 (ID 2)" in patient.events[1]
     assert last == "going on from where it stands"
     # it is asked for 0.8 rad more at once, and begins at nothing
     patient.goal = float(held[0]) + 0.8
@@ -490,7 +493,7 @@ def test_a_shaft_that_is_held_overloads_as_often_as_it_may() -> None:
     patient.line.firmware.block_shafts(np.array([2]))
     here = float(patient.position[2])
     patient.goal = here + 0.33  # full output, and less than does not follow
-    with pytest.raises(SafetyTrippedError, match=r"joint 3 \(ID 3\): alarm: overload"):
+    with pytest.raises(SafetyTrippedError, match=r"joint yaw_03 \(ID 3\): alarm: overload"):
         patient.cycles(1000, speed_rad_s=0.0)
     assert rebooted == [3, 3]
     assert patient.link.recoveries == 2
@@ -500,11 +503,11 @@ def test_a_shaft_that_is_held_overloads_as_often_as_it_may() -> None:
 @pytest.mark.parametrize(
     ("alarm", "servos", "said"),
     [
-        (Alarm.OVERHEATING, (1,), "joint 2 (ID 2): alarm: overheating"),
-        (Alarm.ELECTRICAL_SHOCK, (1,), "joint 2 (ID 2): alarm: electrical shock"),
+        (Alarm.OVERHEATING, (1,), "joint pitch_02 (ID 2): alarm: overheating"),
+        (Alarm.ELECTRICAL_SHOCK, (1,), "joint pitch_02 (ID 2): alarm: electrical shock"),
         (Alarm.OVERLOAD | Alarm.OVERHEATING, (1,), "alarm: overheating, overload"),
         (Alarm.OVERLOAD | Alarm.INPUT_VOLTAGE, (1,), "alarm: input voltage, overload"),
-        (Alarm.OVERLOAD, (1, 3), "joint 2 (ID 2): alarm: overload"),
+        (Alarm.OVERLOAD, (1, 3), "joint pitch_02 (ID 2): alarm: overload"),
     ],
 )
 def test_no_other_alarm_is_rebooted_away(
@@ -538,7 +541,7 @@ def test_an_alarm_after_the_reboot_is_not_waited_for(patient: Rig) -> None:
     start_s = patient.line.clock.now_s()
     with pytest.raises(SafetyTrippedError, match="alarm: overload"):
         patient.cycles(1)
-    assert patient.events[-1].startswith("given up: joint 2 (ID 2): alarm: overheating")
+    assert patient.events[-1].startswith("given up: joint pitch_02 (ID 2): alarm: overheating")
     assert patient.line.clock.now_s() - start_s < 1.0
     assert patient.torque() == [0] * 4
 
@@ -554,7 +557,7 @@ def test_a_limp_joint_that_has_fallen_stays_down(patient: Rig) -> None:
     patient.detect(Alarm.OVERLOAD, 1)
     with pytest.raises(SafetyTrippedError):
         patient.cycles(1)
-    assert "joint 2 (ID 2): moved by -0.5" in patient.events[-1]
+    assert "joint pitch_02 (ID 2): moved by -0.5" in patient.events[-1]
     assert patient.torque() == [0] * 4
 
 
@@ -572,7 +575,7 @@ def test_an_operator_is_asked_about_an_overload_too(answer: bool) -> None:
     with nullcontext() if answer else pytest.raises(SafetyTrippedError):
         rig.cycles(3)
     assert len(asked) == 1
-    assert "to be set up again: joint 1 (ID 1)" in asked[0]
+    assert "to be set up again: joint yaw_01 (ID 1)" in asked[0]
     assert rig.torque() == [int(answer)] * 4
 
 

@@ -83,7 +83,7 @@ def test_a_veto_latches_until_an_operator_resets(
 ) -> None:
     link.enable()
     step(link, clock, 0.01)
-    with pytest.raises(SafetyTrippedError, match=r"joint 1 \(ID 7\): commanded nan"):
+    with pytest.raises(SafetyTrippedError, match=r"joint yaw_01 \(ID 7\): commanded nan"):
         step(link, clock, np.nan)
     assert not joints.torque
     for _ in range(3):
@@ -107,7 +107,7 @@ def test_a_bad_state_latches_at_the_read(link: SafeLink, joints: Joints) -> None
     link.enable()
     joints.changes = {"temperature_c": one(71.0, 1, 40.0)}
     assert link.read().temperature_c[1] == 71.0
-    assert link.tripped == "joint 2 (ID 8): 71 C: too hot"
+    assert link.tripped == "joint yaw_02 (ID 8): 71 C: too hot"
     assert not joints.torque
 
 

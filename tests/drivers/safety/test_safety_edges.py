@@ -84,13 +84,14 @@ def test_a_state_judged_before_is_still_watched_for_its_age() -> None:
     assert first.veto is None
     assert first.memory.checked_state is not None
     again = vetted(0.05, now, first.memory, NOW + 0.1 + 1e-3)
-    assert again.veto == "joint 1 (ID 7): not read for 0.101 s"
+    assert again.veto == "joint yaw_01 (ID 7): not read for 0.101 s"
     assert vetted(0.05, now, first.memory, NOW + 0.1 - 1e-3).veto is None
 
 
 def test_a_state_that_was_read_long_ago_is_old_when_it_is_first_judged() -> None:
     assert (
-        vetted(0.0, state(time_s=NOW - 0.1 - 1e-3)).veto == "joint 1 (ID 7): not read for 0.101 s"
+        vetted(0.0, state(time_s=NOW - 0.1 - 1e-3)).veto
+        == "joint yaw_01 (ID 7): not read for 0.101 s"
     )
     assert vetted(0.0, state(time_s=NOW - 0.1 + 1e-3)).veto is None
 
@@ -148,7 +149,9 @@ def test_a_state_with_a_fault_is_checked_again_and_refused_again() -> None:
     hot = state(temperature_c=np.full(J, 71.0))
     first = vetted(0.05, hot)
     assert first.memory.checked_state is None
-    assert vetted(0.05, hot, first.memory).veto == first.veto == "joint 1 (ID 7): 71 C: too hot"
+    assert (
+        vetted(0.05, hot, first.memory).veto == first.veto == "joint yaw_01 (ID 7): 71 C: too hot"
+    )
 
 
 def test_lasting_over_current_is_no_checked_state_that_is_kept() -> None:
@@ -158,7 +161,7 @@ def test_lasting_over_current_is_no_checked_state_that_is_kept() -> None:
     assert begun.veto is None
     assert begun.memory.over_current_since_s[1] == NOW - 1.0
     later = vetted(0.0, state(current_a=one(3.0, 1)), begun.memory)
-    assert later.veto == "joint 2 (ID 8): 3.00 A for too long"
+    assert later.veto == "joint yaw_02 (ID 8): 3.00 A for too long"
 
 
 @pytest.mark.parametrize("name", ["error", "hardware_error"])
@@ -190,7 +193,7 @@ def test_memory_at_rest_tells_that_no_current_was_too_high() -> None:
 
 def test_the_joint_that_is_too_old_is_named_not_one_at_the_limit() -> None:
     assert vetted(now=state(age_s=np.array([0.1, 0.2, 0.0]))).veto == (
-        "joint 2 (ID 8): not read for 0.200 s"
+        "joint yaw_02 (ID 8): not read for 0.200 s"
     )
 
 
@@ -217,7 +220,7 @@ def test_a_supply_that_dips_does_not_end_the_run_and_one_that_stays_low_does() -
     for last, is_over in ((held.memory, True), (well.memory, False)):
         later = vetted(now=state(time_s=NOW + 1.32, voltage_v=low), last=last, now_s=NOW + 1.32)
         assert (later.veto is not None) == is_over
-        assert "joint 2 (ID 8): 9.9 V: supply too low" in str(later.veto) or not is_over
+        assert "joint yaw_02 (ID 8): 9.9 V: supply too low" in str(later.veto) or not is_over
 
 
 def test_a_state_with_a_dip_is_checked_once() -> None:

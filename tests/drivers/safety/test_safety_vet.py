@@ -22,7 +22,7 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 J = 3
 LIMITS = SafetyLimits(
-    joint_names=("joint 1 (ID 7)", "joint 2 (ID 8)", "joint 3 (ID 9)"),
+    joint_names=("joint yaw_01 (ID 7)", "joint yaw_02 (ID 8)", "joint yaw_03 (ID 9)"),
     limit_rad=np.array([1.5, 1.2, 1.5]),
     limit_slack_rad=0.2,
     goal_rate_rad_s=4.0,
@@ -184,7 +184,7 @@ def run_currents(currents: list[float], valid: list[bool], dt_s: float = 0.1) ->
         )  # fmt: skip
         verdict = vet(JointCommand(k * dt_s, np.zeros(J)), now, last, LIMITS, k * dt_s)
         if verdict.veto is not None:
-            assert "joint 1 (ID 7)" in verdict.veto
+            assert "joint yaw_01 (ID 7)" in verdict.veto
             return k
         last = verdict.memory
     return None
@@ -220,15 +220,15 @@ def test_every_hardware_error_is_vetoed(bit: int) -> None:
     assert vetted(now=state(hardware_error=errors)).veto is not None
     alert = vetted(now=state(error=np.array([0, 0, 0x80], np.uint8)))
     assert alert.veto == (
-        "joint 3 (ID 9): alarm: the alert bit is set, but no alarm was read from Hardware Error "
-        "Status"
+        "joint yaw_03 (ID 9): alarm: the alert bit is set, but no alarm was read from "
+        "Hardware Error Status"
     )
 
 
 def test_the_veto_names_the_alarm() -> None:
     errors = np.array([0, 0x24, 0], np.uint8)
     assert vetted(now=state(hardware_error=errors)).veto == (
-        "joint 2 (ID 8): alarm: overheating, overload"
+        "joint yaw_02 (ID 8): alarm: overheating, overload"
     )
 
 
@@ -314,9 +314,9 @@ def test_a_supply_outside_its_own_limits_is_refused() -> None:
 def test_the_names_of_a_joint_are_its_place_from_the_head_and_its_id() -> None:
     robot = RobotConfig(name="far", joint_axes="yyy", servo=ServoConfig(first_id=41))
     assert SafetyLimits.from_config(robot, SafetyConfig()).joint_names == (
-        "joint 1 (ID 41)",
-        "joint 2 (ID 42)",
-        "joint 3 (ID 43)",
+        "joint yaw_01 (ID 41)",
+        "joint yaw_02 (ID 42)",
+        "joint yaw_03 (ID 43)",
     )
 
 

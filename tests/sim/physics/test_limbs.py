@@ -59,7 +59,7 @@ def test_bodies_and_joints_stand_in_the_order_of_the_bus() -> None:
     model = MujocoPlant(ROBOT, WORLD).mechanics.model
     links = range(ROBOT.joint_count + 1)
     assert [model.body(1 + k).name for k in links] == [f"link{k}" for k in links]
-    assert [model.joint(1 + k).name for k in links[:-1]] == [f"joint{k}" for k in links[:-1]]
+    assert [model.joint(1 + k).name for k in links[:-1]] == list(ROBOT.joint_names)
     assert tuple(model.body_parentid[1:] - 1) == ROBOT.link_parents
     assert model.body_mass.sum() == pytest.approx(ROBOT.mass_kg)
     assert model.body_mass[-1] == HIND.segment_mass_kg
