@@ -118,10 +118,10 @@ def _servo_findings(
     return [
         servos.firmware(reports),
         servos.return_delay(reports),
-        servos.alarms(reports),
+        servos.alarms(reports, robot),
         servos.torque(reports),
         servos.supply(reports, *safety.voltage_limits_v(robot.servo)),
-        servos.heat(reports, safety.temperature_limit_c),
+        servos.heat(reports, robot, safety.temperature_limit_c),
         *_settings(bus, robot, reports, noise),
     ]
 

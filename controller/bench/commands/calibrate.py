@@ -123,8 +123,8 @@ def calibrate(
                 "homing_written": written,
             }
         bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
-        there = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
-        facts["fingerprints"] = str(there)
+        fingerprints = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
+        facts["fingerprints"] = str(fingerprints)
     _show(described, found.notes, facts, as_json)
 
 

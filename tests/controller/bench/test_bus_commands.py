@@ -152,10 +152,10 @@ def test_the_doctor_shows_a_changed_zero_and_accepts_it_when_asked(
     code, out, _ = call(monkeypatch, capsys, *words, "--json")
     found = {f["check"]: f for f in json.loads(out)["findings"]}["fingerprint"]
     assert (code, found["grade"]) == (1, "fail")
-    assert "joint 3 (ID 3): Homing Offset is 100, was 0" in found["found"]
+    assert "joint yaw_03 (ID 3): Homing Offset is 100, was 0" in found["found"]
     code, out, err = call(monkeypatch, capsys, *words, "--accept")
     assert code == 2  # nobody is there to be asked
-    assert "joint 3 (ID 3): Homing Offset: 0 -> 100" in out
+    assert "joint yaw_03 (ID 3): Homing Offset: 0 -> 100" in out
     assert "add --yes" in err
     code, out, _ = call(monkeypatch, capsys, *words, "--accept", "--yes")
     assert code == 0
