@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperCommand
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.messages import messages
+from snakewalk.controller.console.messages import LOGGER, messages
 from snakewalk.controller.console.options import (
     LogFile,
     LogLevel,
@@ -18,6 +18,7 @@ from snakewalk.controller.console.options import (
     check_files,
     check_idle,
 )
+from snakewalk.controller.console.plugins import take_problems
 
 
 class CalledCommand(TyperCommand):
@@ -58,6 +59,8 @@ def with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
         check_idle(options, defaults)
         level = log_level or ("debug" if verbose else "warning" if quiet else "info")
         with messages(level, log_file):
+            for problem in take_problems():
+                LOGGER.warning("%s", problem)
             named = {key: value for key, value in options.items() if isinstance(value, str)}
             check_files(named.get("run"), named.get("robot"), named.get("world"))
             return function(**options)

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.messages import LOGGER
 
 ENTRY_POINTS: Final = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
@@ -130,7 +129,7 @@ def own_plugins() -> tuple[Plugin, ...]:
 
 @cache
 def foreign_plugins() -> tuple[Plugin, ...]:
-    """Return the plug-ins of other distributions; a broken manifest is one warning line."""
+    """Return the plug-ins of other distributions; a broken manifest is a problem to report."""
     return tuple(plugin for entry in entry_points(group=ENTRY_POINTS) for plugin in _of(entry))
 
 
@@ -139,10 +138,19 @@ def _of(entry: EntryPoint) -> Iterator[Plugin]:
     try:
         yield from _read(entry.load().PLUGINS, package)
     except Exception as error:
-        LOGGER.warning(
-            "plug-ins of %s: ignored, its manifest cannot be read (%s: %s)",
-            *(package, type(error).__name__, error),
+        _problems.append(
+            f"plug-ins of {package}: ignored, its manifest cannot be read "
+            f"({type(error).__name__}: {error})"
         )
+
+
+_problems: list[str] = []
+
+
+def take_problems() -> list[str]:
+    """Return why manifests are ignored, once each; a command reports it when it can."""
+    taken, _problems[:] = list(_problems), []
+    return taken
 
 
 def _read(rows: Iterable[tuple[str, ...]], package: str) -> list[Plugin]:
