@@ -188,11 +188,9 @@ def _folder(kind: Kind) -> Path:
 
 def _files() -> dict[str, type[BaseModel]]:
     """Schemas of the three files of a run, by their names."""
-    from snakewalk.config.robot import RobotConfig  # noqa: PLC0415  slow to build
-    from snakewalk.config.run import RunConfig  # noqa: PLC0415  slow to build
-    from snakewalk.config.world import WorldConfig  # noqa: PLC0415  slow to build
+    from snakewalk.config import robot, run, world  # noqa: PLC0415  slow to build
 
-    return {"run": RunConfig, "robot": RobotConfig, "world": WorldConfig}
+    return {"run": run.RunConfig, "robot": robot.RobotConfig, "world": world.WorldConfig}
 
 
 def _dotted(path: str, kind: Any) -> Iterator[str]:

@@ -13,6 +13,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, TypeVar
 
+import numpy as np
+
 from snakewalk.drivers.fallbacks import is_forced, report_fallback
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -48,11 +50,8 @@ def compiled(
     """
 
     def decorate(function: F) -> F:
-        try:
-            from numba import njit  # noqa: PLC0415  slow to import
-        except ModuleNotFoundError as error:
-            if error.name != "numba":
-                raise
+        numba = _numba()
+        if numba is None:
             return function
         model = "numpy" if divides_by_zero else "python"
         options: dict[str, Any] = {}
@@ -60,10 +59,23 @@ def compiled(
             options = _UNCOUNTED
         # numba's cache does not know the options: a forced fallback would share its files
         cached = makes_arrays or not is_forced("numba")
-        made: F = njit(signature, nogil=nogil, error_model=model, cache=cached, **options)(function)
+        made: F = numba.njit(signature, nogil=nogil, error_model=model, cache=cached, **options)(
+            function
+        )
         return made
 
     return decorate
+
+
+def _numba() -> Any:
+    """Return the package numba; None in a light install."""
+    try:
+        import numba  # noqa: PLC0415  slow to import, and a light install has none
+    except ModuleNotFoundError as error:
+        if error.name != "numba":
+            raise
+        return None
+    return numba
 
 
 _UNCOUNTED = {"_nrt": False}
@@ -83,9 +95,7 @@ def _doubled(values: Any) -> float:
 @cache
 def _can_skip_counting() -> bool:
     """Whether numba accepts ``_UNCOUNTED`` and compiles a small loop correctly with it."""
-    import numba  # noqa: PLC0415  slow to import
-    import numpy as np  # noqa: PLC0415
-
+    numba = _numba()
     if is_forced("numba"):
         fault = "the environment asks for it"
     else:
@@ -118,11 +128,8 @@ def inlined(function: F) -> F:
     A loop around it is then made for several numbers at once. It has no types of its own; without
     numba, and outside of compiled functions, it is called as it is written.
     """
-    try:
-        from numba import njit  # noqa: PLC0415  slow to import
-    except ModuleNotFoundError as error:
-        if error.name != "numba":
-            raise
+    numba = _numba()
+    if numba is None:
         return function
-    made: F = njit(inline="always")(function)
+    made: F = numba.njit(inline="always")(function)
     return made

@@ -26,9 +26,7 @@ def permission(device: str) -> Finding:
         raise PortError(f"{device}: no such port: is it plugged in?")
     if os.access(path, os.R_OK | os.W_OK):
         return Finding("permission", "ok", f"{device} may be read and written")
-    import grp  # noqa: PLC0415  Unix alone has it, as it has such devices
-
-    group = grp.getgrgid(path.stat().st_gid).gr_name
+    group = path.group()
     return Finding(
         "permission",
         "fail",

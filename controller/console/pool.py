@@ -74,15 +74,14 @@ def each(
 
 
 def _on_cluster(work: Callable[[A], B], items: Sequence[A], address: str) -> Iterator[tuple[A, B]]:
-    from distributed import Client  # noqa: PLC0415  an extra
-    from distributed import as_completed as finished  # noqa: PLC0415
+    import distributed  # noqa: PLC0415  an extra
 
     try:
-        client = Client(address, timeout="5s")
+        client = distributed.Client(address, timeout="5s")
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(f"--dask {address}: no scheduler answers there ({error})") from None
     with client:
         futures = client.map(work, items, pure=False)
         waiting = {future.key: item for future, item in zip(futures, items, strict=True)}
-        for future in finished(futures):
+        for future in distributed.as_completed(futures):
             yield waiting[future.key], future.result()

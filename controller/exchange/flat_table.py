@@ -81,14 +81,13 @@ def write_csv(table: FlatTable, path: Path) -> int:
 
 def write_parquet(table: FlatTable, path: Path) -> int:
     """Write a table as Parquet; unknown cells are null. Needs pyarrow. Returns its rows."""
-    import pyarrow as pa  # noqa: PLC0415  an extra
-    from pyarrow import parquet  # noqa: PLC0415
+    import pyarrow.parquet  # noqa: PLC0415  an extra
 
     columns = {
-        name: pa.array(cells, from_pandas=True)  # NaN becomes null
+        name: pyarrow.array(cells, from_pandas=True)  # NaN becomes null
         for name, cells in table.columns.items()
     }
-    parquet.write_table(pa.table(columns), path)
+    pyarrow.parquet.write_table(pyarrow.table(columns), path)
     return table.row_count
 
 

@@ -163,7 +163,6 @@ def mjcf_text(robot: RobotConfig) -> str:
     Its contacts have no friction: the simulator adds its own, which knows a direction along the
     body.
     """
-    from snakewalk.sim.physics.body import mjcf  # noqa: PLC0415  an extra
-    from snakewalk.sim.physics.plant import FLOOR_STEP_S  # noqa: PLC0415
+    from snakewalk.sim.physics import body, plant  # noqa: PLC0415  an extra
 
-    return mjcf(robot, WorldConfig(name="floor"), None, FLOOR_STEP_S) + "\n"
+    return body.mjcf(robot, WorldConfig(name="floor"), None, plant.FLOOR_STEP_S) + "\n"

@@ -86,10 +86,9 @@ class _Drawn:
 def _draw(record: RunRecord, made: str = "") -> _Drawn:
     require_extra("the report needs", "matplotlib", "plotly")
     require_extra("the report needs", "jinja2")
-    from snakewalk.controller.report.curves import curves_html  # noqa: PLC0415  an extra
-    from snakewalk.controller.report.figures.sections import sections  # noqa: PLC0415  an extra
+    from snakewalk.controller.report.figures.sections import drawn  # noqa: PLC0415  an extra
 
-    return _Drawn(sections(record), curves_html(record), made)
+    return _Drawn(*drawn(record), made)
 
 
 def _write_page(

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -65,6 +66,29 @@ class Backend:
     """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
 
 
+class _SimulatedBody:
+    """The body of a run in MuJoCo, and the parts that are made from it."""
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None,
+        deviation: Deviation,
+    ) -> None:
+        require_extra("simulated servos need", "mujoco")
+        from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
+
+        self.plant = plant.MujocoPlant(
+            deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
+        )
+        self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
+        """Makes the robot's IMU from the motion of the body; None without an IMU."""
+        self.twin = partial(twin.PlantTwin, robot, world, ground)
+        """Makes a second body."""
+
+
 def simulated(
     run: RunConfig,
     robot: RobotConfig,
@@ -85,14 +109,10 @@ def simulated(
             None is the run's.
 
     """
-    require_extra("simulated runs need", "mujoco")
-    from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
-
     if deviation is None:
         deviation = Deviation.of_run(run.deviation, robot)
-    body = plant.MujocoPlant(
-        deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
-    )
+    made = _SimulatedBody(run, robot, world, ground, deviation)
+    body = made.plant
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     servo = robot.servo
@@ -103,7 +123,7 @@ def simulated(
         mounting=deviation.mounting(robot),
         motors=motors_of(robot),
         supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=plant.plant_imu(robot, body, servo.baud, run.seed),
+        imu=made.imu(),
     )
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),
@@ -129,7 +149,7 @@ def simulated(
         lambda: body.qpos,
         lambda: line.busy_s,
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
-        lambda: twin.PlantTwin(robot, world, ground),
+        made.twin,
         lay_down,
     )
 
@@ -204,18 +224,16 @@ def split(
         PortError: a port is not there, is taken, or may not be opened.
 
     """
-    require_extra("simulated servos need", "mujoco")
-    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415  an extra
-
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
     deviation = Deviation.of_run(run.deviation, robot)
-    plant = MujocoPlant(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s)
+    made = _SimulatedBody(run, robot, world, ground, deviation)
+    plant = made.plant
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     motors = motors_of(robot)
     body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
     baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
-    imu = plant_imu(robot, plant, baud, run.seed)
+    imu = made.imu()
     bank = ServoBank(
         [robot.servo_ids[row] for row in rows], [robot.servo_records[row] for row in rows], baud
     )

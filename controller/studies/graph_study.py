@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import ParseError
 
+import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -183,8 +184,6 @@ def graph_source(spec: str) -> Draw:
 
 
 def _file(path: Path) -> Draw:
-    import networkx as nx  # noqa: PLC0415  half a second, for graph files only
-
     try:
         found = getattr(nx, _READERS[path.suffix])(path)
     except FileNotFoundError:

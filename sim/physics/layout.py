@@ -117,8 +117,7 @@ def _described() -> tuple[StepLayout, dict[str, int]]:
 
 def _structure(name: str) -> Any:
     """Return a structure of MuJoCo as one of ctypes."""
-    from mujoco.introspect import ast_nodes, structs  # noqa: PLC0415  MuJoCo 3.2 lacks it
-
+    ast_nodes, structs = _introspection()
     fields = []
     for member in structs.STRUCTS[name].fields:
         if not isinstance(member, ast_nodes.StructFieldDecl):
@@ -127,9 +126,14 @@ def _structure(name: str) -> Any:
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def _ctype(kind: object) -> Any:
-    from mujoco.introspect import ast_nodes  # noqa: PLC0415
+def _introspection() -> tuple[Any, Any]:
+    from mujoco.introspect import ast_nodes, structs  # noqa: PLC0415  MuJoCo 3.2 lacks it
 
+    return ast_nodes, structs
+
+
+def _ctype(kind: object) -> Any:
+    ast_nodes, _ = _introspection()
     if isinstance(kind, ast_nodes.PointerType):
         return ctypes.c_void_p
     if isinstance(kind, ast_nodes.ArrayType):

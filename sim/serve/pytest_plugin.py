@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def servo_bus() -> "Iterator[Callable[..., ServoBus]]":
     """Make simulated buses: ``servo_bus("1-6:XL330-M288", baud=..., faults=..., imu="200")``."""
     # pytest loads this in every suite of the environment: what is heavy waits for its first use
-    from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415
+    from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415  every suite loads this
 
     made: list[ServoBus] = []
 

@@ -40,9 +40,13 @@ from snakewalk.sim.servo.protection import SupplyAndAmbient
 from snakewalk.sim.sniff.decode import Decoder
 from snakewalk.sim.sniff.trace import TraceWriter
 
+try:
+    from snakewalk.sim.serve.pty import PtyServer
+except ImportError:  # Windows
+    PtyServer = None  # type: ignore[assignment, misc]
+
 if TYPE_CHECKING:
     from snakewalk.sim.line.wire import Wire
-    from snakewalk.sim.serve.pty import PtyServer
 
     Served = tuple[ChainSpec, Wire, LiveTable, MakeDecoder, FaultPlayer | None]
 
@@ -97,10 +101,8 @@ def serve(
     as_json: Json = False,
 ) -> None:
     """Serve simulated servos at a serial device, in real time, with a live table."""
-    try:
-        from snakewalk.sim.serve.pty import PtyServer  # noqa: PLC0415  not on Windows
-    except ImportError:
-        raise InputError("bus serve: pseudo-terminals are for Linux and macOS") from None
+    if PtyServer is None:
+        raise InputError("bus serve: pseudo-terminals are for Linux and macOS")
     if sum(each is not None for each in (servos, robot, play)) > 1:
         raise InputError("give one of --servos, --robot and --play")
     if play is not None and (imu is not None or faults is not None):

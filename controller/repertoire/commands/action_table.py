@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated
 
 import typer
@@ -13,11 +14,11 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
 
 
-def draw_picture(repertoire: Repertoire, picture: Path) -> None:
-    """Draw the displacements of all actions."""
-    from snakewalk.controller.repertoire.repertoire_plots import draw_actions  # noqa: PLC0415  --picture: an extra
+def plots() -> ModuleType:
+    """Return the module that draws a repertoire."""
+    from snakewalk.controller.repertoire import repertoire_plots  # noqa: PLC0415  --picture: an extra
 
-    draw_actions(repertoire, picture)
+    return repertoire_plots
 
 
 def show_actions(file: Path, repertoire: Repertoire, as_json: bool) -> None:

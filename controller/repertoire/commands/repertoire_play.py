@@ -27,6 +27,7 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.schedule_run import (
     PlayedAction,
@@ -123,9 +124,7 @@ def play_actions(
     if played:
         result |= _errors(played)
         if picture is not None:
-            from snakewalk.controller.repertoire.repertoire_plots import draw_schedule  # noqa: PLC0415  --picture: an extra
-
-            draw_schedule(prepared, played, picture)
+            plots().draw_schedule(prepared, played, picture)
             result["picture"] = str(picture)
     show_run(finished, folder, result, as_json, film=film)
 

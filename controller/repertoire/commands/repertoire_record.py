@@ -20,7 +20,7 @@ from snakewalk.controller.console.result_files import (
 from snakewalk.controller.repertoire import repertoire_recording as recording
 from snakewalk.controller.repertoire.commands.action_table import (
     Picture,
-    draw_picture,
+    plots,
     show_actions,
 )
 from snakewalk.controller.repertoire.repertoire_planning import default_file, flat
@@ -65,5 +65,5 @@ def record(
     with atomic_write(file) as part:
         repertoire.save(part)
     if picture is not None:
-        draw_picture(repertoire, picture)
+        plots().draw_actions(repertoire, picture)
     show_actions(file, repertoire, as_json)

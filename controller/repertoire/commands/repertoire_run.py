@@ -20,6 +20,7 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.repertoire_planning import load_plan
 from snakewalk.controller.repertoire.repertoire_run import RepertoireRun, run_name, run_route
 from snakewalk.controller.run.finish import write_artifacts
@@ -76,7 +77,5 @@ def carry_out(
     finished = ran.finished
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     if picture is not None:
-        from snakewalk.controller.repertoire.repertoire_plots import draw_route  # noqa: PLC0415  --picture: an extra
-
-        draw_route(job, finished.record, picture)
+        plots().draw_route(job, finished.record, picture)
     return ran.to_dict() | {"log": str(finished.log)} | artifacts.to_dict(), ran.complete

@@ -10,7 +10,7 @@ from snakewalk.controller.console.options import Force, Json
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.repertoire.commands.action_table import (
     Picture,
-    draw_picture,
+    plots,
     show_actions,
 )
 from snakewalk.controller.repertoire.repertoire import load_repertoire
@@ -28,5 +28,5 @@ def show_file(
     check_picture(picture)
     repertoire = load_repertoire(file)
     if picture is not None:
-        draw_picture(repertoire, picture)
+        plots().draw_actions(repertoire, picture)
     show_actions(file, repertoire, as_json)

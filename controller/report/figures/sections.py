@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from snakewalk.controller.figures.path import path_figure
 from snakewalk.controller.figures.style import data_uri, style
+from snakewalk.controller.report.curves import curves_html
 from snakewalk.controller.report.figures.advance import advance_figure
 from snakewalk.controller.report.figures.attitude import attitude_figure
 from snakewalk.controller.report.figures.effort import effort_figure
@@ -67,6 +68,11 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
         safety_figure,
     ),
 )
+
+
+def drawn(record: RunRecord) -> tuple[list[Section], str]:
+    """Return the sections of a page, and its curves as HTML."""
+    return sections(record), curves_html(record)
 
 
 def sections(record: RunRecord) -> list[Section]:

@@ -13,6 +13,7 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.run_comparison import compared_run, differing, log_names
 
 if TYPE_CHECKING:
@@ -51,11 +52,7 @@ def compare(
             LOGGER.warning("%s: %s", log, record.note)
         runs.append(compared_run(record, name))
     if picture is not None:
-        from snakewalk.controller.studies.plots.run_comparison import (  # noqa: PLC0415  --picture: an extra
-            draw_comparison,
-        )
-
-        draw_comparison(runs, picture)
+        pictures().draw_comparison(runs, picture)
     changed = differing(runs)
     if as_json:
         told = zip(logs, runs, strict=True)

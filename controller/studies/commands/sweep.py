@@ -17,6 +17,7 @@ from snakewalk.controller.console.options import Force, Json, Set, console, key_
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.sweep_measure import measure
 from snakewalk.controller.studies.sweep_points import plan_sweep
 from snakewalk.controller.studies.sweep_table import SweepTable as Sweep
@@ -104,9 +105,7 @@ def sweep(
     held = read_table(out) if out.exists() else []
     rows = [asdict(one) for one in digest(held)]
     if picture is not None:
-        from snakewalk.controller.studies.plots.sweep import draw_sweep  # noqa: PLC0415  --picture: an extra
-
-        draw_sweep(held, picture)
+        pictures().draw_sweep(held, picture)
     if as_json:
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
         print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))

@@ -28,6 +28,7 @@ from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.run.factory import moves_by_gait
 from snakewalk.controller.studies import trials as study
+from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.trials_table import TrialsTable
 
 _HEADS = {
@@ -154,9 +155,7 @@ def trials(
     found = _run(planned, cases, changes, start_spread, workers, out)
     summaries = study.table(found, cases)
     if picture is not None:
-        from snakewalk.controller.studies.plots.trials import draw_trials  # noqa: PLC0415  --picture: an extra
-
-        draw_trials(summaries, picture)
+        pictures().draw_trials(summaries, picture)
     rows = [asdict(one) for one in summaries]
     if as_json:
         settings = {"seeds": list(seen), "start_spread_m": start_spread}

@@ -12,6 +12,7 @@ from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.shape.walks import RULES, check_rule
+from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.graph_study import graph_source, run_study
 
 if TYPE_CHECKING:
@@ -61,9 +62,7 @@ def walk(
         for spec, name in show_progress(cases, "walks", len(cases))
     ]
     if picture is not None:
-        from snakewalk.controller.studies.plots.walk import draw  # noqa: PLC0415  --picture: an extra
-
-        draw(results, picture)
+        pictures().draw_walks(results, picture)
     if as_json:
         print(json.dumps([result.to_dict() for result in results]))
         return

@@ -188,8 +188,8 @@ def test_the_command_reads_it_and_notes_what_it_left_out(tmp_path: Path) -> None
     assert "--classes 2;9: expected numbers from 0 to 255" in str(wrong.exception)
 
 
-def test_broken_files_end_with_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of LAS many in this process, of LAZ some in a process of its own, which may be aborted."""
+def test_broken_files_end_with_a_line(tmp_path: Path) -> None:
+    """Each is read in a process of its own with limits: damaged counts ask for any memory."""
     rng = np.random.default_rng(0)
     points, kinds = cloud()
     las, laz = (
@@ -197,24 +197,22 @@ def test_broken_files_end_with_a_line(tmp_path: Path, monkeypatch: pytest.Monkey
         for ending in ("las", "laz")
     )
     outcomes = {"read": 0, "rejected": 0}
-    for number in range(230):
-        if number == 30:
-            monkeypatch.setattr(las_file, "run_child", lambda words: json.loads(child(words)))
-        raw = bytearray(laz if number < 30 else las)
+    for number in range(40):
+        raw = bytearray(laz if number % 2 else las)
         for _ in range(int(rng.integers(1, 4))):
             at = int(rng.integers(len(raw) if rng.random() < 0.5 else 400))
             if rng.random() < 0.8:
                 raw[at] = int(rng.integers(256))
             else:
                 del raw[at : at + int(rng.integers(1, 300))]
-        file = tmp_path / f"b.{'laz' if number < 30 else 'las'}"
+        file = tmp_path / f"b.{'laz' if number % 2 else 'las'}"
         file.write_bytes(bytes(raw))
         try:
             read(file, spacing_m=5.0, unit="m")
             outcomes["read"] += 1
         except InputError:
             outcomes["rejected"] += 1
-    assert min(outcomes.values()) > 20
+    assert min(outcomes.values()) > 3
 
 
 def test_a_decoder_that_aborts_is_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,51 @@
+"""``snakewalk robot export``: a robot as files of other programs."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json, RobotName, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
+
+
+@command("robot export", examples=("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",))
+def export_robot(
+    name: RobotName,
+    urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,
+    mjcf: Annotated[
+        Path | None, typer.Option(help="write a MuJoCo model here, on a level floor")
+    ] = None,
+    ros2_control: Annotated[
+        Literal["topic", "dynamixel"] | None,
+        typer.Option(
+            help="with a tag for ros2_control in the URDF: topic drives snakewalk ros, dynamixel "
+            "the servos without it",
+            show_default=False,
+        ),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a robot for other programs: the same masses and kinematics."""
+    if urdf is None and mjcf is None:
+        raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
+    if ros2_control is not None and urdf is None:
+        raise InputError(f"--ros2-control {ros2_control}: is a part of a URDF: give --urdf FILE")
+    refuse_to_overwrite([urdf, mjcf], force)
+    robot = load_robot(name)
+    texts = {}
+    if urdf is not None:
+        texts[urdf] = urdf_text(robot, ros2_control)
+    if mjcf is not None:
+        require_extra("MuJoCo models need", "mujoco")
+        texts[mjcf] = mjcf_text(robot)
+    for path, text in texts.items():
+        with atomic_write(path) as part:
+            part.write_text(text, encoding="utf-8")
+    show({"robot": robot.name, "urdf": urdf and str(urdf), "mjcf": mjcf and str(mjcf)}, as_json)

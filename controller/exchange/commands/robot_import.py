@@ -1,0 +1,64 @@
+"""``snakewalk robot import``: a robot file from another program's model."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.config.errors import Assumptions, InputError
+from snakewalk.config.template import robot_toml
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Assume, Force, Json, console, show
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.exchange.robot_import import robot_import
+
+
+@command(
+    "robot import",
+    examples=(
+        "robot import snake.urdf -o snake.toml",
+        "robot import swimmer.xml -o swimmer.toml --scale 0.1 --servo XL330-M288",
+    ),
+)
+def import_robot(
+    file: Annotated[Path, typer.Argument(help="URDF, xacro or MuJoCo model (.xml)")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
+    servo: Annotated[
+        str, typer.Option(help="model of all servos, which such files do not know")
+    ] = ("XM430-W350"),
+    scale: Annotated[float, typer.Option(help="lengths times this, masses times its cube")] = 1.0,
+    reverse: Annotated[bool, typer.Option(help="the model's first body is the tail")] = False,
+    assume: Assume = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Make a robot's file of another program's model; report what was dropped or changed."""
+    if out.suffix != ".toml":
+        raise InputError(f"{out}: a robot's file ends in .toml")
+    if not 1e-3 <= scale <= 1e3:
+        raise InputError(f"--scale {scale:g}: 0.001 to 1000")
+    refuse_to_overwrite([out], force)
+    made = robot_import.import_robot(
+        file,
+        out.stem,
+        servo,
+        scale=scale,
+        reverse=reverse,
+        assumed=Assumptions(assume or ()),
+    )
+    joints = ", ".join(made.joint_names)
+    comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
+    comment += [f"- {note}" for note in made.notes]
+    with atomic_write(out) as part:
+        part.write_text(robot_toml(made.robot, "\n".join(comment)), encoding="utf-8")
+    facts: dict[str, object] = {
+        "robot": str(out),
+        "joints": made.robot.joint_count,
+        "axes": made.robot.joint_axes,
+        "length_m": round(made.robot.length_m, 4),
+        "mass_kg": round(made.robot.mass_kg, 4),
+        "kinematics_error_m": made.kinematics_error_m,
+    }
+    show(facts | ({"notes": list(made.notes)} if as_json else {}), as_json)
+    for note in () if as_json else made.notes:
+        console.print(f"- {note}", markup=False)
