@@ -162,6 +162,11 @@ class _Checks:
             self._unusual("operating mode", ("Operating Mode",)),
             self._unusual("gains", _GAINS),
             self._unusual("profile", _PROFILE),
+            *self._watchdog(),
+        ]
+
+    def _watchdog(self) -> list[Finding | None]:
+        return [
             self._bad(
                 "watchdog",
                 "warn",

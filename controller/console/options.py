@@ -263,7 +263,7 @@ Observe = Annotated[
     list[str] | None,
     typer.Option(
         "--observe",
-        metavar="NAME[:ARGUMENT]",
-        help="observer from a plug-in; `snakewalk list` shows them; may be given again",
+        metavar="NAME",
+        help="observer of a plug-in, NAME:ARGUMENT; `snakewalk list` shows them",
     ),
 ]

@@ -77,7 +77,7 @@ def read_geo_raster(
     """
     require_extra("GeoTIFF and ASCII grid need", "rasterio")
     import rasterio  # noqa: PLC0415  an extra
-    from rasterio.errors import RasterioError  # noqa: PLC0415
+    from rasterio.errors import RasterioError  # noqa: PLC0415  an extra
 
     driver = "AAIGrid" if file.suffix.lower() == ".asc" else "GTiff"
     with file.open("rb"):  # a fault of the system is reported as such

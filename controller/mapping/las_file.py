@@ -3,8 +3,6 @@
 import json
 import logging
 import re
-import subprocess
-import sys
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,9 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.child_process import run_code
 from snakewalk.controller.mapping.length_units import (
     DEGREE,
     degree_cell_m,
@@ -124,10 +124,9 @@ def read_las(
 
 def run_child(words: str) -> dict[str, Any]:
     """Read a file in a process of its own; what it states, or its fault."""
-    command = [sys.executable, "-c", _CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    ended = run_code(_CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S))
     try:
-        said = json.loads(ended.stdout)
+        said = parse_json(ended.stdout)
     except ValueError:
         return {
             "fault": "is damaged: its decoder gave up, or needed over "
@@ -139,7 +138,7 @@ def run_child(words: str) -> dict[str, Any]:
 
 def child(words: str) -> str:
     """Work of the process of its own: write the points, return what the file states as JSON."""
-    file, classes, crop, unit, out = json.loads(words)
+    file, classes, crop, unit, out = parse_json(words)
     import laspy  # noqa: PLC0415  an extra
 
     logging.getLogger("laspy").setLevel(logging.CRITICAL)  # its words are in the fault

@@ -88,7 +88,7 @@ def true_scale(
 
     """
     from rasterio.errors import RasterioError  # noqa: PLC0415  an extra
-    from rasterio.warp import transform  # noqa: PLC0415
+    from rasterio.warp import transform  # noqa: PLC0415  an extra
 
     (x, y), (dx, dy) = place, step
     at_x, at_y = [x - dx, x + dx, x, x], [y, y, y - dy, y + dy]

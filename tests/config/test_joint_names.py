@@ -55,7 +55,9 @@ def test_two_joints_with_one_name_are_refused(pair: tuple[str, str | None]) -> N
 
 
 def test_a_name_that_is_not_set_leaves_the_bytes_of_a_robot() -> None:
-    robot = RobotConfig(name="x", joint_axes="y", joints=(JointConfig(id=4),))
+    robot = RobotConfig(
+        name="x", joint_axes="yy", joints=(JointConfig(limit_rad=0.4), JointConfig(limit_rad=0.5))
+    )
     assert "name" not in robot.model_dump(mode="json")["joints"][0]
     assert '"joints":[{"axis"' in robot.model_dump_json()
     given = robot.model_copy(update={"joints": (JointConfig(id=4, name="neck"),)})

@@ -65,5 +65,7 @@ def test_classes_exist() -> None:
     names = {
         name for page in PAGES if page.name not in HISTORY for name in CLASS.findall(quoted(page))
     }
+    pages = (ROOT / "controller/report/templates").iterdir()
+    sources += "".join(file.read_text(encoding="utf-8") for file in pages)
     defined = set(re.findall(r"\w+", sources))
     assert names - defined == set()

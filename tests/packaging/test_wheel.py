@@ -165,7 +165,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 
 def shipped(source: Path) -> set[str]:
     """Every file that a wheel has to hold, as it is named in it."""
-    kinds = {".html", ".py", ".toml", ".typed"}
+    kinds = {".css", ".html", ".js", ".py", ".toml", ".typed"}
     rooms = [file for room in ROOMS for file in (source / room).rglob("*")]
     own = [file for file in (source / "snakewalk").iterdir() if not file.is_symlink()]
     files = {file.relative_to(source) for file in rooms if file.suffix in kinds}

@@ -117,11 +117,8 @@ def calibrate(
                 there = "The zeros are in the servos, in Homing Offset(20)."
                 with homing_written(bus, offsets):
                     _write(out, robot_toml(described, f"{heading}\n{there}"))
-            facts |= {
-                "backup": str(backup),
-                "homing_offsets": {str(each.servo_id): each.after for each in offsets},
-                "homing_written": written,
-            }
+            after = {str(each.servo_id): each.after for each in offsets}
+            facts |= {"backup": str(backup), "homing_offsets": after, "homing_written": written}
         bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
         fingerprints = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
         facts["fingerprints"] = str(fingerprints)

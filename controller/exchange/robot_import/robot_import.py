@@ -18,7 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import Assumptions, ConfigError, InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.servo_catalogue import described_model
+from snakewalk.config.servo_catalogue import servo_model as known_model
 from snakewalk.controller.exchange.robot_import.body_tree import (
     BodyTree,
     Hinge,
@@ -252,7 +252,7 @@ def _plan_limits(
     efforts = [value for name, value in source.effort_n_m.items() if name in joints]
     speeds = [value for name, value in source.speed_rad_s.items() if name in joints]
     held_n_m = math.inf
-    facts = described_model(servo_model, None)
+    facts = known_model(servo_model)
     if facts is not None and facts.motor is not None:
         held_n_m = round(_HELD_SHARE * facts.motor.stall_torque_n_m, 3)
         keys["torque_limit_n_m"] = held_n_m

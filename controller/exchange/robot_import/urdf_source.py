@@ -160,7 +160,7 @@ def _first_link(source: ModelSource, path: Path) -> str:
     source.notes.append(
         f"link world is dropped: it holds {name_held} by the {kind} joint {holding[0].get('name')}"
     )
-    return str(held)
+    return str(name_held)
 
 
 def _end(joint: object, end: str) -> str | None:

@@ -225,7 +225,7 @@ def finish(
 ) -> None:
     """Draw the map if asked for, and show what was made."""
     if picture is not None:
-        from snakewalk.controller.mapping.terrain_map import draw_terrain_map  # noqa: PLC0415
+        from snakewalk.controller.mapping.terrain_map import draw_terrain_map  # noqa: PLC0415  an extra
 
         with atomic_write(picture) as part:
             draw_terrain_map(world.relief, part, world.config.name)

@@ -79,11 +79,11 @@ def stereo(
     (0, 0) of the world is below the left camera, x is where it looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
-    from snakewalk.controller.mapping.stereo_camera import (  # noqa: PLC0415
+    from snakewalk.controller.mapping.stereo_camera import (  # noqa: PLC0415  an extra
         read_calibration,
         rectify,
     )
-    from snakewalk.controller.mapping.stereo_ground import (  # noqa: PLC0415
+    from snakewalk.controller.mapping.stereo_ground import (  # noqa: PLC0415  an extra
         CameraStand,
         stereo_ground,
     )
@@ -164,7 +164,7 @@ def _facts(made: "StereoGround") -> dict[str, object]:
 def _picture(file: Path) -> "Image":
     """(H, W, 3), blue first."""
     import cv2  # noqa: PLC0415  an extra
-    import numpy as np  # noqa: PLC0415
+    import numpy as np  # noqa: PLC0415  an extra
     from PIL import Image as Pictures  # noqa: PLC0415  an extra
 
     data = file.read_bytes()

@@ -43,9 +43,7 @@ _LEAST_NOISE: Final = 1.0 / 12.0
 _REFINEMENTS: Final = 4
 _LEAST_STEP: Final = 0.01
 """Of ``faulty``: less changes nothing (ours)."""
-_REFINED: Final[dict[Cause, int]] = {
-    **{"friction": 1, "load": 2, "weaker servo": 1, "slipped horn": 2}
-}
+_REFINED: Final = dict[Cause, int](friction=1, load=2) | {"weaker servo": 1, "slipped horn": 2}
 """How many of each kind, those that explain most at first, are followed on the simulator (ours)."""
 SETTLED_S: Final = 1.0
 """From which on the shadow is compared: it begins at rest, wherever the robot was at (ours)."""
@@ -53,11 +51,8 @@ MOST_S: Final = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
 LEAST_S: Final = 4.0
 """Less tells too little (ours)."""
-_DELAY_STEP_S: Final = 0.005
-"""Delay of the goals whose effect is simulated (ours)."""
-_USUAL_DELAY_S: Final = 0.005
-"""Standard deviation of the delay between a host's read and its write: a simulated host needs no
-time, one with a port computes for some milliseconds in between (ours)."""
+_DELAY_STEP_S, _USUAL_DELAY_S = 0.005, 0.005
+"""Simulated delay of the goals, and its usual deviation between a read and a write (ours)."""
 
 
 @dataclass(frozen=True, slots=True)

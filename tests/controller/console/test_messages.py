@@ -100,7 +100,7 @@ def test_the_result_is_the_same_at_every_level() -> None:
 def commands(group: Any, path: str = "snakewalk") -> dict[str, set[str]]:
     """Options of every command."""
     found: dict[str, set[str]] = {}
-    for name in group.commands:
+    for name in group.list_commands(None):
         command = group.get_command(None, name)
         if isinstance(command, TyperGroup):
             found |= commands(command, f"{path} {name}")

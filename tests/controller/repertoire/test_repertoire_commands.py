@@ -41,7 +41,7 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("plan", "--with", "physics"), "there is: repertoire"),
+        (("plan", "--with", "physics"), "--with physics: unknown; valid: repertoire"),
         (("plan", "flat-slalom", "--with", "repertoire"), "snakewalk repertoire record"),
         (("plan", "flat-slalom", "--with", "repertoire", "--motion", "walk"), "takes no --motion"),
         (("plan", "flat-slalom", "--run"), "belong to --with repertoire"),

@@ -84,6 +84,14 @@ def test_a_typo_is_told_before_anything_heavy_is_imported(tmp_path: Path) -> Non
 
 def test_what_is_shipped_is_listed_by_kind() -> None:
     listed = json.loads(CliRunner().invoke(app, ["list", "--json"]).stdout)
-    assert set(listed) == {"runs", "robots", "worlds", "recordings", "policies", "gaits"}
+    assert set(listed) == {
+        "runs",
+        "robots",
+        "worlds",
+        "recordings",
+        "policies",
+        "gaits",
+        "plug-ins",
+    }
     assert "worm-like" in listed["recordings"]
     assert "sidewinding-fast" in listed["gaits"]

@@ -24,9 +24,9 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
-from snakewalk.controller.run.commands.gait_run import _Hands
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.run.hands import Hands
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
@@ -164,7 +164,7 @@ def test_what_is_set_in_the_page_changes_the_gait(
     pytest.importorskip("mujoco")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     view = View()
-    hands = _Hands([view], view)  # type: ignore[list-item, arg-type]
+    hands = Hands([view], view)  # type: ignore[list-item, arg-type]
 
     def on_progress(progress: Progress) -> None:
         view.page.step()
@@ -192,7 +192,7 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
     pytest.importorskip("mujoco")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     view, cycles = View(), count()
-    hands = _Hands([view], view)  # type: ignore[list-item, arg-type]
+    hands = Hands([view], view)  # type: ignore[list-item, arg-type]
     texts: list[str] = []
     script = {
         30: (),  # it is seen: from now on it has to be held

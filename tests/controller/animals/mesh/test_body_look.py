@@ -15,7 +15,7 @@ from snakewalk.controller.animals.mesh.body_look import skin_look
 from snakewalk.controller.animals.mesh.body_motion import from_poses, robot_skin
 from snakewalk.controller.animals.mesh.body_skin import body_skin
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
-from snakewalk.controller.run.film_look import check_look
+from snakewalk.controller.run.film_look import check_look, film_look
 from snakewalk.sim.rendering.looks import dressed_model
 
 
@@ -69,7 +69,7 @@ def test_the_animal_is_the_one_that_was_captured(tmp_path: Path) -> None:
     assert thick is not None
     assert plain is not None
     assert np.ptp(thick.vertices_m[:, 1]) > 2.0 * np.ptp(plain.vertices_m[:, 1])
-    assert skin_look("servos", header()) is None
+    assert film_look("servos", header()) is None
 
 
 def test_the_skin_rests_where_the_belly_does_and_at_its_axis_in_water() -> None:
