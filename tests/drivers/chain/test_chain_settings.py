@@ -245,7 +245,9 @@ def test_a_setting_of_the_eeprom_that_changes_in_motion_stops_the_run(
     rig.link.enable()
     rig.cycles(20)
     rig.line.bank[register][1] = value  # the servo itself goes on as before
-    with pytest.raises(SafetyTrippedError, match=r"joint 2 \(ID 2\): .*another program write"):
+    with pytest.raises(
+        SafetyTrippedError, match=r"joint pitch_02 \(ID 2\): .*another program write"
+    ):
         rig.cycles(49)
     assert said in str(rig.link.tripped)
 

@@ -79,7 +79,7 @@ def test_a_second_master_is_named_within_two_rounds(rig: Rig, joints: list[int])
     rig.disturb = lambda: rig.write_goals(joints, 2300)
     assert rig.swing(2 * SLOW_EVERY) < 2 * SLOW_EVERY
     tripped = str(rig.link.tripped)
-    names = ", ".join(f"joint {k + 1} (ID {k + 1})" for k in joints)
+    names = ", ".join(f"joint yaw_{k + 1:02} (ID {k + 1})" for k in joints)
     assert tripped.startswith(f"{names}: Goal Position is 2300, not ")
     assert "second master" in tripped
 
@@ -151,4 +151,4 @@ def test_detection_takes_at_most_a_round_and_a_few_cycles(
     assert rig.swing(SLOW_EVERY + 3, period_s=period_s) == SLOW_EVERY + 3
     rig.disturb = lambda: rig.write_goals([joints - 1], 2300)
     assert rig.swing(2 * SLOW_EVERY, period_s=period_s) <= SLOW_EVERY + 3
-    assert f"joint {joints} (ID {joints}): Goal Position is 2300" in str(rig.link.tripped)
+    assert f"joint yaw_{joints:02} (ID {joints}): Goal Position is 2300" in str(rig.link.tripped)
