@@ -49,9 +49,9 @@ def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     apart_a = (record.cycle.current_a - record.shadow.current_a)[late]
     assert np.sqrt((apart_a**2).mean(axis=0)).argmax() == 1
     events = [event.text for event in record.events if event.kind == "shadow"]
-    assert "joint 2" in events[0]
+    assert "joint yaw_02 (ID 2)" in events[0]
     assert "differs from its shadow" in events[0]
-    assert "a weaker servo: joint 2" in events[-1]
+    assert "a weaker servo: joint yaw_02" in events[-1]
     assert [text for kind, text in told if kind == "shadow"] == events
     ended = CliRunner().invoke(app, ["shadow", str(finished.log), "--workers", "1", "--json"])
     said = json.loads(ended.stdout)  # the log alone says the same
