@@ -24,7 +24,8 @@ MOTIONS: Final = (
     "source",
 )
 """Motions that need no plug-in."""
-_ALONG_WAYPOINTS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
+WALKS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
+"""Motions along waypoints."""
 MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
 """A motion of ``MOTIONS``, or the name of a plug-in."""
 
@@ -285,6 +286,6 @@ class RunConfig(Strict):
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
             raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
         planned = self.motion == "repertoire" and not self.repertoire
-        if (planned or self.motion in _ALONG_WAYPOINTS) and not self.waypoints_m:
+        if (planned or self.motion in WALKS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")
         return self

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from snakewalk.config.camera import MappingConfig
 from snakewalk.config.compliance import ComplianceConfig
@@ -18,7 +18,7 @@ from snakewalk.config.loader import (
     shipped,
 )
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import MOTIONS, RunConfig
+from snakewalk.config.run import MOTIONS, WALKS, RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import find, require, unknown
@@ -47,8 +47,6 @@ from snakewalk.controller.run.run_keys import (
 from snakewalk.controller.run.servo_setup import check_servos, with_gains
 from snakewalk.controller.track.readers.load import track_beside
 
-_WALKS: Final = ("walk", "walk-printed", "walk-blind", "kp", "serpenoid")
-
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
     """Prepare a run from its configuration, for example from that in a log.
@@ -66,7 +64,7 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
             f"run {run.name}: its motion was the user's own, which no configuration holds; its "
             "goals are sent again by: snakewalk replay LOG; a new run is made by prepare_source"
         )
-    if run.motion not in _WALKS:
+    if run.motion not in WALKS:
         return _extension(run, robot, world)
     if not run.waypoints_m:
         raise InputError(f"run {run.name}: a {run.motion} needs waypoints")

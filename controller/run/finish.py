@@ -88,15 +88,6 @@ NOT_MEASURED: Final = 3
 """Exit code: finished as planned, arrival not measured."""
 
 
-def arrivals(finished: Finished) -> dict[str, object]:
-    """Return the waypoints that the body reached, with their evidence, for a command's answer."""
-    numbers, reached = finished.summary, finished.outcome.reached
-    found: dict[str, object] = {"waypoints_reached": reached if numbers.is_measured else None}
-    if not numbers.is_measured:
-        found["dead_reckoned_waypoints_reached"] = reached
-    return found | {"pose_evidence": numbers.pose_evidence, "pose_source": numbers.pose_source}
-
-
 def by_evidence(finished: Finished, values: Mapping[str, object]) -> dict[str, object]:
     """Return values that need a measured pose; without one, None and ``dead_reckoned_*``."""
     numbers = finished.summary
@@ -107,17 +98,10 @@ def by_evidence(finished: Finished, values: Mapping[str, object]) -> dict[str, o
     return {**dict.fromkeys(values), **believed, **evidence}
 
 
-def costs_of_transport(numbers: RunSummary) -> dict[str, float | None]:
-    """Return the costs of transport of a run, for a command's answer."""
-    found = {
-        "electrical_cost_of_transport": numbers.electrical_cost_of_transport,
-        "mechanical_cost_of_transport": numbers.mechanical_cost_of_transport,
-    }
-    if not numbers.is_measured:
-        found |= {
-            f"dead_reckoned_{key}": getattr(numbers, f"dead_reckoned_{key}") for key in tuple(found)
-        }
-    return found
+def summarized(numbers: RunSummary, *keys: str) -> dict[str, object]:
+    """Return numbers that need a measured pose; without one, their ``dead_reckoned_*``, too."""
+    believed = () if numbers.is_measured else tuple(f"dead_reckoned_{key}" for key in keys)
+    return {key: getattr(numbers, key) for key in (*keys, *believed)}
 
 
 def exit_code(finished: Finished, accept_dead_reckoning: bool) -> int:

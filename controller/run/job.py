@@ -13,7 +13,7 @@ from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import changed, prepare_job, with_compliance, with_map
 from snakewalk.controller.run.film_look import check_look
-from snakewalk.controller.run.finish import arrivals, exit_code, write_artifacts
+from snakewalk.controller.run.finish import by_evidence, exit_code, write_artifacts
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.run.progress_bar import progress_bar
 from snakewalk.controller.run.watchers import watched
@@ -45,8 +45,10 @@ class Job:
     observe: list[str] | None
     shadow: bool
 
-    def carry_out(self, *, film: bool, look: str, as_json: bool) -> Finished:
-        """Run the job and show its result.
+    def carry_out(
+        self, *, film: bool, look: str, accept_dead_reckoning: bool, as_json: bool
+    ) -> int:
+        """Run the job and show its result; returns the exit code.
 
         Raises:
             InputError: a value is unknown, or two of them contradict each other.
@@ -65,7 +67,7 @@ class Job:
             {
                 "run": name,
                 "waypoints": outcome.waypoints,
-                **arrivals(finished),
+                **by_evidence(finished, {"waypoints_reached": outcome.reached}),
                 "duration_s": round(outcome.duration_s, 2),
                 "tripped": outcome.tripped,
                 "advance_alarms": outcome.alarms,
@@ -77,11 +79,6 @@ class Job:
             },
             as_json,
         )
-        return finished
-
-    @staticmethod
-    def exit_code(finished: Finished, accept_dead_reckoning: bool) -> int:
-        """Return the exit code of the command."""
         return exit_code(finished, accept_dead_reckoning)
 
     def _prepared(self) -> PreparedRun:

@@ -43,6 +43,11 @@ class MapPlugin(Protocol):
         ...
 
 
+def _source(name: str) -> MapPlugin:
+    source: MapPlugin = require("map", name, "mapping.source").load()()
+    return source
+
+
 def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
     """Reject a run that maps its ground where it cannot.
 
@@ -53,8 +58,7 @@ def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
     mapping = prepared.run.mapping
     if mapping is None:
         return
-    source: MapPlugin = require("map", mapping.source, "mapping.source").load()()
-    faults = source.faults(prepared, on_port=metal)
+    faults = _source(mapping.source).faults(prepared, on_port=metal)
     if faults:
         raise InputError(faults)
 
@@ -109,6 +113,7 @@ def map_provider(
     if mapping is None:
         yield MapProvider(measure)
         return
-    source: MapPlugin = require("map", mapping.source, "mapping.source").load()()
-    with source.open(MapContext(prepared, backend, measure, folder, on_event)) as provider:
+    with _source(mapping.source).open(
+        MapContext(prepared, backend, measure, folder, on_event)
+    ) as provider:
         yield provider

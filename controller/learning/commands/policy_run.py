@@ -25,10 +25,9 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.progress import TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_policy
-from snakewalk.controller.run.finish import by_evidence, show_run
+from snakewalk.controller.run.finish import show_run, summarized
 from snakewalk.controller.run.watchers import watched
 
 Name = Annotated[
@@ -89,12 +88,10 @@ def run_policy(
         "duration_s": round(finished.outcome.duration_s, 2),
         "tripped": finished.outcome.tripped,
         "slowed_to": round(finished.outcome.least_rate, 3),
-        **by_evidence(finished, {"travelled_m": _travelled_m(finished.summary)}),
+        **summarized(finished.summary, "travelled_m"),
+        "pose_evidence": finished.summary.pose_evidence,
+        "pose_source": finished.summary.pose_source,
         "electrical_energy_j": finished.summary.electrical_energy_j,
         "peak_current_a": finished.summary.peak_current_a,
     }
     show_run(finished, folder, result, as_json, film=film)
-
-
-def _travelled_m(numbers: RunSummary) -> float | None:
-    return numbers.travelled_m if numbers.is_measured else numbers.dead_reckoned_travelled_m

@@ -35,7 +35,7 @@ from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
-from snakewalk.controller.run.finish import by_evidence, costs_of_transport, show_run
+from snakewalk.controller.run.finish import by_evidence, show_run, summarized
 from snakewalk.controller.run.hands import Hands, open_hands
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.watchers import watched
@@ -169,7 +169,9 @@ def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
         result |= by_evidence(finished, moved)
     result |= {
         "electrical_energy_j": finished.summary.electrical_energy_j,
-        **costs_of_transport(finished.summary),
+        **summarized(
+            finished.summary, "electrical_cost_of_transport", "mechanical_cost_of_transport"
+        ),
         "peak_current_a": finished.summary.peak_current_a,
         "peak_temperature_c": finished.summary.peak_temperature_c,
     }

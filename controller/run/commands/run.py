@@ -96,5 +96,8 @@ def run(
         map_source=map_, keys=set_, compliance=compliance, port=port, out=out, force=force,
         live=live, view=view, view_at=view_at, ros=ros, observe=observe, shadow=shadow,
     )  # fmt: skip
-    finished = job.carry_out(film=film, look=look, as_json=as_json)
-    raise SystemExit(job.exit_code(finished, accept_dead_reckoning))
+    raise SystemExit(
+        job.carry_out(
+            film=film, look=look, accept_dead_reckoning=accept_dead_reckoning, as_json=as_json
+        )
+    )
