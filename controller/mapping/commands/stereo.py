@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
+import numpy as np
 import typer
 
 from snakewalk.config.archive import check_expansion
@@ -164,7 +165,6 @@ def _facts(made: "StereoGround") -> dict[str, object]:
 def _picture(file: Path) -> "Image":
     """(H, W, 3), blue first."""
     import cv2  # noqa: PLC0415  an extra
-    import numpy as np  # noqa: PLC0415  an extra
     from PIL import Image as Pictures  # noqa: PLC0415  an extra
 
     data = file.read_bytes()

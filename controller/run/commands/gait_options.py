@@ -1,12 +1,14 @@
 """Options that several ``snakewalk gait`` commands have, and what they show of a gait."""
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.options import key_values
-from snakewalk.controller.gaits.gait import Gait
+
+if TYPE_CHECKING:
+    from snakewalk.controller.gaits.gait import Gait
 
 Name = Annotated[
     str,
@@ -24,6 +26,6 @@ def parameters(given: list[str] | None) -> dict[str, Any]:
     return key_values("--param", given, "NAME=VALUE")
 
 
-def needed_joints(gait: type[Gait]) -> list[str]:
+def needed_joints(gait: "type[Gait]") -> list[str]:
     """Return the kinds of joints that a gait needs."""
     return [name for name in ("yaw", "pitch", "legs", "wheels") if getattr(gait.needs, name)]

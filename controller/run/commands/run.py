@@ -83,6 +83,7 @@ def run(
         typer.Option(
             "--accept-dead-reckoning",
             help="exit code 0 instead of 3 where the arrival was dead-reckoned, not measured",
+            rich_help_panel="Evidence",
         ),
     ] = False,
     force: Force = False,

@@ -153,6 +153,7 @@ ROWS = [
     ("run flat-square --port robot", "the file of yaw16 has no [[ports]]"),
     ("run flat-square --port .", ".: is no serial device"),
     ("run flat-square --pose imu", "pose: robot yaw16 has no IMU"),
+    ("run flat-square --pose gps", "pose gps: unknown; valid: camera, imu, joints, simulator"),
     ("run flat-square --out /proc/x", "/proc/x: cannot be made"),
     ("run flat-square --log-file nosuch/x.log", "--log-file nosuch/x.log: No such file"),
     ("run flat-square --motion=", "nothing after --motion: fill it"),
