@@ -20,7 +20,7 @@ SECONDS = 12.0
 def test_a_body_on_its_back_turns_home_on_hills_and_says_so(
     pose: str, tmp_path: Path, mocker: MockerFixture
 ) -> None:
-    """Two of three at least: where it lies in a hollow it takes longer (15 of 16 within 20 s).
+    """Where it lies in a hollow it takes longer. With ``imu`` 6 of 12 seeds are upright in time.
 
     With ``imu`` nothing but the device on the bus tells the walk how the body lies.
     """
