@@ -88,6 +88,8 @@ class ServoChain:
         given up, and when replies get lost again and again."""
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
+        self.checks_in_read = True
+        """Whether ``read`` calls ``check_servos``; a ``SafeLink`` calls it after the goals."""
         self._bus = bus
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
@@ -106,6 +108,7 @@ class ServoChain:
         self._prepare_reads(fast=True)
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
+        self._has_time: bool | None = None
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
@@ -213,7 +216,7 @@ class ServoChain:
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
-        self._reads = 0
+        self._reads, self._has_time = 0, None
         self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
@@ -304,8 +307,8 @@ class ServoChain:
         Where no joint could be read nothing else is asked: that is put off to the next call.
 
         Raises:
-            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
-                has written to it), or its watchdog has stopped it or is not armed.
+            BusError: a servo holds another goal than the one sent to it; raised by
+                ``check_servos``, if ``checks_in_read``.
             PortError: the port is gone.
 
         """
@@ -322,7 +325,11 @@ class ServoChain:
         if read > 0:  # else what is asked beside it waits, too, and the state grows stale
             self._reads += 1
             is_alone = not self._read_slow(measured_at_s)
-            self._check_liveness(has_time=is_alone and reply.complete)
+            self._has_time = is_alone and reply.complete
+            if self._liveness is not None:
+                self._check(self._liveness.check_goals, self._has_time)
+            if self.checks_in_read:
+                self.check_servos()
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -351,20 +358,32 @@ class ServoChain:
             self.on_event(line)
         return measured_at_s
 
-    def _check_liveness(self, *, has_time: bool) -> None:
-        """Check torque, watchdogs, settings; where a servo tells an alarm, that is the reason.
+    def check_servos(self) -> None:
+        """Check torque, watchdogs and settings of the servos, one register in a cycle.
 
-        An alarm that switches a servo off may come between the group read and the check.
+        After a read without a reply there is no check.
 
-        Args:
-            has_time: the state is all that was read in this cycle, and all servos replied.
+        Raises:
+            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
+                has written to it), or its watchdog has stopped it or is not armed.
+            PortError: the port is gone.
 
         """
-        if not self._armed or self._liveness is None or self._readings.alert:
+        has_time, self._has_time = self._has_time, None
+        if has_time is not None and self._liveness is not None:
+            self._check(self._liveness.check, has_time)
+
+    def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> None:
+        """Make a check; an alarm of a servo is the reason for what the check finds.
+
+        An alarm that switches a servo off may come between the group read and the check.
+        """
+        if not self._armed or self._readings.alert:
             return
         try:
-            asked = self._liveness.check(self._reads - 1, has_time=has_time)
+            asked = check(self._reads - 1, has_time=has_time)
             if asked is not None:
+                self._has_time = None  # for another check in this cycle
                 self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
             self._take(self._cycle.read(), again=True)
