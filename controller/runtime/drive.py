@@ -220,7 +220,7 @@ class Drive:
                 pose = self._pose(state)
                 view = spine.in_world(pose, state.position_rad)
                 self._displacement_m = (
-                    view.advance_since_m(self._last) if self._last is not None else 0.0
+                    view.unbiased_advance_since_m(self._last) if self._last is not None else 0.0
                 )
                 self._find_friction(view)
                 if self._run.waypoints_m:  # gaits may roll as they please
