@@ -192,7 +192,7 @@ ROWS = [
     ("policy run typo.toml", "typo.toml: robot: is required"),
     ("policy run wave-ppo --robot alternating16", "its network observes the joints of yaw16"),
     ("policy run wave-cma --set run.time_limit_s=9", "run.time_limit_s: is given by --seconds"),
-    ("policy learn -o file.txt", "file.txt: a policy's file ends in .toml"),
+    ("policy learn -o new.txt", "new.txt: a policy's file ends in .toml"),
     ("policy learn -o /nosuch/a.toml", "/nosuch: no such folder"),
     ("policy trials nosuch --seeds 1", "nosuch: no such policy"),
     ("view .", "a folder; a run's log is log.mcap"),
