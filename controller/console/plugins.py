@@ -48,7 +48,7 @@ class Plugin:
 
     @property
     def is_own(self) -> bool:
-        """Whether it belongs to snakewalk itself."""
+        """Whether it is one of snakewalk's own."""
         return self.package.startswith(f"{OWN}.")
 
     def load(self) -> Any:
