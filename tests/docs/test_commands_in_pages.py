@@ -20,15 +20,17 @@ COMMAND = re.compile(r"^ *(?:\$ )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE)
 
 
 def printed(page: Path) -> list[str]:
-    """Command lines in a page's blocks of code, without comments and prompts."""
+    """Command lines in a page's blocks of code, without those of a command that the page adds."""
     text = page.read_text(encoding="utf-8")
+    added = [f"snakewalk {words}" for words in re.findall(r'^@command\("([a-z ]+)"', text, re.M)]
     fenced = re.findall(r"^```\w*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     indented = re.findall(r"(?:^    .*\n)+", text, re.MULTILINE)
     return [
         line.replace("\\\n", " ")
         for block in [*fenced, *indented]
         for line in COMMAND.findall(block)
-        if " [-" not in line  # which options there are, not a command
+        if not line.startswith(tuple(added))
+        and " [-" not in line  # which options there are, not a command
     ]
 
 
