@@ -71,6 +71,12 @@ def checked(model: type[M], data: dict[str, Any], source: str, text: str = "") -
     return strict_toml.checked(model, data, source, text, _files)
 
 
+def place_of(path: Path, key: str) -> str:
+    """Return file, line and name of a key, as messages about a file begin."""
+    number = strict_toml.line_number(path.read_text(encoding="utf-8"), key.split("."))
+    return f"{path}: {key}" if number is None else f"{path}:{number}: {key}"
+
+
 def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
     """Return ``config`` with the values of dotted ``keys`` replaced, as strict as a file.
 

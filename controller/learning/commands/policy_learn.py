@@ -9,13 +9,14 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.learning.wave_search import search_wave
 
 
 @command(
     "policy learn",
     examples=("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+    results=("out",),
 )
 def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
@@ -33,7 +34,6 @@ def learn_policy(
     """Learn a wave with its feedback by CMA-ES, on episodes of the Gymnasium environment."""
     if out.suffix != ".toml":
         raise InputError(f"{out}: a policy's file ends in .toml")
-    refuse_to_overwrite([out], force)
     with ProgressBar(f"{robot} on {world}", generations) as bar:
         policy = search_wave(
             out.stem,

@@ -26,7 +26,7 @@ from snakewalk.controller.console.options import (
     key_values,
 )
 from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+from snakewalk.controller.console.result_files import check_picture, run_folder
 from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.schedule_run import (
@@ -59,6 +59,7 @@ Patience = Annotated[
         "repertoire play --speed 0.6 --turn 0.3",
         "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
     ),
+    results=("picture",),
 )
 def play_actions(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
@@ -84,7 +85,6 @@ def play_actions(
     as_json: Json = False,
 ) -> None:
     """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
-    refuse_to_overwrite([picture], force)
     check_picture(picture)
     prepared = prepare_schedule(
         file,

@@ -19,7 +19,7 @@ from snakewalk.controller.console.options import (
     show,
 )
 from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+from snakewalk.controller.console.result_files import check_picture, run_folder
 from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.repertoire_planning import load_plan
 from snakewalk.controller.repertoire.repertoire_run import RepertoireRun, run_name, run_route
@@ -30,6 +30,7 @@ from snakewalk.controller.run.watchers import Watchers, watched
 @command(
     "repertoire run",
     examples=("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
+    results=("picture",),
 )
 def run_plan(
     plan: Annotated[Path, typer.Argument(help="made by: snakewalk plan --with repertoire -o")],
@@ -47,7 +48,6 @@ def run_plan(
     as_json: Json = False,
 ) -> None:
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
-    refuse_to_overwrite([picture], force)
     job = load_plan(plan, replan=not open_loop)
     with watched(view, view_at, ros) as watchers:
         found, complete = carry_out(job, port, out, film, picture, force, watchers)

@@ -24,6 +24,7 @@ from snakewalk.controller.console.options import (
     World,
 )
 from snakewalk.controller.run.commands.gait_options import Name, Param
+from snakewalk.controller.run.gait_job import GaitJob
 
 Then = Annotated[
     list[str] | None,
@@ -81,8 +82,6 @@ def run_gait(
     as_json: Json = False,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.gait_job import GaitJob  # noqa: PLC0415  --help stays quick
-
     GaitJob(
         name=name, robot=robot, world=world, param=param, keys=set_, then=then, by=by,
         seconds=seconds, look_heading_rad=look_heading_rad, look_at=look_at, live=live,

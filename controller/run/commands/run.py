@@ -29,6 +29,7 @@ from snakewalk.controller.console.options import (
     ViewAt,
     World,
 )
+from snakewalk.controller.run.job import Job
 
 
 @command(
@@ -90,8 +91,6 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.job import Job  # noqa: PLC0415  --help stays quick
-
     job = Job(
         run=run, robot=robot, world=world, track=track, seed=seed, motion=motion, pose=pose,
         map_source=map_, keys=set_, compliance=compliance, port=port, out=out, force=force,
