@@ -32,6 +32,7 @@ MODULES = tuple(
         "repertoire",
         "support",
         "gym_steps",
+        "busy_calibrations",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

@@ -1,73 +1,46 @@
-"""Calibration: which servo is which joint, which way round, where straight is, and how far it goes.
+"""Calibration: the joint of each servo, its direction, its zero and its range.
 
-Nothing is known of the chain but its servos' IDs and models. Every motion passes a ``SafeLink``
-around a chain of all servos in current-based position mode with a small goal current: one joint
-moves, slowly, the others hold where they are. Somebody who sees the robot says what has moved; the
-ends of the range are where a servo pushes with all that it is allowed and does not turn.
+Only the IDs and models of the servos are known. Every motion passes a ``SafeLink`` around a chain
+of all servos in current-based position mode with a small goal current: one joint moves, slowly, the
+others hold where they are. A person who sees the robot says which joint has moved; the range ends
+where a servo pushes with all the current that it may use and does not turn.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.kinematics.smoothstep import cubic
-from snakewalk.controller.runtime.loop import ticks
+from snakewalk.controller.bench.calibration_bench import BUS_TRIES, RANGE_RAD, CalibrationBench
+from snakewalk.controller.bench.calibration_progress import (
+    CalibrationProgress,
+    JointRange,
+    Journal,
+    SeenBend,
+)
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.errors import BusError, SafetyTrippedError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_of
-from snakewalk.drivers.safety.limits import SafetyLimits
-from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.types import JointCommand, JointState
 
-WIGGLE_RAD = 0.25
-"""How far a joint is wiggled (ours)."""
-WIGGLE_S = 0.8
-"""How long the way there takes, and the way back (ours)."""
 CURRENT_A = 0.3
 """Goal current by default, A: an XM430 turns with an eighth of its stall torque (ours)."""
-MOVED_SHARE = 0.5
-"""A joint that makes less of its wiggle is held or has no power (ours)."""
-SWEEP_RAD_S = 1.0
-"""Speed of the sweep (ours)."""
 BEYOND_RAD = 0.25
 """How far beyond the limit of the robot the sweep looks for a stop (ours)."""
-STOP_LAG_RAD = 0.1
-"""A joint that is so far behind its goal, and pushes ... (ours)."""
-STOP_EFFORT = 0.8
-"""... with this share of its goal current, for ... (ours)."""
-STOP_S = 0.2
-"""... so long, s, has met its stop (ours)."""
-REST_S = 0.3
-"""How long a joint may come to rest before the next moves, s (ours)."""
 MARGIN_RAD = 0.1
 """How far before a stop the limit is set; the simulator's stops are as far beyond limits (ours)."""
 LEAST_LIMIT_RAD = 0.1
 """A joint with less range is of no use (ours)."""
-_RANGE_RAD = 3.1
-_CYCLE_S = 0.02
-_READS = 5
-
-
-@dataclass(frozen=True, slots=True)
-class SeenBend:
-    """What somebody saw when a servo was wiggled."""
-
-    joint: int
-    """Which joint moved, counted from 0 at the head."""
-    direction: Literal[1, -1]
-    """1: first it bent the head side to the left (yaw), or lifted it (pitch); -1: the other way."""
+_SCANS = 3
+"""Scans until the bus has as many servos as the robot has joints (ours)."""
+_PROBES = 6
+"""Probes of a servo until its replies come once each and whole: two servos with one ID never do
+that, and a busy line does it soon (ours)."""
 
 
 class Observer(Protocol):
@@ -88,15 +61,6 @@ class Observer(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class JointRange:
-    """Where a joint met its stops."""
-
-    low_rad: float | None
-    """None: not within ``BEYOND_RAD`` of the robot's limit."""
-    high_rad: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class ChainCalibration:
     """What was found, as a robot and in words."""
 
@@ -107,8 +71,13 @@ class ChainCalibration:
     """What a person should look at: joints with less range than the others, or without a stop."""
 
 
-def find_servos(port: BytePort, latency_s: float) -> dict[int, str]:
+def find_servos(port: BytePort, latency_s: float, count: int | None = None) -> dict[int, str]:
     """Model of each servo on the bus, by ID.
+
+    Args:
+        port: the line.
+        latency_s: how long adapter and driver may hold bytes back.
+        count: number of servos to expect; with fewer or more the bus is scanned again.
 
     Raises:
         InputError: two servos share an ID.
@@ -116,17 +85,25 @@ def find_servos(port: BytePort, latency_s: float) -> dict[int, str]:
         PortError: the port is gone.
 
     """
-    bus = DynamixelBus(port, latency_s=latency_s)
+    bus = DynamixelBus(port, latency_s=latency_s, tries=BUS_TRIES)
     found = bus.scan()
-    probes = [bus.probe(each) for each in found]
-    shared = [str(probe.servo_id) for probe in probes if probe.doubled or probe.damaged]
+    for _ in range(_SCANS - 1):
+        if count is None or len(found) == count:
+            break
+        found |= bus.scan()
+    shared = [str(servo_id) for servo_id in sorted(found) if not _is_alone(bus, servo_id)]
     if shared:
         raise InputError(
             f"{port.name}: replies of ID {', '.join(shared)} come doubled or damaged: two servos "
             "share it, or the line is bad; connect one alone and give it another ID: snakewalk "
             "bus set --new-id"
         )
-    return {servo_id: model_of(reply.model_number) for servo_id, reply in found.items()}
+    return {each: model_of(found[each].model_number) for each in sorted(found)}
+
+
+def _is_alone(bus: DynamixelBus, servo_id: int) -> bool:
+    probes = (bus.probe(servo_id) for _ in range(_PROBES))
+    return any(probe.answered and not probe.doubled and not probe.damaged for probe in probes)
 
 
 def unknown_chain(like: RobotConfig, servos: Mapping[int, str], current_a: float) -> RobotConfig:
@@ -147,7 +124,8 @@ def unknown_chain(like: RobotConfig, servos: Mapping[int, str], current_a: float
             axis="p",  # whatever it is: pitch joints have a goal current
             id=servo_id,
             model=model,
-            limit_rad=_RANGE_RAD,
+            name=f"servo_{servo_id}",
+            limit_rad=RANGE_RAD,
             position_p_gain=like.servo.position_p_gain,
             current_limit_a=current_a,
         )
@@ -167,6 +145,7 @@ def calibrate(
     sweep: bool = True,
     stop_requested: Callable[[], str | None] = lambda: None,
     on_progress: Callable[[str], None] = lambda step: None,
+    journal: Journal | None = None,
 ) -> ChainCalibration:
     """Find out everything about the chain on ``port``.
 
@@ -180,6 +159,8 @@ def calibrate(
         sweep: whether the ends of the ranges are looked for.
         stop_requested: returns why the safe link has to latch, or None.
         on_progress: gets a line for each step.
+        journal: of an interrupted calibration, whose answers are not asked again; it is saved
+            after each answer and each range.
 
     Raises:
         InputError: the servos are not the robot's, a joint does not move, two servos seem to move
@@ -187,171 +168,98 @@ def calibrate(
         DriverError: a servo does not do what an instruction asks, or safety has latched.
 
     """
-    on_progress("who is on the bus")
-    servos = find_servos(port, latency_s)
+    if journal is None:
+        journal = Journal(CalibrationProgress(joint_axes=like.joint_axes))
+    on_progress("search for servos")
+    servos = find_servos(port, latency_s, like.joint_count)
+    journal.known.check_servos(servos, "--resume")
     unknown = unknown_chain(like, servos, current_a)
-    bench = _Bench(port, unknown, latency_s, stop_requested)
-    seen: dict[int, int] = {}
-    signs: dict[int, Literal[1, -1]] = {}
+    bench = CalibrationBench(port, unknown, latency_s, stop_requested, on_progress)
+    journal.note(servos=servos)
+    steps = _Steps(like, bench, on_progress, journal)
     for row, servo_id in enumerate(unknown.servo_ids):
-        on_progress(f"ID {servo_id}: which joint")
-        bend = observer.which(
-            servo_id,
-            partial(bench.wiggle, row),
-            {joint: unknown.servo_ids[other] for joint, other in seen.items()},
-        )
-        if not 0 <= bend.joint < like.joint_count or bend.joint in seen:
+        if servo_id not in journal.known.bends:
+            steps.ask(observer, servo_id, partial(bench.wiggle, row))
+    bench.name_joints([steps.label(servo_id) for servo_id in unknown.servo_ids])
+    if not journal.known.zeros_rad:
+        on_progress("lay the body straight")
+        observer.straighten()
+        straight_rad = dict(zip(unknown.servo_ids, bench.where_rad().tolist(), strict=True))
+        journal.note(zeros_rad=straight_rad)
+    if sweep:
+        steps.sweep(unknown.servo_ids)
+    return _found(like, name, unknown, journal.known, sweep=sweep)
+
+
+@dataclass
+class _Steps:
+    """Steps of a calibration, each of which adds to the progress."""
+
+    like: RobotConfig
+    bench: CalibrationBench
+    on_progress: Callable[[str], None]
+    journal: Journal
+
+    @property
+    def known(self) -> CalibrationProgress:
+        """The progress so far."""
+        return self.journal.known
+
+    def label(self, servo_id: int) -> str:
+        """Label of the joint that a servo moves."""
+        return joint_label(self.like.joint_names[self.known.bends[servo_id].joint], servo_id)
+
+    def ask(self, observer: Observer, servo_id: int, wiggle: Callable[[], None]) -> None:
+        """Ask which joint a servo moves.
+
+        Raises:
+            InputError: the joint is known already, or the robot does not have it.
+
+        """
+        self.on_progress(f"ID {servo_id}: which joint")
+        seen = {bend.joint: other for other, bend in self.known.bends.items()}
+        bend = observer.which(servo_id, wiggle, seen)
+        if not 0 <= bend.joint < self.like.joint_count or bend.joint in seen:
             raise InputError(
                 f"ID {servo_id}: the joint that moved, number {bend.joint + 1} from the head, is "
-                f"known already or not of {like.name}"
+                f"known already or not of {self.like.name}"
             )
-        seen[bend.joint], signs[bend.joint] = row, bend.direction
-    on_progress("straight")
-    observer.straighten()
-    straight = bench.where_rad()
-    rows = [seen[joint] for joint in range(like.joint_count)]
-    ranges: list[JointRange] = []
-    if sweep:
-        with bench.straight(straight) as push:
-            for joint, row in enumerate(rows):
-                label = joint_label(like.joint_names[joint], unknown.servo_ids[row])
-                on_progress(f"range of {label}")
-                reach_rad = like.limit_rad[joint] + BEYOND_RAD
-                high = push(row, signs[joint], reach_rad)
-                low = push(row, -signs[joint], reach_rad)
-                ranges.append(JointRange(None if low is None else -low, high))
-    return _found(like, name, unknown, rows, signs, straight, ranges)
+        self.journal.note(bends={**self.known.bends, servo_id: bend})
 
+    def sweep(self, servo_ids: Sequence[int]) -> None:
+        """Find the ends of each joint's range, from the head on."""
+        rows = {servo_id: row for row, servo_id in enumerate(servo_ids)}
+        in_order = sorted(servo_ids, key=lambda servo_id: self.known.bends[servo_id].joint)
+        straight_rad = np.array([self.known.zeros_rad[servo_id] for servo_id in servo_ids])
 
-class _Bench:
-    """Motions of one servo of an unknown chain; torque is off between them."""
+        stops: dict[tuple[int, int], float | None] = {}
 
-    def __init__(
-        self,
-        port: BytePort,
-        robot: RobotConfig,
-        latency_s: float,
-        stop_requested: Callable[[], str | None],
-    ) -> None:
-        self._robot = robot
-        self._stop_requested = stop_requested
-        self._clock = port.clock
-        bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
-        self._chain = ServoChain(bus, robot)
-        self._limits = SafetyLimits.from_config(robot, SafetyConfig())
+        def push_each() -> None:
+            with self.bench.straight(straight_rad) as push:
+                for servo_id in [each for each in in_order if each not in self.known.ranges]:
+                    bend, row = self.known.bends[servo_id], rows[servo_id]
+                    reach_rad = self.like.limit_rad[bend.joint] + BEYOND_RAD
+                    for side in 1, -1:
+                        at = servo_id, side
+                        if at not in stops:
+                            self.on_progress(f"range of {self.label(servo_id)}")
+                            keep = partial(stops.__setitem__, at)
+                            push(row, side * bend.direction, reach_rad, keep)
+                    low, high = stops[servo_id, -1], stops[servo_id, 1]
+                    ends = JointRange(low_rad=None if low is None else -low, high_rad=high)
+                    self.journal.note(ranges={**self.known.ranges, servo_id: ends})
 
-    @contextmanager
-    def _link(self) -> Iterator[tuple[SafeLink, Floats]]:
-        """A safe link with torque on, and the pose that it holds; torque is off behind it."""
-        stop = self._stop_requested
-        with SafeLink(self._chain, self._limits, self._clock, stop_requested=stop) as link:
-            yield link, np.array(link.enable().position_rad)
-
-    def where_rad(self) -> Floats:
-        """Where the servos are; their torque is off, and stays off.
-
-        Raises:
-            BusError: a servo does not reply.
-
-        """
-        for _ in range(_READS):
-            state = SafeLink(self._chain, self._limits, self._clock).read()
-            if state.valid.all():
-                return state.position_rad
-        silent = np.array(self._robot.servo_ids)[~state.valid].tolist()
-        raise BusError(f"no reply from ID {', '.join(map(str, silent))}")
-
-    def wiggle(self, row: int) -> None:
-        """Turn one servo a little in its positive direction and back.
-
-        Raises:
-            InputError: it does not move.
-            DriverError: safety has latched.
-
-        """
-        with self._link() as (link, here):
-            most = 0.0
-            for time_s, state in self._cycles(link, 2.0 * WIGGLE_S):
-                most = max(most, float(state.position_rad[row] - here[row]))
-                share = cubic(max(0.0, min(time_s, 2.0 * WIGGLE_S - time_s)) / WIGGLE_S)
-                self._write(link, here, row, here[row] + WIGGLE_RAD * share)
-        if most < MOVED_SHARE * WIGGLE_RAD:
-            raise InputError(
-                f"ID {self._robot.servo_ids[row]}: moved by {most:.2f} of {WIGGLE_RAD:g} rad: is "
-                "it held, or too weak for what it carries? hang the robot up, or give --current"
-            )
-
-    @contextmanager
-    def straight(self, straight_rad: Floats) -> Iterator[Callable[[int, int, float], float | None]]:
-        """Hold the body straight; gives a function that pushes one joint: see ``_push``."""
-        with self._link() as (link, here):
-            for row, zero_rad in enumerate(straight_rad):
-                self._go(link, here, row, float(here[row]), float(zero_rad))
-            yield partial(self._push, link, here)
-
-    def _push(
-        self, link: SafeLink, here: Floats, row: int, side: int, reach_rad: float
-    ) -> float | None:
-        """Bend one joint one way and back; how far it went, rad, if it met a stop.
-
-        A stop is where the servo pushes with all that it may and does not follow any more.
-        """
-        zero_rad = float(here[row])
-        # the servo knows one turn only
-        reach_rad = min(reach_rad, _RANGE_RAD - abs(zero_rad))
-        stop, pushing_s, last_s, goal = None, 0.0, 0.0, zero_rad
-        least_a = STOP_EFFORT * self._robot.current_limits_a[row]
-        for time_s, state in self._cycles(link, reach_rad / SWEEP_RAD_S + STOP_S):
-            far = side * (goal - float(state.position_rad[row]))
-            pushes = far > STOP_LAG_RAD and side * float(state.current_a[row]) >= least_a
-            pushing_s = pushing_s + time_s - last_s if pushes else 0.0
-            last_s = time_s
-            if pushing_s >= STOP_S:
-                stop = side * (float(state.position_rad[row]) - zero_rad)
-                break
-            if not pushes:
-                ahead = side * (goal - zero_rad) + SWEEP_RAD_S * _CYCLE_S
-                goal = zero_rad + side * min(ahead, reach_rad)
-            self._write(link, here, row, goal)
-        self._go(link, here, row, goal, zero_rad)
-        return stop
-
-    def _go(self, link: SafeLink, here: Floats, row: int, start: float, end: float) -> None:
-        """Move one servo evenly, and let it come to rest."""
-        last_s = abs(end - start) / SWEEP_RAD_S
-        for time_s, _ in self._cycles(link, last_s + REST_S):
-            share = min(time_s / last_s, 1.0) if last_s > 0.0 else 1.0
-            self._write(link, here, row, start + share * (end - start))
-        here[row] = end
-
-    def _cycles(self, link: SafeLink, seconds: float) -> Iterator[tuple[float, JointState]]:
-        """Time since the first cycle and the state, at 50 Hz.
-
-        Raises:
-            SafetyTrippedError: safety has latched.
-
-        """
-        start_s = self._clock.now_s()
-        for tick in ticks(self._clock, _CYCLE_S, start_s + seconds):
-            state = link.read()
-            if link.tripped is not None:
-                raise SafetyTrippedError(link.tripped)
-            yield tick.deadline_s - start_s, state
-
-    def _write(self, link: SafeLink, here: Floats, row: int, goal_rad: float) -> None:
-        goals = here.copy()
-        goals[row] = goal_rad
-        link.write(JointCommand(self._clock.now_s(), goals))
+        if len(self.known.ranges) < len(in_order):
+            self.bench.retried(push_each, lambda: len(stops))
 
 
 def _found(
     like: RobotConfig,
     name: str,
     unknown: RobotConfig,
-    rows: Sequence[int],
-    signs: Mapping[int, Literal[1, -1]],
-    straight: Floats,
-    ranges: Sequence[JointRange],
+    known: CalibrationProgress,
+    *,
+    sweep: bool,
 ) -> ChainCalibration:
     """Put together the robot and the notes.
 
@@ -360,10 +268,13 @@ def _found(
 
     """
     joints, faults, notes = [], [], []
+    rows = {known.bends[servo_id].joint: row for row, servo_id in enumerate(unknown.servo_ids)}
+    ids = [unknown.servo_ids[rows[joint]] for joint in range(like.joint_count)]
+    ranges = [known.ranges[servo_id] for servo_id in ids] if sweep else []
     stopless = [k for k, r in enumerate(ranges) if r.low_rad is None or r.high_rad is None]
-    for joint, row in enumerate(rows):
+    for joint, servo_id in enumerate(ids):
         limit = like.limit_rad[joint]
-        said = joint_label(like.joint_names[joint], unknown.servo_ids[row])
+        said = joint_label(like.joint_names[joint], servo_id)
         if ranges:
             stops = [
                 abs(stop)
@@ -380,12 +291,12 @@ def _found(
         if limit < LEAST_LIMIT_RAD:
             faults.append(f"{said}: only {limit + MARGIN_RAD:.2f} rad to its stop: free it")
             continue
-        model = unknown.servo_models[row]
+        model = known.servos[servo_id]
         found = {
-            "id": unknown.servo_ids[row],
+            "id": servo_id,
             "model": None if model == like.servo.model else model,
-            "sign": signs[joint],
-            "zero_rad": round(float(straight[row]), 5),
+            "sign": known.bends[servo_id].direction,
+            "zero_rad": round(known.zeros_rad[servo_id], 5),
         }
         if limit != like.limit_rad[joint]:
             found["limit_rad"] = limit
