@@ -13,8 +13,8 @@ from benchmarks.rows import Row
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.controller.bench.calibration_progress import SeenBend
-from snakewalk.controller.bench.chain_calibration import calibrate
+from snakewalk.controller.bench.calibration.chain_calibration import calibrate
+from snakewalk.controller.bench.calibration.progress import SeenBend
 from snakewalk.drivers.errors import DriverError
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine

@@ -13,8 +13,8 @@ from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml
-from snakewalk.controller.bench import chain_calibration
-from snakewalk.controller.bench.calibration_progress import ProgressFile, SeenBend
+from snakewalk.controller.bench.calibration import chain_calibration
+from snakewalk.controller.bench.calibration.progress import ProgressFile, SeenBend
 from snakewalk.controller.bench.eeprom_backup import back_up, backup_text
 from snakewalk.controller.bench.fingerprints import read_fingerprints, write_fingerprints
 from snakewalk.controller.bench.homing_offset import homing_written, plan_homing, without_zeros

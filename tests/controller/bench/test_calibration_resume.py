@@ -9,8 +9,8 @@ from benchmarks.busy_calibrations import calibrated
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.bench.calibration_progress import ProgressFile, SeenBend
-from snakewalk.controller.bench.chain_calibration import calibrate
+from snakewalk.controller.bench.calibration.chain_calibration import calibrate
+from snakewalk.controller.bench.calibration.progress import ProgressFile, SeenBend
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from tests.controller.bench.test_chain_calibration import Trio, trio

@@ -18,13 +18,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import JointConfig, RobotConfig
 from snakewalk.config.template import robot_toml
-from snakewalk.controller.bench.calibration_bench import WIGGLE_RAD
-from snakewalk.controller.bench.calibration_progress import SeenBend
-from snakewalk.controller.bench.chain_calibration import (
+from snakewalk.controller.bench.calibration.chain_calibration import (
     ChainCalibration,
     calibrate,
     find_servos,
 )
+from snakewalk.controller.bench.calibration.progress import SeenBend
+from snakewalk.controller.bench.calibration.slow_motions import WIGGLE_RAD
 from snakewalk.controller.bench.commands import calibrate as calibrate_command
 from snakewalk.controller.bench.homing_offset import (
     HomingOffset,

@@ -17,12 +17,16 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.controller.bench.calibration_bench import BUS_TRIES, RANGE_RAD, CalibrationBench
-from snakewalk.controller.bench.calibration_progress import (
+from snakewalk.controller.bench.calibration.progress import (
     CalibrationProgress,
     JointRange,
     Journal,
     SeenBend,
+)
+from snakewalk.controller.bench.calibration.slow_motions import (
+    BUS_TRIES,
+    RANGE_RAD,
+    CalibrationBench,
 )
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.port.byte_port import BytePort
