@@ -33,6 +33,7 @@ MODULES = tuple(
         "support",
         "gym_steps",
         "startup",
+        "busy_calibrations",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )
