@@ -7,8 +7,8 @@ from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.config.servo_model import RegisterRow, ServoModel
+from snakewalk.drivers.protocol.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.alarms import Ax12Alarms
-from snakewalk.sim.ax12.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.table import MODEL, end_of, initial_value
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft

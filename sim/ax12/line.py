@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
-from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
-from snakewalk.sim.ax12.ax12 import Ax12Servos
-from snakewalk.sim.ax12.protocol1 import (
+from snakewalk.drivers.protocol.protocol1 import (
     BROADCAST_ID,
     HEADER,
     Error1,
@@ -18,6 +16,8 @@ from snakewalk.sim.ax12.protocol1 import (
     Reader1,
     frame,
 )
+from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
+from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.line.bus_contention import Reply, bus_contention
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.wire import Wire
