@@ -400,7 +400,10 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
-        self._goal_check = GoalCheck(bus, self.robot, fast=fast)
+        labels = [self.robot.joint_label(joint) for joint in range(self.robot.joint_count)]
+        self._goal_check = GoalCheck(
+            labels, bus.block(ids, "Goal Position", "Goal Position", fast=fast)
+        )
         self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 
