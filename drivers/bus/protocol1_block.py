@@ -26,7 +26,7 @@ from snakewalk.drivers.protocol.protocol1 import (
 _REFUSED = Error1.RANGE | Error1.CHECKSUM | Error1.INSTRUCTION
 """Errors of a reply that contains no value."""
 _STATUS_BYTES = 6
-"""Of a reply without parameters."""
+"""Length of a reply without parameters."""
 _QUIET_S = 2e-3
 """Silence after which no reply to an older request is under way (ours)."""
 
