@@ -130,6 +130,7 @@ def simulated(
         robot.model_copy(update={"ports": ()}),  # here they are on one wire
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
+        can_hold=run.safety.on_trip == "hold",
     )
 
     def lay_down(pose: InitialPose) -> None:
@@ -197,6 +198,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
         fingerprint_file=_fingerprint_file(run),
+        can_hold=run.safety.on_trip == "hold",
     )
     name = port_map_text((each.port, each.ids) for each in robot.ports) or port
     return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
@@ -250,7 +252,13 @@ def split(
     if deviation.torque is not None:
         line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[rows]
     bus = _bus_on_ports(robot, clock, line)
-    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+    chain = ServoChain(
+        bus,
+        robot,
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+        can_hold=run.safety.on_trip == "hold",
+    )
 
     def follow(state: JointState) -> None:
         body.follow(state.time_s - state.age_s, state.position_rad, state.velocity_rad_s)

@@ -68,6 +68,7 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.drivers.safety.trip_hold import TripHold
 from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
 
@@ -247,6 +248,7 @@ class _Execution:
                 self._recovery(backend, warn),
                 observers.with_stop(self.stop_requested, button),
                 lambda text: warn("safety", text),
+                TripHold.from_config(robot, safety),
             )
             start = initial_pose if self.port is None else None
             beside = _shadow(prepared, start, log, self.on_event) if self.shadow else None

@@ -185,7 +185,7 @@ class Ax12Servos:
         self._readings.set(rows, name, value)
 
     def clear_reading(self, rows: Indices, name: str) -> None:
-        """Let servos report what they measure in a register."""
+        """Let servos report measured values in a register again."""
         self._readings.clear(rows, name)
 
     def advance(self, until_s: float) -> None:

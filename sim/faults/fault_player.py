@@ -71,7 +71,7 @@ class FaultyServos(Protocol):
         ...
 
     def clear_reading(self, rows: Indices, name: str) -> None:
-        """Let servos report what they measure in a register."""
+        """Let servos report measured values in a register again."""
         ...
 
     def cut_power(self, rows: Indices) -> None:

@@ -298,7 +298,7 @@ class Firmware:
         self._readings.set(rows, name, value)
 
     def clear_reading(self, rows: NDArray[np.intp], name: str) -> None:
-        """Let servos report what they measure in a register."""
+        """Let servos report measured values in a register again."""
         self._readings.clear(rows, name)
 
     def cut_power(self, rows: NDArray[np.intp]) -> None:
