@@ -298,7 +298,7 @@ class ServoChain:
     def hold_softly(self, current_a: Floats) -> None:
         """Hold where the joints are, with currents of at most ``current_a`` (J,).
 
-        Reads keep the watchdogs fed and go on comparing the servos with what was set.
+        Reads keep the watchdogs fed, and still compare the servos with their settings.
 
         Raises:
             BusError: a servo cannot limit its current, or does not confirm it.
