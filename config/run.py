@@ -168,6 +168,13 @@ class SafetyConfig(Strict):
     hold_current_a: float | None = Field(
         None, gt=0.0, description="of each joint while it holds; default: 0.2 of its stall current"
     )
+    stop_output: str | None = Field(
+        None,
+        pattern=r"^(-?(rts|dtr):.+|command:/.+)$",
+        description="activated if torque off is not confirmed: rts:PORT or dtr:PORT sets this line "
+        "of a serial port, -rts:PORT or -dtr:PORT clears it, command:/PROGRAM ARGUMENT starts a "
+        "program; a simulated run opens the simulated supply",
+    )
     advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
     recovery: Literal["stop", "confirm", "resume"] = Field(

@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -64,6 +66,8 @@ class Backend:
     """Makes a second body, on which motion is tried; None where time does not wait for it."""
     lay_down: Callable[[InitialPose], None] | None = None
     """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
+    open_supply: Callable[[], None] | None = None
+    """Opens the supply of all servos; None if some of them are real."""
 
 
 class _SimulatedBody:
@@ -152,6 +156,7 @@ def simulated(
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
         made.twin,
         lay_down,
+        partial(line.firmware.cut_power, np.arange(robot.joint_count)),
     )
 
 

@@ -16,6 +16,7 @@ from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.measured_step import MeasuredSteps
 from snakewalk.drivers.safety.recovery import Recovery
+from snakewalk.drivers.safety.stop_output import StopOutput
 from snakewalk.drivers.safety.trip_hold import INTERRUPTED, TripHold
 from snakewalk.drivers.safety.vet import (
     SafetyMemory,
@@ -55,7 +56,9 @@ class SafeLink:
 
     With a ``hold`` a trip with a valid state holds with low currents for a while before torque goes
     off: after a joint that does not follow, and after ``request_stop(..., may_hold=True)``, which
-    the first Ctrl-C is then. ``is_holding`` is true meanwhile; it ends unless ``read`` goes on.
+    the first Ctrl-C is then. ``is_holding`` is true meanwhile, and ``read`` ends it in time.
+
+    A ``stop_output`` is activated if torque off is not confirmed.
     """
 
     def __init__(
@@ -67,6 +70,7 @@ class SafeLink:
         stop_requested: Callable[[], str | None] = lambda: None,
         on_event: Callable[[str], None] = lambda line: None,
         hold: TripHold | None = None,
+        stop_output: StopOutput | None = None,
     ) -> None:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""
@@ -90,6 +94,7 @@ class SafeLink:
         self._stop_requested: str | None = None
         self._stop_may_hold = False
         self._hold, self._hold_until_s = hold, -math.inf
+        self._stop_output, self._output_is_active = stop_output, False
         self._asked_to_stop = stop_requested
         self._touched = False
         self._off_tries = 0
@@ -163,9 +168,20 @@ class SafeLink:
         return state
 
     def disable(self) -> None:
-        """Torque off; safe to call at any time, more than once."""
+        """Torque off; safe to call at any time, more than once.
+
+        The stop output is activated if torque off is not confirmed.
+
+        Raises:
+            DriverError: torque off is not confirmed.
+
+        """
         self._memory, self._hold_until_s = None, -math.inf
-        self._link.disable()
+        try:
+            self._link.disable()
+        except DriverError as fault:
+            self._activate_output(fault)
+            raise
         self._off_tries = 0
 
     def read(self) -> JointState:
@@ -353,6 +369,21 @@ class SafeLink:
         except DriverError as fault:
             self.tripped = f"{self.tripped} (torque off failed: {fault})"
             self._off_tries = _OFF_TRIES
+
+    def _activate_output(self, fault: DriverError) -> None:
+        """Stop the servos from outside, once, and report it."""
+        output = self._stop_output
+        if output is None or self._output_is_active or not self._touched:
+            return
+        try:
+            output.activate()
+        except OSError as error:
+            line = f"stop output {output.name}: {error}; switch the servo power off"
+        else:
+            self._output_is_active = True
+            line = f"stop output {output.name}: activated, because torque off is not confirmed"
+        fault.add_note(line)
+        self._on_event(line)
 
     def _stops_softly(self) -> bool:
         """Whether the stop that was asked for may hold: an operator's, and no stop button's."""

@@ -121,6 +121,8 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         low_a, high_a = float(hold.current_a.min()), float(hold.current_a.max())
         amps = f"{low_a:.2f} A" if low_a == high_a else f"{low_a:.2f} to {high_a:.2f} A"
         found["on_trip"] = f"hold for {safety.hold_s:g} s with at most {amps} a joint"
+    if safety.stop_output is not None:
+        found["stop_output"] = safety.stop_output
     if ahead.slide is not None:
         found["steeper_than_held"] = (
             f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "

@@ -4,13 +4,16 @@ import signal
 from pathlib import Path
 
 import pytest
+from pytest_mock import MockerFixture
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait, prepare_walk
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
+from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.safety.trip_hold import INTERRUPTED
+from snakewalk.sim.servo.firmware import Firmware
 from tests.helpers.command import snakewalk
 
 HOLD_S = 0.4
@@ -51,3 +54,21 @@ def test_the_plan_states_the_hold() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "hold for 5 s with at most 0.46 A a joint" in " ".join(done.stdout.split())
+
+
+def test_the_stop_output_of_a_simulated_run_opens_its_supply(
+    tmp_path: Path, mocker: MockerFixture
+) -> None:
+    pytest.importorskip("mujoco")
+    cut = mocker.spy(Firmware, "cut_power")
+    mocker.patch(
+        "snakewalk.drivers.chain.torque_off.TorqueOff.send", side_effect=BusError("not confirmed")
+    )
+    keys = {"run.safety.stop_output": "rts:/dev/nowhere"}
+    job = prepare_gait("lateral-undulation", seconds=0.5, keys=keys)
+    with pytest.raises(BusError) as raised:
+        execute(job, tmp_path)
+    assert cut.call_count == 1
+    assert any("stop output simulated supply: activated" in x for x in raised.value.__notes__)
+    log = read_log(tmp_path / "log.mcap")
+    assert any("stop output simulated supply: activated" in each.text for each in log.events)
