@@ -33,6 +33,25 @@ class CheckingLink(Protocol):
         ...
 
 
+@runtime_checkable
+class SoftLink(Protocol):
+    """A link whose joints can hold with low currents."""
+
+    def hold_softly(self, current_a: Floats) -> None:
+        """Hold where the joints are, with currents of at most ``current_a`` (J,)."""
+        ...
+
+
+@runtime_checkable
+class HoldingLink(Protocol):
+    """A link that may hold for a while after a trip; reads go on until it has ended."""
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether it holds."""
+        ...
+
+
 class JointLink(Protocol):
     """Enable, read, write, disable; every backend passes the same contract tests."""
 

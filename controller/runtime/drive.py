@@ -1,6 +1,7 @@
 """One run: link, motion, log and alarms joined in the loop; the same on metal and in simulation."""
 
 import gc
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -32,7 +33,7 @@ from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
-from snakewalk.drivers.link import VettedLink
+from snakewalk.drivers.link import HoldingLink, VettedLink
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
@@ -237,9 +238,10 @@ class Drive:
                 self._send(tick, state, pose, view, goal)
                 if self._link.tripped or motion.done:
                     break
+            if self._link.tripped:
+                log.event(clock.now_s(), "trip", self._link.tripped, "error")
+                self._hold_out(period_s)
             tripped = self._link.tripped
-            if tripped:
-                log.event(clock.now_s(), "trip", tripped, "error")
         if not self._run.waypoints_m:
             end = "the motion came to its end" if motion.done else "the motion was cut off"
         elif path.reached == self._waypoints:
@@ -257,6 +259,26 @@ class Drive:
             self._waypoints,
             self._derating.least,
         )
+
+    def _hold_out(self, period_s: float) -> None:
+        """Go on reading while a trip holds the body, until its torque is off."""
+        link, log = self._link, self._log
+        if not isinstance(link, HoldingLink):
+            return
+        for tick in ticks(self._clock, period_s, lambda: math.inf if link.is_holding else -1.0):
+            with _LATCHED:
+                state = link.read()
+                log.cycle(
+                    *(tick.deadline_s, state.position_rad, state.position_rad, state),
+                    deadline_s=tick.deadline_s,
+                    lateness_s=tick.lateness_s,
+                    wire_busy_s=math.nan,
+                    **self._energy()._asdict(),
+                    yield_rad=None,
+                    verdict="veto",
+                    reason=link.tripped or "",
+                    joints=[],
+                )
 
     def _find_friction(self, view: BodyView) -> None:
         sent, monitor = self._link.last_verdict, self._friction_monitor

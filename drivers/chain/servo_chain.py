@@ -21,6 +21,7 @@ from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Reading
 from snakewalk.drivers.chain.liveness import SLOW_EVERY, LivenessCheck, RegisterCheck
 from snakewalk.drivers.chain.lost_replies import LostReplies
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
+from snakewalk.drivers.chain.soft_hold import limit_currents
 from snakewalk.drivers.chain.start_up import (
     Inspection,
     ServoSettings,
@@ -65,6 +66,7 @@ class ServoChain:
         watchdog_s: float = 0.2,
         rate_hz: float | None = None,
         fingerprint_file: FingerprintFile | None = None,
+        can_hold: bool = False,
     ) -> None:
         """Prepare; nothing is sent before ``enable``.
 
@@ -74,6 +76,7 @@ class ServoChain:
             watchdog_s: after so long without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
             fingerprint_file: compared with the servos at each ``enable``; None: not compared.
+            can_hold: ``hold_softly`` may be called, so every joint has a limit of its current.
 
         Raises:
             ControlTableError: a model lacks a register or a unit that the cycle needs, or has it
@@ -94,7 +97,8 @@ class ServoChain:
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
         tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
-        self._units = JointUnits.of(robot, [ServoUnits.of(table.facts) for table in tables])
+        scales = [ServoUnits.of(table.facts) for table in tables]
+        self._units = JointUnits.of(robot, scales, can_hold=can_hold)
         # rounded up: at least the time that was asked for
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
@@ -280,15 +284,36 @@ class ServoChain:
         self._expect("Bus Watchdog", [ticks] * len(ids))
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
-        self._liveness = LivenessCheck(
-            *(bus, self.robot, self._configured, self._fingerprints, ticks, self._goal_check),
-            fast=self._fast_reads,
-            rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
-        )
+        self._liveness = self._new_liveness()
         self._armed = True
         state = self.read()
         check_stillness(self.robot, state.position_rad, here_rad, STILL_RAD)
         return state
+
+    def _new_liveness(self) -> LivenessCheck:
+        return LivenessCheck(
+            *(self._bus, self.robot, self._configured, self._fingerprints),
+            *(self._watchdog_ticks, self._goal_check),
+            fast=self._fast_reads,
+            rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
+        )
+
+    def hold_softly(self, current_a: Floats) -> None:
+        """Hold where the joints are, with currents of at most ``current_a`` (J,).
+
+        Reads keep the watchdogs fed, and still compare the servos with their settings.
+
+        Raises:
+            BusError: a servo cannot limit its current, or does not confirm it.
+            PortError: the port is gone.
+
+        """
+        self.hold()
+        self._configured = limit_currents(
+            self._bus, self.robot, self._units, self._configured, current_a
+        )
+        self._liveness = self._new_liveness()
+        self._sent_at_s = self._clock.now_s()
 
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
@@ -419,7 +444,10 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
-        self._goal_check = GoalCheck(bus, self.robot, fast=fast)
+        labels = [self.robot.joint_label(joint) for joint in range(self.robot.joint_count)]
+        self._goal_check = GoalCheck(
+            labels, bus.block(ids, "Goal Position", "Goal Position", fast=fast)
+        )
         self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 
