@@ -97,7 +97,7 @@ class Job:
         ]
         parts = [run.name, *replaced, run.motion, f"seed{run.seed}"]
         if run.pose is not None:
-            parts.append(f"pose-{run.pose}")
+            parts.append(f"pose-{run.pose.partition(':')[0]}")
         if run.mapping is not None:
             parts.append(f"map-{run.mapping.source}")
         return "-".join(parts)
