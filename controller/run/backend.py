@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from snakewalk.config.loader import with_keys
 from snakewalk.config.robot import SIMULATED, RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.pose.sample import PoseFeed
 from snakewalk.controller.run.deviation import Deviation
+from snakewalk.controller.run.external.served_robot import simulated_line
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -68,6 +70,21 @@ class Backend:
     """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
     open_supply: Callable[[], None] | None = None
     """Opens the supply of all servos; None if some of them are real."""
+    poses: PoseFeed | None = None
+    """Poses that arrive at a rehearsal in simulated time, in place of real datagrams."""
+
+
+class RehearsedPort(Protocol):
+    """A port of simulated servos in this process and in simulated time, in place of a real one."""
+
+    @property
+    def name(self) -> str:
+        """Name of the port, for the log."""
+        ...
+
+    def open(self, run: RunConfig, robot: RobotConfig) -> Backend:
+        """Open the port; nothing of the simulation but its bytes and datagrams is known."""
+        ...
 
 
 class _SimulatedBody:
@@ -119,16 +136,7 @@ def simulated(
     body = made.plant
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
-    servo = robot.servo
-    line = SimLine(
-        ServoBank(robot.servo_ids, robot.servo_records, servo.baud),
-        body,
-        baud=servo.baud,
-        mounting=deviation.mounting(robot),
-        motors=motors_of(robot),
-        supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=made.imu(),
-    )
+    line = simulated_line(robot, body, deviation, made.imu())
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),
         robot.model_copy(update={"ports": ()}),  # here they are on one wire
@@ -144,8 +152,6 @@ def simulated(
         line.firmware.hold_position()
 
     drive = line.firmware.drive
-    if deviation.torque is not None:
-        drive.torque_constant_n_m_a[:] *= deviation.torque
     return Backend(
         "sim",
         chain,

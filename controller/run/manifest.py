@@ -16,4 +16,5 @@ PLUGINS = (
     ("pose", "imu", "Dead reckoning from the joint angles and the heading of the robot's IMU.", "snakewalk.controller.run.pose_provider:ImuPose", ""),
     ("pose", "joints", "Dead reckoning from the joint angles alone.", "snakewalk.controller.run.pose_provider:JointsPose", ""),
     ("pose", "simulator", "The true pose of the simulated body.", "snakewalk.controller.run.pose_provider:SimulatorPose", ""),
+    ("pose", "udp", "Poses in UDP datagrams: udp:PORT, or udp:HOST:PORT.", "snakewalk.controller.run.external.external_source:UdpPose", ""),
 )
