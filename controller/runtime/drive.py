@@ -250,13 +250,7 @@ class Drive:
             if self._link.tripped:
                 self._hold_out(period_s)
                 tripped = self._link.tripped
-        if not self._run.waypoints_m:
-            end = "the motion came to its end" if motion.done else "the motion was cut off"
-        elif path.reached == self._waypoints:
-            end = "every waypoint reached"
-        else:
-            end = f"{path.reached} waypoints reached"
-        log.event(clock.now_s(), "stop", f"torque off; {end}")
+        log.event(clock.now_s(), "stop", f"torque off; {self._end_text()}")
         duration_s = clock.now_s() - start_s
         return Outcome(
             path.reached,
@@ -267,6 +261,15 @@ class Drive:
             self._waypoints,
             self._derating.least,
         )
+
+    def _end_text(self) -> str:
+        reached = self._path.reached
+        if not self._run.waypoints_m:
+            is_done = self._motion.done
+            return "the motion came to its end" if is_done else "the motion was cut off"
+        if reached == self._waypoints:
+            return "every waypoint reached"
+        return f"{reached} waypoints reached"
 
     def _hold_out(self, period_s: float) -> None:
         """Go on reading while a trip holds the body, until its torque is off."""
