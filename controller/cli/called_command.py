@@ -2,8 +2,9 @@
 
 import inspect
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Any
+from typing import Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand
@@ -50,7 +51,8 @@ def called(
     """Return the function of a command with the options that all commands have.
 
     It checks the files that the command names, of its input and of its results, before ``load``
-    imports what the command uses.
+    imports what the command uses. A parameter whose type is a dataclass stands for the options that
+    are the fields of the dataclass.
 
     Args:
         declared: the command's signature, docstring and declaration.
@@ -58,7 +60,13 @@ def called(
 
     """
     signature = inspect.signature(declared, eval_str=True)
-    defaults = {name: one.default for name, one in signature.parameters.items()}
+    groups: dict[str, Any] = {
+        name: one.annotation
+        for name, one in signature.parameters.items()
+        if is_dataclass(one.annotation)
+    }
+    given = [each for one in signature.parameters.values() for each in _options(one)]
+    defaults = {one.name: one.default for one in given}
     info = command_info(declared)
 
     @wraps(declared)
@@ -77,6 +85,10 @@ def called(
             force = bool(options.get("force"))
             refuse_to_overwrite([options[name] for name in info.results], force)
             refuse_to_overwrite([options[name] for name in info.tables], force=True)
+            for name, group in groups.items():
+                options[name] = group(
+                    **{each.name: options.pop(each.name) for each in fields(group)}
+                )
             return load()(**options)
 
     own = [
@@ -90,8 +102,18 @@ def called(
     ]
     paragraphs = (inspect.getdoc(declared) or "").split("\n\n")
     command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
-    command.__annotations__ = declared.__annotations__ | {one.name: one.annotation for one in own}
-    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[*signature.parameters.values(), *own]
-    )
+    command.__annotations__ = {one.name: one.annotation for one in (*given, *own)}
+    command.__signature__ = signature.replace(parameters=[*given, *own])  # type: ignore[attr-defined]
     return command
+
+
+def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
+    """Return the options for which a parameter of a command stands."""
+    group = parameter.annotation
+    if not is_dataclass(group):
+        return [parameter]
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        parameter.replace(name=each.name, default=each.default, annotation=hints[each.name])
+        for each in fields(group)
+    ]

@@ -9,7 +9,7 @@ from typing import Any, Final
 from snakewalk.config.errors import InputError
 from snakewalk.controller import gaits
 from snakewalk.controller.gaits.gait import Gait
-from snakewalk.controller.gaits.spine import SpineGait
+from snakewalk.controller.gaits.spine import SpineGait, heading_loop
 
 _FIRST: Final = (
     "lateral_undulation",
@@ -65,8 +65,7 @@ def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "")
         InputError: no such gait, unknown parameters, values out of range; one line each.
 
     """
-    from snakewalk.controller.gaits import spine_heading  # noqa: F401, PLC0415  compiled here, never within a run
-
+    heading_loop()  # compiled here, never within a run
     if name not in GAITS:
         raise InputError(f"{name}: no such gait; there are {', '.join(GAITS)}")
     return GAITS[name].of(values, source)

@@ -40,10 +40,10 @@ MOST: Final = {
     "a fragment: 'Of ...', 'That of ...', 'Likewise'": 227,
     "'takes' for accepts, uses, needs": 222,
     "'is none', 'is no X', 'has it that'": 194,
-    "'told', 'tells', 'says of'": 144,
+    "'told', 'tells', 'says of'": 143,
     "'so many', 'from ... on', 'beside', 'somebody'": 155,
     "'of now', 'reckon', 'foretold', 'anew', 'mend'": 26,
-    "a metaphor for code: room, house, door, noun": 22,
+    "a metaphor for code: room, house, door, noun": 18,
 }
 """Occurrences that are left; a count that falls is lowered here, none rises."""
 

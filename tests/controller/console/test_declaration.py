@@ -37,7 +37,7 @@ def options(function: Callable[..., Any]) -> dict[str, Any]:
     """Return type, option and default of each parameter, without the identity of functions."""
     found = {}
     for name, one in inspect.signature(function, eval_str=True).parameters.items():
-        kind, *infos = get_args(one.annotation)
+        kind, *infos = get_args(one.annotation) or [one.annotation]
         found[name] = kind, one.default, [plain(info) for info in infos]
     return found
 
