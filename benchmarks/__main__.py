@@ -33,6 +33,7 @@ MODULES = tuple(
         "support",
         "gym_steps",
         "busy_calibrations",
+        "light_install",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

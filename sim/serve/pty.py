@@ -75,6 +75,8 @@ class PtyServer:
         self._offset_s = line.clock.now_s() - clock.now_s() * pace
         self.missed_s = 0.0
         """Time on the line that was left out because the server came late."""
+        self.latest_s = 0.0
+        """Longest time by which it came late, also if none was left out; ``IDLE_S`` is not late."""
         self._master = self._slave = -1
         self._speed = 0
         self.overrun_bytes = 0
@@ -235,7 +237,9 @@ class PtyServer:
     def _catch_up(self) -> None:
         """Bring the line to the present."""
         line = self._line
-        late_s = self._now_s() - line.clock.now_s() - LATE_S * self._pace
+        since_s = self._now_s() - line.clock.now_s()
+        self.latest_s = max(self.latest_s, since_s - IDLE_S * self._pace)
+        late_s = since_s - LATE_S * self._pace
         if late_s > 0.0:
             self._offset_s -= late_s
             self.missed_s += late_s
