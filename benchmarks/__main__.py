@@ -35,6 +35,7 @@ MODULES = tuple(
         "gym_steps",
         "startup",
         "busy_calibrations",
+        "light_install",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

@@ -1,4 +1,4 @@
-"""Devices on a line that the robot does not list, and echoes of what the host sends."""
+"""Devices on a line that the robot does not list, and echoes of sent packets."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 

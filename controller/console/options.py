@@ -12,6 +12,7 @@ from rich.table import Table
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.controller.console.plugins import require
 
@@ -46,23 +47,26 @@ Motion = Annotated[
 Port = Annotated[
     str | None,
     typer.Option(
+        callback=check_port_name,
         help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter "
-        "there is"
+        "there is",
     ),
 ]
 ChainPort = Annotated[
     str | None,
     typer.Option(
+        callback=check_port_name,
         help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
-        "of the chain have ports of their own; default: the only USB adapter there is"
+        "of the chain have ports of their own; default: the only USB adapter there is",
     ),
 ]
 RunPort = Annotated[
     str | None,
     typer.Option(
+        callback=check_port_name,
         help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
         "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
-        "whose file says which; without it, the simulator"
+        "whose file says which; without it, the simulator",
     ),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]

@@ -56,8 +56,8 @@ BUS_TRIES = 6
 _STALE_S = 0.4
 """Age of a state that ends a motion: weak and slow motions may be seen later than a run (ours)."""
 _WATCHDOG_S = 1.5
-"""Longer than a busy host stands still (ours): a servo that its watchdog has stopped takes no goals
-any more, which looks as if it were blocked."""
+"""Longer than a busy host stands still (ours): a servo that its watchdog has stopped rejects goals,
+which looks as if it were blocked."""
 _READS = 3
 """Reads in a cycle until all servos have replied (ours)."""
 _POSE_READS = 40

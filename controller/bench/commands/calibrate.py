@@ -94,7 +94,7 @@ def calibrate(
     ):
         if (
             backup is not None and not keeps_backup
-        ):  # before anything is written: what a chain needs is EEPROM, too
+        ):  # before anything is written: a start writes EEPROM, too
             chain_calibration.find_servos(line, line.latency_s)
             _write(backup, backup_text(back_up(line, line.latency_s)))
         found = chain_calibration.calibrate(
