@@ -143,6 +143,12 @@ class SafetyConfig(Strict):
     )
     current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
     temperature_limit_c: float = Field(70.0, gt=0.0)
+    winding_limit_c: float = Field(
+        125.0,
+        gt=0.0,
+        description="estimated temperature of a motor's winding: that of the housing, and the heat "
+        "of its current",
+    )
     voltage_min_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_min_v"
     )

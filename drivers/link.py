@@ -16,6 +16,19 @@ class ExplainingLink(Protocol):
         ...
 
 
+class LoadEstimate(Protocol):
+    """Estimates of a chain's current, and of the temperature of its motors."""
+
+    current_a: float
+    """Drawn by the chain now."""
+    charge_ah: float
+    """Drawn since the start."""
+
+    def winding_c(self, state: JointState) -> Floats:
+        """(J,) temperatures of the windings."""
+        ...
+
+
 @runtime_checkable
 class CheckingLink(Protocol):
     """A link that compares the servos with the values written to them, once a cycle."""
@@ -39,6 +52,16 @@ class SoftLink(Protocol):
 
     def hold_softly(self, current_a: Floats) -> None:
         """Hold where the joints are, with currents of at most ``current_a`` (J,)."""
+        ...
+
+
+@runtime_checkable
+class LoadedLink(Protocol):
+    """A link that estimates the load of its servos."""
+
+    @property
+    def load(self) -> LoadEstimate | None:
+        """The estimates; None without records of the motors."""
         ...
 
 

@@ -28,6 +28,18 @@ _KEYS = {"paths_replanned": "paths_laid_again"}
 
 
 @dataclass(frozen=True, slots=True)
+class SummarizedBattery:
+    """Supply and load of a run; all but the voltages are estimated."""
+
+    first_v: float | None
+    last_v: float | None
+    least_v: float | None
+    current_max_a: float | None
+    charge_ah: float | None
+    winding_max_c: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class SummarizedFriction:
     """Friction under the body: that of the world's file, and what the run found."""
 
@@ -129,6 +141,8 @@ class RunSummary:
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
     """What the run found at last; None where it did not look for it."""
+    battery: SummarizedBattery | None
+    """Supply and load over the run; None in older logs."""
     pose_evidence: str
     """How the poses are known: ``measured``, ``estimated`` or ``dead-reckoned``."""
     pose_source: str
@@ -262,6 +276,7 @@ def _summary(record: RunRecord) -> RunSummary:
         decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
+        battery=_battery(record),
         pose_evidence=str(header.pose_evidence.kind),
         pose_source=header.pose_evidence.source,
         pose_is_simulated=header.initial_pose is not None,
@@ -283,6 +298,24 @@ def _assumptions(header: Header) -> dict[str, dict[str, object]]:
         key: {"value": value, "kind": str(Kind.ASSUMED), "source": source}
         for key, (value, source) in values.items()
     }
+
+
+def _battery(record: RunRecord) -> SummarizedBattery | None:
+    found = record.battery
+    if not len(found.time_s):
+        return None
+    known_v = found.voltage_v[np.isfinite(found.voltage_v)]
+    first_v, last_v, least_v = (
+        (known_v[0], known_v[-1], known_v.min()) if len(known_v) else (np.nan,) * 3
+    )
+    return SummarizedBattery(
+        _digits(float(first_v)),
+        _digits(float(last_v)),
+        _digits(float(least_v)),
+        _digits(_peak(found.current_a)),
+        _digits(float(found.charge_ah[-1])),
+        _digits(_peak(found.winding_c)),
+    )
 
 
 def _friction(record: RunRecord) -> SummarizedFriction | None:

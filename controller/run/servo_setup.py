@@ -47,6 +47,7 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
         except ValueError as fault:
             raise InputError(f"run {run.name}: {fault}") from None
     _check_hold(run, robot)
+    _check_fuse(robot)
     budget, safety = robot_budget(robot, robot.servo.baud, fast=True), run.safety
     budget.check(run.cycle_hz)
     check_ages(
@@ -67,6 +68,19 @@ def _check_hold(run: RunConfig, robot: RobotConfig) -> None:
                 f"run {run.name}: safety.on_trip = hold: {facts.model} has no current-based "
                 "position control, so its joints cannot hold with a low current; set "
                 "safety.on_trip to off"
+            )
+
+
+def _check_fuse(robot: RobotConfig) -> None:
+    """Reject a fuse if the current of the chain cannot be estimated."""
+    if robot.power is None or robot.power.fuse_a is None:
+        return
+    for facts in robot.models_by_id.values():
+        if facts.motor is None:
+            raise InputError(
+                f"robot {robot.name}: power.fuse_a = {robot.power.fuse_a:g}: the file of "
+                f"{facts.model} has no [motor], so its current cannot be estimated; add it: "
+                "docs/how-to/add-a-servo-model.md"
             )
 
 

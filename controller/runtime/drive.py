@@ -19,6 +19,7 @@ from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progre
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.topics import (
+    BatteryTable,
     FrictionTable,
     PathTable,
     PoseSourceTable,
@@ -35,7 +36,7 @@ from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
-from snakewalk.drivers.link import HoldingLink, VettedLink
+from snakewalk.drivers.link import HoldingLink, LoadedLink, VettedLink
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
@@ -76,6 +77,8 @@ def _no_long_collections() -> Iterator[None]:
 
 PoseSource = Callable[[JointState], BodyPose]
 _SETTLE_S = 0.3
+BATTERY_S = 1.0
+"""Time between two rows of the supply (ours)."""
 _LATCHED = suppress(SafetyTrippedError)
 
 
@@ -180,7 +183,9 @@ class Drive:
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
         self._roll_monitor = RollMonitor()
         self._friction_monitor = friction
-        self._derating = Derating(run.safety, robot, self._on_derating)
+        self._load = link.load if isinstance(link, LoadedLink) else None
+        self._battery_s = -math.inf
+        self._derating = Derating(run.safety, robot, self._on_derating, self._load)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = sensors.wire_busy_s
@@ -291,6 +296,22 @@ class Drive:
                     joints=[],
                 )
 
+    def _log_battery(self, time_s: float, state: JointState) -> None:
+        """Log supply and load once a second."""
+        load = self._load
+        if load is None or time_s < self._battery_s + BATTERY_S:
+            return
+        self._battery_s = time_s
+        known_v = state.voltage_v[np.isfinite(state.voltage_v)]
+        self._log.add(
+            BatteryTable,
+            time_s,
+            voltage_v=float(known_v.max()) if len(known_v) else math.nan,
+            current_a=load.current_a,
+            charge_ah=load.charge_ah,
+            winding_c=load.winding_c(state),
+        )
+
     def _find_friction(self, view: BodyView) -> None:
         sent, monitor = self._link.last_verdict, self._friction_monitor
         if monitor is None or sent is None:
@@ -399,6 +420,7 @@ class Drive:
             reason=self._link.tripped or "",
             joints=clamped,
         )
+        self._log_battery(tick.deadline_s, state)
         if self._observer is not None and not self._link.tripped:
             self._observer.step(tick.deadline_s, sent_rad, state)
         self._measure_speed()

@@ -12,8 +12,10 @@ from typing import Any
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
 from snakewalk.drivers.link import CheckingLink, ExplainingLink, JointLink, SoftLink
+from snakewalk.drivers.safety.chain_load import ChainLoad
 from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.load_limits import LoadLimits
 from snakewalk.drivers.safety.measured_step import MeasuredSteps
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.stop_output import StopOutput
@@ -91,6 +93,7 @@ class SafeLink:
         self._state: JointState | None = None
         self._following = FollowingError(limits)
         self._steps = MeasuredSteps(limits)
+        self._loads = LoadLimits(limits)
         self._doubt: str | None = None
         self._is_held_off = False
         self._on_event = on_event
@@ -147,6 +150,11 @@ class SafeLink:
     def was_enabled(self) -> bool:
         """Whether ``enable`` has been called, so that torque may have been on."""
         return self._touched
+
+    @property
+    def load(self) -> ChainLoad | None:
+        """Estimates of current, charge and windings; None without records of the motors."""
+        return self._loads.load
 
     @property
     def is_holding(self) -> bool:
@@ -352,6 +360,7 @@ class SafeLink:
     ) -> None:
         now_s = self._clock.now_s()
         fault, self._memory = check_state(state, memory, limits or self._limits, now_s)
+        fault = fault or self._loads.update(state)
         stop, is_sound = self._stop(), fault is None
         fault = stop or fault or self._following_fault(state, memory)
         if fault is not None:
@@ -427,7 +436,7 @@ class SafeLink:
         self._state = state
         assert self._memory is not None
         unsound, self._memory = check_state(state, self._memory, self._limits, now_s)
-        reason = self._stop() or doubt or unsound
+        reason = self._stop() or doubt or unsound or self._loads.update(state)
         if reason is not None or now_s >= self._hold_until_s:
             self._end_hold(reason)
         return state
