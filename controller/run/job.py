@@ -8,13 +8,13 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.options import key_values, show
+from snakewalk.controller.console.progress import PathBar, TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.carry_out import Carried, carry_out, watched_by
 from snakewalk.controller.run.factory import changed, prepare_job, with_compliance, with_map
 from snakewalk.controller.run.film_look import check_look
 from snakewalk.controller.run.finish import by_evidence, exit_code, write_artifacts
-from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.progress_bar import progress_bar
+from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,3 +113,10 @@ class Job:
 def _confirm(found: str) -> bool:
     """Ask whether an interrupted chain may go on; the servos hold meanwhile."""
     return typer.confirm(f"{found}; go on?", err=True)
+
+
+def progress_bar(prepared: PreparedRun) -> PathBar | TimeBar:
+    """Return the bar that fits a run: along its path, or over its time."""
+    if isinstance(prepared, PathRun):
+        return PathBar(prepared.path.length_m)
+    return TimeBar(prepared.run.name, prepared.run.time_limit_s)

@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.budget import WireBudget, robot_budget
+from snakewalk.drivers.bus.budget import WireBudget, plain_reads_text, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
@@ -455,20 +455,10 @@ class ServoChain:
         return robot_budget(self.robot, self._port.getBaudRate(), fast=fast)
 
     def _report_plain_reads(self) -> None:
-        """Tell that fast reads were given up, and whether the wire still carries the rate."""
         self._fast_reads = False
-        line = (
-            f"fast sync reads given up after {FAST_FAILURES} failures in a row, plain from now on"
-        )
-        if len(self._bus.parts) > 1:
-            line = f"{', '.join(self._cycle.given_up_on)}: {line}"
+        ports = self._cycle.given_up_on if len(self._bus.parts) > 1 else ()
         budget = self._budget(fast=False)
-        if self._rate_hz is not None and budget.share(self._rate_hz) > 1.0:
-            line += (
-                f": the wire carries at most {budget.limit_hz:.0f} Hz of plain reads, not "
-                f"{self._rate_hz:g} Hz: cycles will be late"
-            )
-        self.on_event(line)
+        self.on_event(plain_reads_text(budget, self._rate_hz, FAST_FAILURES, ports))
 
     def _send_goals(self, goal_rad: Floats) -> Int32s:
         goals = self._goals.encode(goal_rad)
