@@ -88,7 +88,7 @@ class RunSummary:
     path_error_mean_m: float | None
     path_error_max_m: float | None
     speed_m_s: float | None
-    """Of the centre of mass, along the path or along the axis of the gait
+    """Speed of the centre of mass, along the path or along the axis of the gait
     (``controller.metrics.travel``)."""
     predicted_speed_m_s: float | None
     planned_speed_m_s: float | None
