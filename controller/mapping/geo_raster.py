@@ -77,7 +77,6 @@ def read_geo_raster(
     """
     require_extra("GeoTIFF and ASCII grid need", "rasterio")
     import rasterio  # noqa: PLC0415  an extra
-    from rasterio.errors import RasterioError  # noqa: PLC0415  an extra
 
     driver = "AAIGrid" if file.suffix.lower() == ".asc" else "GTiff"
     with file.open("rb"):  # a fault of the system is reported as such
@@ -88,7 +87,7 @@ def read_geo_raster(
             rasterio.open(file.absolute(), driver=driver) as opened,
         ):
             return _read(file, opened, units, crop, spacing_of)
-    except (RasterioError, ValueError) as error:
+    except (rasterio.errors.RasterioError, ValueError) as error:
         raise InputError(f"{file}: cannot be read as {driver}: {error}") from None
 
 
