@@ -87,6 +87,18 @@ def _missing_remedy(
     return f"look at the cable in front of servo {missing[0]}; snakewalk scan --port {port}"
 
 
+def unnamed_robot(findings: Sequence[Finding], robot: RobotConfig) -> Finding | None:
+    """Finding for a command without ``--robot`` whose servos are not the default robot's."""
+    if all(each.check != "servo IDs" or each.grade == "ok" for each in findings):
+        return None
+    return Finding(
+        "robot",
+        "warn",
+        f"--robot is not given, so {shown_ids(robot.servo_ids)} are expected",
+        "name your robot by --robot; snakewalk list has the shipped ones",
+    )
+
+
 def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = False) -> Finding:
     """Two servos with one ID answer twice, or over each other.
 

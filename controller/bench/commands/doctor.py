@@ -19,6 +19,7 @@ from snakewalk.controller.bench.fingerprints import (
 )
 from snakewalk.controller.bench.port_lines import PortLines, open_lines
 from snakewalk.controller.bench.scan import pick_port
+from snakewalk.controller.bench.servo_checks import unnamed_robot
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.device_kind import check_port_name
@@ -111,6 +112,9 @@ def doctor(
                     on_progress=lambda step: status.update(f"{device}: {step}"),
                 )
             findings += _fingerprints(robot_file, described, lines)
+    if robot is None and run == DEFAULT_RUN:
+        unnamed = unnamed_robot(findings, described)
+        findings += [] if unnamed is None else [unnamed]
     show_findings(findings, {"port": device, "robot": described.name}, as_json)
 
 

@@ -3,16 +3,21 @@
 The kinds are the rows of the second table of that page.
 """
 
+import json
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from snakewalk.config.robot import ImuConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench.doctor import examine
+from snakewalk.controller.bench.port_lines import PortLines
+from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.finding import Finding, worst
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import Ax12Line
@@ -307,6 +312,34 @@ def test_one_servo_in_place_of_another_is_given_its_id() -> None:
     registers(("ID", 2, 1), ("Baud Rate", 2, 1))(line)
     remedy = check(doctor(line), "baud rate").remedy
     assert remedy.endswith("--baud 57600 --id 1 --new-id 3 --new-baud 1000000")
+
+
+def test_a_command_without_a_robot_asks_for_one_and_names_no_file(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It said what to write into the robot's file, and sent the user to the cable of servo 5."""
+    line = TestLine(servos=5)
+    line.bank["ID"][4] = 77
+    line.setBaudRate(line.getBaudRate())
+    line.latency_s, line.latency_timer_ms = 0.004, None  # type: ignore[attr-defined]
+
+    @contextmanager
+    def opened(device: str, baud: int) -> Iterator[PortLines]:
+        yield PortLines(device, ((line, None),))  # type: ignore[arg-type]
+
+    monkeypatch.setattr("snakewalk.controller.bench.commands.doctor.open_lines", opened)
+    monkeypatch.setattr(
+        "snakewalk.controller.bench.commands.doctor.permission",
+        lambda device: Finding("permission", "ok", device),
+    )
+    result = CliRunner().invoke(app, ["doctor", "--port", "/dev/ttyNONE", "--json"])
+    told = json.loads(result.stdout)
+    texts = " ".join(f"{each['found']} {each['remedy']}" for each in told["findings"])
+    assert ".toml" not in texts.replace("-o my-robot.toml", "")
+    assert "TOML" not in texts
+    assert "alternating16" not in texts
+    (robot,) = [each for each in told["findings"] if each["check"] == "robot"]
+    assert robot["found"] == "--robot is not given, so servos 1 to 16 are expected"
 
 
 def test_servos_of_protocol_1_are_named() -> None:

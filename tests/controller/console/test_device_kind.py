@@ -1,4 +1,4 @@
-"""A port that is no serial device is rejected by its name, before a command does any work."""
+"""A port that is not a serial device is rejected by its name, before a command does any work."""
 
 import os
 from pathlib import Path
