@@ -295,11 +295,11 @@ def test_the_first_motor_without_current_is_named_before_a_joint_that_does_not_f
 
 
 def test_a_motor_that_does_not_push_is_told_from_a_joint_that_does_not_follow() -> None:
-    following = FollowingError(LIMITS)
+    following = FollowingError(JUDGED)
     assert not following.is_idle
     assert idle(0.1, 0.0, following=following) is not None
     assert following.is_idle
-    following = FollowingError(replace(LIMITS, output=None))
+    following = FollowingError(LIMITS)
     for k in range(8):
         fault = following.update(state(time_s=0.1 * k), one(0.5, 0))
     assert fault is not None
