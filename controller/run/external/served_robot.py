@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -63,6 +63,19 @@ def place_of(prepared: PreparedRun) -> Place:
     return Place(prepared.run.start_m, prepared.start_heading_rad, joint_rad)
 
 
+def physics_modules() -> tuple[Any, Any]:
+    """Return the modules with the body in MuJoCo and with a second body.
+
+    Raises:
+        InputError: MuJoCo is not installed.
+
+    """
+    require_extra("simulated servos need", "mujoco")
+    from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
+
+    return plant, twin
+
+
 def simulated_line(
     robot: RobotConfig,
     plant: Plant,
@@ -97,9 +110,7 @@ class ServedRobot:
         serving: Serving,
         truth: Path | None = None,
     ) -> None:
-        require_extra("simulated servos need", "mujoco")
-        from snakewalk.sim.physics import plant as physics  # noqa: PLC0415  an extra
-
+        physics, _ = physics_modules()
         deviation = serving.deviation
         self._robot, self._deviation = robot, deviation
         ground = build_ground(world)
