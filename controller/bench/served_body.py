@@ -13,7 +13,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.options import key_values
 from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.pose.udp_feed import UdpSender, parse_address
-from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
+from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 
 
@@ -88,8 +88,7 @@ class ServedBody:
             world = load_world(self.world or "flat")
             return load_robot(self.robot or ""), world, self._place(Place())
         prepared = prepare_job(self.run, world=self.world)
-        start = Place(prepared.run.start_m, prepared.start_heading_rad)
-        return prepared.robot, prepared.world, self._place(start)
+        return prepared.robot, prepared.world, self._place(place_of(prepared))
 
     def _place(self, default: Place) -> Place:
         if self.at is None:
@@ -101,7 +100,7 @@ class ServedBody:
             raise InputError(f"--at {self.at}: expected X,Y or X,Y,DEGREES") from None
         if not all(map(math.isfinite, (x_m, y_m, heading_deg))):
             raise InputError(f"--at {self.at}: expected finite numbers")
-        return Place((x_m, y_m), math.radians(heading_deg))
+        return Place((x_m, y_m), math.radians(heading_deg), default.joint_rad)
 
 
 class PosePublisher:

@@ -60,7 +60,6 @@ class ExternalPose:
         self._now_s = self._used_s = -np.inf
         self._used: PoseSample | None = None
         self._reason = ""
-        self._contradiction: str | None = None
         self._reported: dict[str, float] = {}
         self.counts = dict.fromkeys(("poses", "used", "lost", "rejected", "restarts"), 0)
         """Poses that arrived, that were used, that never arrived, that were rejected."""
@@ -85,8 +84,8 @@ class ExternalPose:
 
     def fault(self) -> str | None:
         """Return why the pose cannot be trusted any more; None while it can."""
-        if self._contradiction is not None:
-            return self._contradiction
+        if self._check.fault is not None:
+            return self._check.fault
         age_s = self._now_s - self._used_s
         if age_s <= self._config.max_age_s:
             return None
@@ -146,11 +145,9 @@ class ExternalPose:
         if self._is_frozen(sample, then):
             self._reject("frozen", "stale: the same pose is sent while the head moves")
             return
-        contradiction = self._check.fault(measured, then)
-        if contradiction is not None:
-            self._contradiction = contradiction
-        if self._contradiction is not None:
-            self._reject("contradiction", self._contradiction)
+        self._check.add(measured, then)
+        if self._check.fault is not None:
+            self._reject("contradiction", self._check.fault)
             return
         off = self._filter.innovation(measured, then)
         if self._filter.is_placed and off.is_jump:

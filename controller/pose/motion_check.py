@@ -17,35 +17,42 @@ STEP_S: Final = 0.4
 """Time between two measurements that are compared (ours)."""
 WINDOW: Final = 16
 """Comparisons that count."""
-LEAST: Final = 6
+LEAST: Final = 7
 """Comparisons before a fault is reported (ours)."""
-LEAST_TURN_RAD2: Final = 0.05
+LEAST_UP: Final = 0.7
+"""Least cosine between the head's up axis and the vertical (ours)."""
+LEAST_TURN_RAD2: Final = 0.2
 LEAST_WAY_M2: Final = 0.01
 """Sums of squares before a fault is reported: below, noise decides (ours)."""
 SCALE: Final = 20.0
 """A motion that is this many times larger than expected has another unit (ours)."""
 TURNED_RAD: Final = 1.0
 """Direction beyond which the frame is turned (ours)."""
-SHARE: Final = 0.7
+SHARE: Final = 0.8
 """Least correlation with which a fault is reported (ours)."""
 
 
 class MotionCheck:
-    """Call ``fault`` with each measurement, in order of time."""
+    """Call ``add`` with each measurement, in order of time."""
 
     def __init__(self) -> None:
         self._last: tuple[Moment, HeadMeasurement] | None = None
         self._turns: deque[tuple[float, float]] = deque(maxlen=WINDOW)
         self._ways: deque[tuple[complex, complex]] = deque(maxlen=WINDOW)
+        self.fault: str | None = None
+        """How the source contradicts the joints; None while it does not."""
 
-    def fault(self, measured: HeadMeasurement, then: Moment) -> str | None:
-        """Return how the source contradicts the joints, or None."""
+    def add(self, measured: HeadMeasurement, then: Moment) -> None:
+        """Compare a measurement with the one before; a head that lies on its side shows nothing."""
+        if measured.rotation[2, 2] < LEAST_UP:
+            self._last = None
+            return
         if self._last is None or then.time_s - self._last[0].time_s > 2.0 * STEP_S:
             self._last = (then, measured)
-            return None
+            return
         before, seen = self._last
         if then.time_s - before.time_s < STEP_S:
-            return None
+            return
         self._last = (then, measured)
         turn = then.place[2] - before.place[2]
         seen_turn = _heading(measured) - _heading(seen)
@@ -53,7 +60,7 @@ class MotionCheck:
         way = complex(*(then.place[:2] - before.place[:2]))
         way *= np.exp(1j * (_heading(seen) - before.place[2]))
         self._ways.append((way, complex(*(measured.position_m - seen.position_m)[:2])))
-        return self._judge()
+        self.fault = self._judge()
 
     def _judge(self) -> str | None:
         if len(self._turns) < LEAST:

@@ -23,18 +23,23 @@ SLIP_SHARE: Final = 0.15
 """Standard deviation of dead-reckoned speed and rate, over their magnitude (ours)."""
 SLIP_TIME_S: Final = 0.5
 """How long one such error lasts (ours)."""
-DRIFT_M2_S: Final = 4e-5
-"""Growth of the variance of each coordinate at rest: 6 mm in a second (ours)."""
-DRIFT_RAD2_S: Final = 4e-4
-"""Growth of the variance of each angle at rest: 1.1 degrees in a second (ours)."""
+DRIFT_M2_S: Final = 2e-4
+"""Growth of the variance of each coordinate at rest: 14 mm in a second (ours)."""
+DRIFT_RAD2_S: Final = 1e-3
+"""Growth of the variance of the heading at rest: 1.8 degrees in a second (ours)."""
 RISE_M2_S: Final = 2e-4
 """The same of the height, which dead reckoning does not know (ours)."""
-TILT_RAD2_S: Final = 1e-2
-"""The same of roll and pitch of the body, which dead reckoning does not know (ours)."""
+TILT_RAD2_S: Final = 5e-2
+"""The same of roll and pitch of the body: it may roll over within half a second (ours)."""
 JUMP_SD: Final = 5.0
 JUMP_M: Final = 0.10
 JUMP_RAD: Final = 0.45
-"""A measurement is a jump beyond this many standard deviations and beyond these errors (ours)."""
+"""A measurement is a jump beyond this many standard deviations and beyond these errors of position
+and heading (ours). Roll and pitch are free: a body may roll over quickly."""
+SLIDE_M_S: Final = 0.3
+SLIDE_RAD_S: Final = 0.5
+SLIDE_S: Final = 0.5
+"""How fast a body may slide and turn without its joints, and for how long at most (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +73,8 @@ class PoseFilter:
         self._body = np.eye(3)
         self._shape = np.eye(3)
         """Mean frame of the links in the axes of the head link, for the newest joints."""
+        self._measured_s = -np.inf
+        """When the newest measurement that was used was made."""
         self._frame_rad = 0.0
         """Heading of the frame of dead reckoning in the world."""
         self.is_placed = False
@@ -117,17 +124,23 @@ class PoseFilter:
         body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
         seen = measured.rotation @ self._mean_frame(then.joint_rad)
         off_m, off_rad = measured.position_m - head_m, rotation_vector(seen @ body.T)
+        gap_s = min(max(then.time_s - self._measured_s, 0.0), SLIDE_S)
         far = _deviations(off_m, self.position_covariance + measured.position_covariance)
-        wide = _deviations(off_rad, self.turn_covariance + measured.rotation_covariance)
+        variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
+        turn_rad = abs(float(off_rad[2]))
         is_jump = bool(
-            (far > JUMP_SD and np.linalg.norm(off_m) > JUMP_M)
-            or (wide > JUMP_SD and np.linalg.norm(off_rad) > JUMP_RAD)
+            (far > JUMP_SD and np.linalg.norm(off_m) > JUMP_M + SLIDE_M_S * gap_s)
+            or (
+                (turn_rad > JUMP_SD * np.sqrt(variance))
+                and turn_rad > JUMP_RAD + SLIDE_RAD_S * gap_s
+            )
         )
         return Innovation(off_m, off_rad, is_jump)
 
     def update(self, measured: HeadMeasurement, then: Moment) -> None:
         """Correct the pose by a measurement; the first one places the body."""
         off = self.innovation(measured, then)
+        self._measured_s = then.time_s
         if not self.is_placed:
             self.is_placed = True
             self.position_covariance = measured.position_covariance.copy()

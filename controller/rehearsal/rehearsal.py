@@ -1,6 +1,6 @@
 """Rehearsals of runs in simulated time: a served robot with errors, a tracker, and a judgement."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -14,7 +14,7 @@ from snakewalk.controller.rehearsal.judgement import judge
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
+from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.runlog.truth import read_truth
 
@@ -100,10 +100,11 @@ def _judged(case: RehearsalCase, folder: Path) -> dict[str, Any]:
         rng = np.random.default_rng([case.seed, 0x42])
         moved_m = START_SD_M * rng.standard_normal(2)
         turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
-        start_m = prepared.run.start_m
-        place = Place(
-            (start_m[0] + float(moved_m[0]), start_m[1] + float(moved_m[1])),
-            prepared.start_heading_rad + float(turned_rad),
+        start = place_of(prepared)
+        place = replace(
+            start,
+            start_m=(start.start_m[0] + float(moved_m[0]), start.start_m[1] + float(moved_m[1])),
+            heading_rad=start.heading_rad + float(turned_rad),
         )
         deviation = errors_of(prepared.robot, rng) if case.has_errors else NO_DEVIATION
         serving = Serving(case.tracker, deviation, LATE_S if case.has_errors else 0.0, case.seed)

@@ -9,13 +9,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import with_keys
 from snakewalk.config.robot import SIMULATED, RobotConfig
@@ -23,7 +22,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.pose.sample import PoseFeed
 from snakewalk.controller.run.deviation import Deviation
-from snakewalk.controller.run.external.served_robot import simulated_line
+from snakewalk.controller.run.external.served_robot import physics_modules, simulated_line
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -44,6 +43,9 @@ from snakewalk.sim.plant import Mounting
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import motors_of
 from snakewalk.sim.servo.protection import SupplyAndAmbient
+
+if TYPE_CHECKING:
+    from snakewalk.sim.physics.plant import MujocoPlant
 
 FILE_PORTS: Final = "robot"
 """``--port`` of a robot whose file names the ports of its segments."""
@@ -98,10 +100,8 @@ class _SimulatedBody:
         ground: HeightField | None,
         deviation: Deviation,
     ) -> None:
-        require_extra("simulated servos need", "mujoco")
-        from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
-
-        self.plant = plant.MujocoPlant(
+        plant, twin = physics_modules()
+        self.plant: MujocoPlant = plant.MujocoPlant(
             deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
         )
         self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)

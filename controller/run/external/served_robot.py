@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from snakewalk.controller.kinematics.links import body_in_world, mean_heading_ra
 from snakewalk.controller.pose.tracked_body import TrackedBody
 from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.truth import TruthLog
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import Plant
@@ -33,12 +34,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a served robot lies when serving begins."""
+    """Where and how a served robot lies when serving begins."""
 
     start_m: tuple[float, float] = (0.0, 0.0)
     """Centre of the head link."""
     heading_rad: float = 0.0
     """Mean heading of the body."""
+    joint_rad: tuple[float, ...] | None = None
+    """Angles that the servos report; None: straight. A straight round body rolls down a slope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,25 @@ class Serving:
     physics_step_s: float | None = None
     baud: int | None = None
     """None: the robot's."""
+
+
+def place_of(prepared: PreparedRun) -> Place:
+    """Return where a run begins, in its first shape."""
+    joint_rad = tuple(float(angle) for angle in prepared.initial_pose().joint_rad)
+    return Place(prepared.run.start_m, prepared.start_heading_rad, joint_rad)
+
+
+def physics_modules() -> tuple[Any, Any]:
+    """Return the modules with the body in MuJoCo and with a second body.
+
+    Raises:
+        InputError: MuJoCo is not installed.
+
+    """
+    require_extra("simulated servos need", "mujoco")
+    from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
+
+    return plant, twin
 
 
 def simulated_line(
@@ -88,16 +110,15 @@ class ServedRobot:
         serving: Serving,
         truth: Path | None = None,
     ) -> None:
-        require_extra("simulated servos need", "mujoco")
-        from snakewalk.sim.physics import plant as physics  # noqa: PLC0415  an extra
-
+        physics, _ = physics_modules()
         deviation = serving.deviation
         self._robot, self._deviation = robot, deviation
         ground = build_ground(world)
         self.body: MujocoPlant = physics.MujocoPlant(
             deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s
         )
-        servo_rad = np.zeros(robot.joint_count)
+        straight = (0.0,) * robot.joint_count
+        servo_rad = np.array(straight if place.joint_rad is None else place.joint_rad)
         shaft_rad = deviation.shaft_rad(servo_rad)
         heading_rad = place.heading_rad - mean_heading_rad(robot, shaft_rad)
         self.body.reset(place.start_m, heading_rad, shaft_rad)
@@ -146,6 +167,7 @@ def _header(
         "world": world.name,
         "start_m": list(place.start_m),
         "heading_rad": place.heading_rad,
+        "joint_rad": _listed(None if place.joint_rad is None else np.array(place.joint_rad)),
         "tracker": serving.tracker.model_dump(),
         "seed": serving.seed,
         "goal_delay_s": serving.goal_delay_s,

@@ -88,6 +88,7 @@ NOT_RUN = {
     "synthesise -o": "walks over all hills: test_synthesise_command.py",
     "fish match top.mp4 -o": "searches every frame: test_fish_command.py",
     "identify": PENDULUM,
+    "pose check": "needs a sender: tests/docs/test_rehearsal_page.py",
     "rehearse": "makes whole runs: tests/controller/rehearsal",
     "judge": "needs a served run: tests/controller/rehearsal",
     "--pose-out": "needs a client: tests/controller/rehearsal",
