@@ -391,7 +391,11 @@ class Drive:
         if self._slip_monitor.update(path.pulse_m_s * period_s, self._displacement_m):
             self._alarms += 1
             share = self._slip_monitor.window.share if self._slip_monitor.window else float("nan")
-            text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
+            text = f"the body moves {share:.0%} of the predicted distance"
+            if self._friction_monitor is not None and self._friction_monitor.confirms_file:
+                text += "; the friction found is that of the world's file, so it is not the ground"
+            else:
+                text += ": is the ground too slippery?"
             log.event(now_s, "alarm", text, "warning")
         return goal
 
