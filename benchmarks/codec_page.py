@@ -61,8 +61,12 @@ def table(lines: Sequence[Line]) -> str:
     return "\n".join(text)
 
 
-def measured_rows(lines: Sequence[Line]) -> dict[str, str]:
-    """Rows of ``docs/measured.md``, by how they begin."""
+QUIET_LOAD = 1.5
+"""Load average up to which wall times say something about the programs (ours)."""
+
+
+def measured_rows(lines: Sequence[Line], *, is_quiet: bool) -> dict[str, str]:
+    """Rows of ``docs/measured.md``, by how they begin; wall times need a quiet machine."""
     ours = [each for each in lines if each.what.endswith(": cycle")]
     plain = [each for each in ours if "fast" not in each.what]
     fast = [each for each in ours if "fast" in each.what]
@@ -80,15 +84,16 @@ def measured_rows(lines: Sequence[Line]) -> dict[str, str]:
     of_plain, of_fast = (span([each.of_rustypot for each in some]) for some in (plain, fast))
     cpu = "| control cycle of 16 servos, CPU |"
     wire = "| the same, over the wire time |"
+    times = (
+        f"{over(plain)} % with sync reads, {over(fast)} % with fast ones (aim: 6); `rustypot` "
+        f"{over(rusty)} %"
+    )
     return {
         cpu: (
             f"{cpu} {of_sdk} of `dynamixel-sdk`; {of_plain} of `rustypot` with sync reads, "
             f"{of_fast} with fast ones, at 1, 3 and 4 Mbaud | {source} |"
         ),
-        wire: (
-            f"{wire} {over(plain)} % with sync reads, {over(fast)} % with fast ones (aim: 6); "
-            f"`rustypot` {over(rusty)} % | the same |"
-        ),
+        wire: f"{wire} {times if is_quiet else 'not measured on a quiet machine'} | the same |",
     }
 
 
@@ -97,6 +102,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog=COMMAND, description=__doc__)
     parser.add_argument("--rows", type=Path, help="rows of an earlier run, as JSON")
     given = parser.parse_args()
+    load = 0.0
     if given.rows is None:
         load = os.getloadavg()[0]
         lines = lines_of(run())
@@ -109,7 +115,7 @@ def main() -> None:
     text = f"{head}\n\n{table(lines)}"
     print(text)
     write_tables(PAGES / "control-cycle.md", "cycle", text)
-    new = measured_rows(lines)
+    new = measured_rows(lines, is_quiet=load <= QUIET_LOAD)
     page = [
         next((row for begin, row in new.items() if line.startswith(begin)), line)
         for line in MEASURED.read_text(encoding="utf-8").splitlines()

@@ -69,7 +69,7 @@ class FollowingError:
             return None
         self.joint = joint
         self.is_idle = bool(self._idle_s[joint] >= IDLE_TIME_S)
-        if self._idle_s[joint] >= IDLE_TIME_S:
+        if self.is_idle:
             return self._idle_fault(state, goal_rad, joint)
         for_s = state.time_s - self._since_s[joint]
         if not for_s >= self._limits.following_time_s:

@@ -299,6 +299,10 @@ def test_a_motor_that_does_not_push_is_told_from_a_joint_that_does_not_follow() 
     assert not following.is_idle
     assert idle(0.1, 0.0, following=following) is not None
     assert following.is_idle
+    following = FollowingError(JUDGED)
+    following._idle_s[1] = IDLE_TIME_S  # the limit itself
+    assert following.update(state(), np.zeros(J)) is not None
+    assert following.is_idle
     following = FollowingError(LIMITS)
     for k in range(8):
         fault = following.update(state(time_s=0.1 * k), one(0.5, 0))
