@@ -36,6 +36,8 @@ JUMP_M: Final = 0.10
 JUMP_RAD: Final = 0.45
 """A measurement is a jump beyond this many standard deviations and beyond these errors of position
 and heading (ours). Roll and pitch are free: a body may roll over quickly."""
+LEAST_LEVEL: Final = 0.5
+"""Least horizontal part of a direction that has a heading (ours)."""
 SLIDE_M_S: Final = 0.3
 SLIDE_RAD_S: Final = 0.5
 SLIDE_S: Final = 0.5
@@ -127,7 +129,7 @@ class PoseFilter:
         gap_s = min(max(then.time_s - self._measured_s, 0.0), SLIDE_S)
         far = _deviations(off_m, self.position_covariance + measured.position_covariance)
         variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
-        turn_rad = abs(float(off_rad[2]))
+        turn_rad = abs(_turn_between(body[:, 0], seen[:, 0]))
         is_jump = bool(
             (far > JUMP_SD and np.linalg.norm(off_m) > JUMP_M + SLIDE_M_S * gap_s)
             or (
@@ -202,6 +204,13 @@ def rotation_vector(rotation: Floats) -> Floats:
 
 def _wrapped(angle_rad: float) -> float:
     return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
+
+
+def _turn_between(one: Floats, two: Floats) -> float:
+    """Return the angle between two directions in the horizontal plane; 0 of a steep one."""
+    if min(np.hypot(*one[:2]), np.hypot(*two[:2])) < LEAST_LEVEL:
+        return 0.0
+    return float(np.arctan2(one[0] * two[1] - one[1] * two[0], one[0] * two[0] + one[1] * two[1]))
 
 
 def _deviations(error: Floats, covariance: Floats) -> float:
