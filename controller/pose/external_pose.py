@@ -156,7 +156,7 @@ class ExternalPose:
                 f"jump by {off.distance_m:.2f} m and {np.degrees(off.angle_rad):.0f} degrees",
             )
             return
-        self._filter.update(measured, then)
+        self._filter.update(measured, then, off)
         self.counts["used"] += 1
         self._used, self._used_s, self._reason = sample, measured_s, ""
 

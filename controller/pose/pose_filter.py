@@ -6,6 +6,7 @@ turns slowly while the head swings. Position and attitude have a covariance each
 between them is neglected. Dead reckoning adds uncertainty with time and with the distance.
 """
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
@@ -36,6 +37,8 @@ JUMP_M: Final = 0.10
 JUMP_RAD: Final = 0.45
 """A measurement is a jump beyond this many standard deviations and beyond these errors of position
 and heading (ours). Roll and pitch are free: a body may roll over quickly."""
+LEAST_LEVEL: Final = 0.5
+"""Least horizontal part of a direction that has a heading (ours)."""
 SLIDE_M_S: Final = 0.3
 SLIDE_RAD_S: Final = 0.5
 SLIDE_S: Final = 0.5
@@ -69,6 +72,8 @@ class PoseFilter:
     def __init__(self, robot: RobotConfig) -> None:
         self._spine = SpineLinks.of(robot)
         self._last: Moment | None = None
+        self._frames: deque[tuple[Moment, Floats]] = deque(maxlen=3)
+        """Mean frames of the newest moments: each is needed several times in a cycle."""
         self._head_m = np.zeros(3)
         self._body = np.eye(3)
         self._shape = np.eye(3)
@@ -99,7 +104,7 @@ class PoseFilter:
     def advance(self, moment: Moment) -> None:
         """Move the body as dead reckoning does since the last call, and grow the uncertainty."""
         before, self._last = self._last, moment
-        self._shape = self._mean_frame(moment.joint_rad)
+        self._shape = self._mean_frame(moment)
         if before is None:
             self._align()
             return
@@ -122,12 +127,12 @@ class PoseFilter:
         turn, way = self._motion(then, self._last)
         head_m = self._head_m - np.append(way, 0.0)
         body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
-        seen = measured.rotation @ self._mean_frame(then.joint_rad)
+        seen = measured.rotation @ self._mean_frame(then)
         off_m, off_rad = measured.position_m - head_m, rotation_vector(seen @ body.T)
         gap_s = min(max(then.time_s - self._measured_s, 0.0), SLIDE_S)
         far = _deviations(off_m, self.position_covariance + measured.position_covariance)
         variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
-        turn_rad = abs(float(off_rad[2]))
+        turn_rad = abs(_turn_between(body[:, 0], seen[:, 0]))
         is_jump = bool(
             (far > JUMP_SD and np.linalg.norm(off_m) > JUMP_M + SLIDE_M_S * gap_s)
             or (
@@ -137,9 +142,8 @@ class PoseFilter:
         )
         return Innovation(off_m, off_rad, is_jump)
 
-    def update(self, measured: HeadMeasurement, then: Moment) -> None:
-        """Correct the pose by a measurement; the first one places the body."""
-        off = self.innovation(measured, then)
+    def update(self, measured: HeadMeasurement, then: Moment, off: Innovation) -> None:
+        """Correct the pose by a measurement and its innovation; the first one places the body."""
         self._measured_s = then.time_s
         if not self.is_placed:
             self.is_placed = True
@@ -171,11 +175,19 @@ class PoseFilter:
         self._frame_rad = _wrapped(heading - self._body_heading(self._last))
 
     def _body_heading(self, moment: Moment) -> float:
-        frame = self._mean_frame(moment.joint_rad)
+        frame = self._mean_frame(moment)
         return float(moment.place[2] + np.arctan2(frame[1, 0], frame[0, 0]))
 
-    def _mean_frame(self, joint_rad: Floats) -> Floats:
+    def _mean_frame(self, moment: Moment) -> Floats:
         """Return the mean axes (3, 3) of the links, in those of the head link."""
+        for known, frame in self._frames:
+            if known is moment:
+                return frame
+        frame = self._mean_axes(moment.joint_rad)
+        self._frames.append((moment, frame))
+        return frame
+
+    def _mean_axes(self, joint_rad: Floats) -> Floats:
         at_origin = BodyPose(0.0, np.zeros(3), np.eye(3))
         rotation = self._spine.in_world(at_origin, joint_rad).rotation
         forward, up = rotation[:, :, 0].mean(axis=0), rotation[:, :, 2].mean(axis=0)
@@ -202,6 +214,13 @@ def rotation_vector(rotation: Floats) -> Floats:
 
 def _wrapped(angle_rad: float) -> float:
     return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
+
+
+def _turn_between(one: Floats, two: Floats) -> float:
+    """Return the angle between two directions in the horizontal plane; 0 of a steep one."""
+    if min(np.hypot(*one[:2]), np.hypot(*two[:2])) < LEAST_LEVEL:
+        return 0.0
+    return float(np.arctan2(one[0] * two[1] - one[1] * two[0], one[0] * two[0] + one[1] * two[1]))
 
 
 def _deviations(error: Floats, covariance: Floats) -> float:

@@ -39,8 +39,9 @@ def run(
     pose: Annotated[
         str | None,
         typer.Option(
-            help="pose source of the head: simulator, camera, imu, joints, or that of a plug-in",
-            autocompletion=completion.words("simulator", "camera", "imu", "joints"),
+            help="pose source of the head: simulator, camera, imu, joints, udp:PORT, ros:/TOPIC, "
+            "or that of a plug-in",
+            autocompletion=completion.words("simulator", "camera", "imu", "joints", "udp:", "ros:"),
         ),
     ] = None,
     map_: Annotated[

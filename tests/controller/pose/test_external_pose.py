@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.pose import PoseConfig
+from snakewalk.controller.kinematics.links import mean_heading_rad
 from snakewalk.controller.pose.datagram import decode_pose, encode_pose
 from snakewalk.controller.pose.sample import (
     ArrivedPose,
@@ -15,7 +16,8 @@ from snakewalk.controller.pose.sample import (
     UnusablePoseError,
     turned,
 )
-from tests.controller.pose.scene import Change, Scene, moved
+from snakewalk.drivers.attitude import rotation_by
+from tests.controller.pose.scene import CYCLE_S, ROBOT, Change, Scene, joint_state, moved
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
@@ -213,3 +215,20 @@ def test_a_body_on_another_link_in_a_turned_frame_gives_the_same_pose() -> None:
     scene.run(3.0)
     assert scene.pose.fault() is None
     assert scene.errors_m[-1] < 0.01
+
+
+def test_a_body_that_rolls_over_is_followed() -> None:
+    scene = Scene()
+    scene.run(3.0)
+
+    def roll(time_s: float, sample: PoseSample) -> list[PoseSample]:
+        heading = np.arctan2(sample.rotation[1, 0], sample.rotation[0, 0])
+        heading += mean_heading_rad(ROBOT, joint_state(time_s).position_rad)
+        turn_rad = np.radians(min(300.0 * (time_s - 3.0), 170.0))
+        along = turn_rad * np.array([np.cos(heading), np.sin(heading), 0.0])
+        return [replace(sample, rotation=rotation_by(along) @ sample.rotation)]
+
+    scene.run(4.0, roll)
+    assert scene.events == []
+    assert scene.pose.fault() is None
+    assert scene.pose(joint_state(scene.cycles * CYCLE_S)).rotation[2, 2] < -0.9
