@@ -13,7 +13,7 @@ from snakewalk.drivers.port.byte_port import BytePort
 OVERHEAR_S = 0.6
 """How long the doctor listens before it says a word (ours): any other master talks by then."""
 PATIENCE_S = 0.1
-"""How late a group read may be (ours): a computer that is busy is no bad line."""
+"""How late a group read may be (ours): a busy computer does not make a bad line."""
 _TEST_READS = 200
 _BAD_SHARE = 0.05
 """Share of the requests that a line may fail before it is a fault (ours)."""

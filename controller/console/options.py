@@ -14,6 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.plain_console import PlainConsole
+from snakewalk.controller.console.plugins import require
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
@@ -182,14 +183,17 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
 
     Raises:
         ConfigError: every fault of the first file that has one.
+        InputError: a run names a pose source that is not installed.
 
     """
-    from snakewalk.config.loader import load_robot, load_run, load_world  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.loader import load_robot, load_run, load_world, place_of  # noqa: PLC0415  --help stays quick
 
     beside = None
     if run is not None and run.endswith(".toml"):
         beside, given = Path(run).parent, load_run(run)
         robot, world = robot or given.robot, world or given.world
+        if given.pose is not None:
+            require("pose", given.pose.partition(":")[0], place_of(Path(run), "pose"))
     if robot is not None and robot.endswith(".toml"):
         load_robot(robot, beside)
     if world is not None and world.endswith(".toml"):

@@ -191,9 +191,7 @@ class _Strips:
         return out, absent
 
     def _strip(self, first: int, last: int) -> Floats:
-        from rasterio.windows import Window  # noqa: PLC0415  an extra
-
-        part = Window.from_slices((first, last), (self._columns.start, self._columns.stop))
+        part = ((first, last), (self._columns.start, self._columns.stop))
         values = self._opened.read(1, window=part, out_dtype="float64")
         missing: Bools = self._opened.read_masks(1, window=part) == 0
         missing |= ~np.isfinite(values)

@@ -1,7 +1,7 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import DeviationConfig, RunConfig
+from snakewalk.config.run import DeviationConfig, RunConfig, SafetyConfig
 from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
@@ -20,6 +20,7 @@ from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (
     Backend,
+    RehearsedPort,
     is_pseudo_terminal,
     is_split,
     metal,
@@ -68,6 +69,8 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.drivers.safety.stop_output import StopCall, StopOutput, parse_stop_output
+from snakewalk.drivers.safety.trip_hold import TripHold
 from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
 
@@ -99,7 +102,7 @@ class Finished:
 def execute(
     prepared: PreparedRun,
     folder: Path,
-    port: str | None = None,
+    port: str | RehearsedPort | None = None,
     *,
     force: bool = False,
     stoppable: bool = True,
@@ -114,7 +117,8 @@ def execute(
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
     ``port`` is a device or a URL, ``1-8=PORT,9-16=PORT`` where segments of the chain are on ports
-    of their own, or ``robot``, whose file says so; a port ``sim`` has simulated servos.
+    of their own, or ``robot``, whose file says so; a port ``sim`` has simulated servos. A
+    ``RehearsedPort`` serves a simulated robot in this process as if it were real.
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
@@ -135,9 +139,11 @@ def execute(
 
     """
     refuse_another_run(folder, force)
+    rehearsed = None if isinstance(port, str | None) else port
+    name = port if isinstance(port, str | None) else port.name
     run = _Execution(
-        prepared, folder, port, view, shadow, confirm, stop_requested, waypoint_commands,
-        on_progress, on_event,
+        prepared, folder, name, rehearsed, view, shadow, confirm, stop_requested,
+        waypoint_commands, on_progress, on_event,
     )  # fmt: skip
     return run.carry_out(stoppable=stoppable)
 
@@ -149,6 +155,7 @@ class _Execution:
     prepared: PreparedRun
     folder: Path
     port: str | None
+    rehearsed: RehearsedPort | None
     view: Watcher | None
     shadow: bool
     confirm: Callable[[str], bool] | None
@@ -160,7 +167,7 @@ class _Execution:
     def carry_out(self, *, stoppable: bool) -> Finished:
         """Check the plan, open backend, stop button and log, and run."""
         prepared, port, view = self.prepared, self.port, self.view
-        robot = on_ports(prepared.robot, port)
+        robot = prepared.robot if self.rehearsed else on_ports(prepared.robot, port)
         body_simulated = port is None or is_split(robot)
         _check(prepared, metal=not body_simulated, shadow=self.shadow)
         plan = prepared.check_plan()
@@ -195,7 +202,9 @@ class _Execution:
                 torque_constant_n_m_a=torque_constant_n_m_a,
                 winding=winding,
                 pose_evidence=evidence,
-                port_is_pseudo_terminal=is_pseudo_terminal(ports),
+                port_is_pseudo_terminal=(
+                    is_pseudo_terminal(ports) if self.rehearsed is None else True
+                ),
             )
             outcome, pose, mapped, source = self._loop(robot, backend, log, button, initial_pose)
         LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
@@ -204,6 +213,8 @@ class _Execution:
 
     def _backend(self, robot: RobotConfig, initial_pose: InitialPose | None) -> Backend:
         prepared, port = self.prepared, self.port
+        if self.rehearsed is not None:
+            return self.rehearsed.open(prepared.run, robot)
         if initial_pose is None:
             return metal(prepared.run, robot, port or "")
         make = simulated if port is None else split
@@ -235,6 +246,7 @@ class _Execution:
         with (
             pose_provider(prepared, backend, log_event, **shown) as pose,
             map_provider(prepared, backend, pose.measure, self.folder, log_event) as mapped,
+            _stop_output(safety, backend) as output,
         ):
             source = prepared.make_source(log_event)
             friction = _second_body(prepared, source, backend)
@@ -247,13 +259,15 @@ class _Execution:
                 self._recovery(backend, warn),
                 observers.with_stop(self.stop_requested, button),
                 lambda text: warn("safety", text),
+                TripHold.from_config(robot, safety),
+                output,
             )
             start = initial_pose if self.port is None else None
             beside = _shadow(prepared, start, log, self.on_event) if self.shadow else None
             drive = Drive(
                 link=link,
                 clock=clock,
-                sensors=Sensors(mapped.measure, backend.wire_busy_s, backend.energy),
+                sensors=Sensors(mapped.measure, backend.wire_busy_s, backend.energy, pose.health),
                 motion=source,
                 log=log,
                 robot=prepared.robot,
@@ -265,7 +279,8 @@ class _Execution:
                 on_event=self.on_event,
             )
             with _end_told(link, log, clock):
-                with raised_priority() if self.port is not None else nullcontext():
+                on_wire = self.port is not None and self.rehearsed is None
+                with raised_priority() if on_wire else nullcontext():
                     outcome = drive.run()
                 if button is not None:
                     button.end(outcome.tripped or "it had come to its end")
@@ -283,6 +298,17 @@ class _Execution:
             confirm=self.confirm,
             on_event=lambda text: warn("recovery", text),
         )
+
+
+def _stop_output(
+    safety: SafetyConfig, backend: Backend
+) -> AbstractContextManager[StopOutput | None]:
+    """The run's stop output; that of a simulated bench opens its supply."""
+    if safety.stop_output is None:
+        return nullcontext()
+    if backend.open_supply is not None:
+        return StopCall("simulated supply", backend.open_supply)
+    return parse_stop_output(safety.stop_output)
 
 
 def _live(

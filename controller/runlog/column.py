@@ -26,7 +26,7 @@ Kind = Literal["exact", "rounded", "integer", "flag", "text", "joints", "points"
 """``exact`` floats keep every digit, ``rounded`` ones six decimals; ``joints`` are indices of some
 joints, ``points`` lists of coordinates, ``object`` is any JSON."""
 Watched = Literal["all", "newest", ""]
-UNITS: Final = ("rad_s", "m_s", "rad", "a", "s", "m", "c", "v", "j")
+UNITS: Final = ("rad_s", "m_s", "rad", "ah", "a", "s", "m", "c", "v", "j")
 """Suffixes of names that are units; the longest comes first."""
 JOINT, LINK, ANY = "joint", "link", "any"
 """Sizes that differ from robot to robot, and from row to row."""
@@ -48,6 +48,7 @@ class Panel(StrEnum):
     CYCLE = "in a cycle, ms"
     HEAT = "hottest servo, °C"
     SUPPLY = "lowest supply, V"
+    CHAIN = "whole chain, A"
     FRICTION = "estimated friction"
     JOINT_ANGLE = "joint's angle, rad"
     """Of the joint that the reader of the page selects."""
@@ -137,6 +138,8 @@ class Topic:
     """Whether rows are printed with a fixed number of digits, which is quicker."""
     only_changes: bool
     """Whether a row that differs from the last one only in time is left out."""
+    is_optional: bool
+    """Whether a log has the topic only if it has a row."""
     watched: Watched
     """Rows that a page and a ROS node receive: all, the newest, or none."""
 
@@ -175,7 +178,12 @@ _registered: list[type[Table]] = []
 
 @dataclass_transform(frozen_default=True)
 def topic(
-    name: str, *, is_fast: bool = False, only_changes: bool = False, watched: Watched = "newest"
+    name: str,
+    *,
+    is_fast: bool = False,
+    only_changes: bool = False,
+    is_optional: bool = False,
+    watched: Watched = "newest",
 ) -> Callable[[type[T]], type[T]]:
     """Return a decorator that makes a class the table of a topic and registers it."""
 
@@ -183,7 +191,7 @@ def topic(
         table = dataclass(frozen=True, slots=True)(made)
         hints = get_type_hints(table, include_extras=True)
         columns = {each.name: _column(hints[each.name]) for each in fields(table)}  # type: ignore[arg-type]
-        table.topic = Topic(name, columns, is_fast, only_changes, watched)
+        table.topic = Topic(name, columns, is_fast, only_changes, is_optional, watched)
         _registered.append(table)
         return table
 

@@ -16,11 +16,13 @@ from snakewalk.controller.runlog.encode import array, exact, floats, number, thi
 from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
 from snakewalk.controller.runlog.topics import (
     FORMAT,
+    BatteryTable,
     CycleTable,
     EventTable,
     FrictionTable,
     ImuTable,
     PathTable,
+    PoseSourceTable,
     PoseTable,
     QposTable,
     ShadowTable,
@@ -197,9 +199,11 @@ class RunRecord:
     pose: PoseTable
     walk: WalkTable
     friction: FrictionTable
+    battery: BatteryTable
     qpos: QposTable
     shadow: ShadowTable
     imu: ImuTable
+    pose_source: PoseSourceTable
     paths: tuple[tuple[float, Floats], ...]
     """Paths in force from a time on; the first is the plan's, at 0."""
     waypoints: tuple[tuple[float, Floats], ...]

@@ -61,14 +61,18 @@ class RunLog:
         self._channels: dict[type[Table], int] = {}
         self._printers: dict[type[Table], RowPrinter] = {}
         for table in TABLES:
-            topic = table.topic
-            schema = self._writer.register_schema(topic.schema_name, "jsonschema", topic.schema)
-            self._channels[table] = self._writer.register_channel(topic.name, "json", schema)
-            self._printers[table] = RowPrinter(topic)
+            if not table.topic.is_optional:
+                self._register(table)
         self._flushed_s = 0.0
         self._last_rows: dict[type[Table], bytes] = {}
         """Newest row of each topic that holds only changes, without its time."""
         self._has_cycles = False
+
+    def _register(self, table: type[Table]) -> None:
+        topic = table.topic
+        schema = self._writer.register_schema(topic.schema_name, "jsonschema", topic.schema)
+        self._channels[table] = self._writer.register_channel(topic.name, "json", schema)
+        self._printers[table] = RowPrinter(topic)
 
     def __enter__(self) -> Self:
         """Start at once."""
@@ -199,6 +203,8 @@ class RunLog:
             self._writer.flush()
 
     def _write(self, table: type[Table], time_s: float, row: Mapping[str, Any]) -> None:
+        if table not in self._channels:
+            self._register(table)
         stamp_ns, data = round(time_s * 1e9), self._printers[table].row(row).encode()
         self._writer.add_message(self._channels[table], stamp_ns, data, publish_time=stamp_ns)
         if self._on_row is not None:

@@ -1,10 +1,11 @@
 """One run: link, motion, log and alarms joined in the loop; the same on metal and in simulation."""
 
 import gc
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,8 +19,10 @@ from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progre
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.topics import (
+    BatteryTable,
     FrictionTable,
     PathTable,
+    PoseSourceTable,
     PoseTable,
     WalkTable,
     WaypointTable,
@@ -28,11 +31,12 @@ from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor
 from snakewalk.controller.runtime.loop import Tick, ticks
+from snakewalk.controller.runtime.pose_hold import PoseHealth, PoseHold
 from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
-from snakewalk.drivers.link import VettedLink
+from snakewalk.drivers.link import HoldingLink, LoadedLink, VettedLink
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
@@ -73,6 +77,8 @@ def _no_long_collections() -> Iterator[None]:
 
 PoseSource = Callable[[JointState], BodyPose]
 _SETTLE_S = 0.3
+BATTERY_S = 1.0
+"""Time between two rows of the supply (ours)."""
 _LATCHED = suppress(SafetyTrippedError)
 
 
@@ -142,6 +148,8 @@ class Sensors:
     """Time that bytes have spent on the wire so far; NaN if it is not counted."""
     energy: Callable[[], MotorEnergy] = MotorEnergy
     """Energy that the motors have drawn and delivered so far."""
+    pose_health: PoseHealth | None = None
+    """Whether the pose can be trusted; None of a source that is always believed."""
 
 
 class Drive:
@@ -165,6 +173,8 @@ class Drive:
     ) -> None:
         self._observer = observer
         self._link, self._clock, self._pose = link, clock, sensors.pose
+        health = sensors.pose_health
+        self._pose_hold = None if health is None else PoseHold(health, self._on_pose)
         self._motion, self._path = motion, path_progress(motion)
         self._open = motion if isinstance(motion, OpenWaypoints) else None
         self._waypoints_m = None if self._open is None else self._open.waypoints_m
@@ -173,7 +183,9 @@ class Drive:
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
         self._roll_monitor = RollMonitor()
         self._friction_monitor = friction
-        self._derating = Derating(run.safety, robot, self._on_derating)
+        self._load = link.load if isinstance(link, LoadedLink) else None
+        self._battery_s = -math.inf
+        self._derating = Derating(run.safety, robot, self._on_derating, self._load)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = sensors.wire_busy_s
@@ -220,7 +232,7 @@ class Drive:
                 pose = self._pose(state)
                 view = spine.in_world(pose, state.position_rad)
                 self._displacement_m = (
-                    view.advance_since_m(self._last) if self._last is not None else 0.0
+                    view.unbiased_advance_since_m(self._last) if self._last is not None else 0.0
                 )
                 self._find_friction(view)
                 if self._run.waypoints_m:  # gaits may roll as they please
@@ -231,22 +243,19 @@ class Drive:
                     sent = self._link.last_verdict
                     before_rad = state.position_rad if sent is None else sent.goal_rad
                     rate = self._derating.update(state, before_rad, period_s)
-                    goal = self._steer(period_s * rate, view)
+                    goal = self._steer_or_hold(period_s, rate, view)
                     if self._compliance is not None:
                         goal = self._compliance.step(goal, state, period_s)
                 self._send(tick, state, pose, view, goal)
-                if self._link.tripped or motion.done:
+                if self._link.tripped or motion.done or self._pose_failure:
                     break
-            tripped = self._link.tripped
+            tripped = self._link.tripped or self._pose_failure
             if tripped:
                 log.event(clock.now_s(), "trip", tripped, "error")
-        if not self._run.waypoints_m:
-            end = "the motion came to its end" if motion.done else "the motion was cut off"
-        elif path.reached == self._waypoints:
-            end = "every waypoint reached"
-        else:
-            end = f"{path.reached} waypoints reached"
-        log.event(clock.now_s(), "stop", f"torque off; {end}")
+            if self._link.tripped:
+                self._hold_out(period_s)
+                tripped = self._link.tripped
+        log.event(clock.now_s(), "stop", f"torque off; {self._end_text()}")
         duration_s = clock.now_s() - start_s
         return Outcome(
             path.reached,
@@ -256,6 +265,51 @@ class Drive:
             tripped,
             self._waypoints,
             self._derating.least,
+        )
+
+    def _end_text(self) -> str:
+        reached = self._path.reached
+        if not self._run.waypoints_m:
+            is_done = self._motion.done
+            return "the motion came to its end" if is_done else "the motion was cut off"
+        if reached == self._waypoints:
+            return "every waypoint reached"
+        return f"{reached} waypoints reached"
+
+    def _hold_out(self, period_s: float) -> None:
+        """Go on reading while a trip holds the body, until its torque is off."""
+        link, log = self._link, self._log
+        if not isinstance(link, HoldingLink):
+            return
+        for tick in ticks(self._clock, period_s, lambda: math.inf if link.is_holding else -1.0):
+            with _LATCHED:
+                state = link.read()
+                log.cycle(
+                    *(tick.deadline_s, state.position_rad, state.position_rad, state),
+                    deadline_s=tick.deadline_s,
+                    lateness_s=tick.lateness_s,
+                    wire_busy_s=math.nan,
+                    **self._energy()._asdict(),
+                    yield_rad=None,
+                    verdict="veto",
+                    reason=link.tripped or "",
+                    joints=[],
+                )
+
+    def _log_battery(self, time_s: float, state: JointState) -> None:
+        """Log supply and load once a second."""
+        load = self._load
+        if load is None or time_s < self._battery_s + BATTERY_S:
+            return
+        self._battery_s = time_s
+        known_v = state.voltage_v[np.isfinite(state.voltage_v)]
+        self._log.add(
+            BatteryTable,
+            time_s,
+            voltage_v=float(known_v.max()) if len(known_v) else math.nan,
+            current_a=load.current_a,
+            charge_ah=load.charge_ah,
+            winding_c=load.winding_c(state),
         )
 
     def _find_friction(self, view: BodyView) -> None:
@@ -289,6 +343,23 @@ class Drive:
         self._log.event(self._clock.now_s(), kind, text, "warning")
         self._on_event(kind, text)
 
+    def _on_pose(self, level: Literal["info", "warning"], text: str) -> None:
+        self._log.event(self._clock.now_s(), "pose", text, level)
+        self._on_event("pose", text)
+
+    @property
+    def _pose_failure(self) -> str | None:
+        return None if self._pose_hold is None else self._pose_hold.failure
+
+    def _steer_or_hold(self, period_s: float, rate: float, view: BodyView) -> Floats:
+        """Return the goals of this cycle; without a pose the motion pauses."""
+        hold = self._pose_hold
+        if hold is not None:
+            rate *= hold.rate(self._clock.now_s(), period_s)
+            if hold.is_held:
+                return self._motion.goal_rad()
+        return self._steer(period_s * rate, view)
+
     def _steer(self, period_s: float, view: BodyView) -> Floats:
         path, log, now_s = self._path, self._log, self._clock.now_s()
         reached, missed = path.reached, path.missed
@@ -320,7 +391,11 @@ class Drive:
         if self._slip_monitor.update(path.pulse_m_s * period_s, self._displacement_m):
             self._alarms += 1
             share = self._slip_monitor.window.share if self._slip_monitor.window else float("nan")
-            text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
+            text = f"the body moves {share:.0%} of the predicted distance"
+            if self._friction_monitor is not None and self._friction_monitor.confirms_file:
+                text += "; the friction found is that of the world's file, so it is not the ground"
+            else:
+                text += ": is the ground too slippery?"
             log.event(now_s, "alarm", text, "warning")
         return goal
 
@@ -349,6 +424,7 @@ class Drive:
             reason=self._link.tripped or "",
             joints=clamped,
         )
+        self._log_battery(tick.deadline_s, state)
         if self._observer is not None and not self._link.tripped:
             self._observer.step(tick.deadline_s, sent_rad, state)
         self._measure_speed()
@@ -367,6 +443,8 @@ class Drive:
             path_s_m=along_m,
             target=path.reached,
         )
+        if self._pose_hold is not None:
+            self._log.add(PoseSourceTable, tick.deadline_s, **self._pose_hold.health.row())
         self._last = view
         self._on_progress(
             Progress(

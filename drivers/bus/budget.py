@@ -4,6 +4,7 @@ A cycle is one sync write and one sync read, or *fast* sync read, of N servos. E
 bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from snakewalk.config.robot import RobotConfig
@@ -185,3 +186,26 @@ def _reply_bytes(servos: int, length: int, *, fast: bool) -> int:
     if fast:
         return FAST_HEAD_BYTES + servos * (FAST_PART_BYTES + length)
     return servos * (STATUS_BYTES + length)
+
+
+def plain_reads_text(
+    budget: WireBudget, rate_hz: float | None, failures: int, ports: Sequence[str]
+) -> str:
+    """Return the report that fast reads were given up.
+
+    Args:
+        budget: of plain reads.
+        rate_hz: rate of the control cycles; None: unknown.
+        failures: fast reads that failed in a row.
+        ports: those that gave up; empty for a bus with one port.
+
+    """
+    line = f"fast sync reads given up after {failures} failures in a row, plain from now on"
+    if ports:
+        line = f"{', '.join(ports)}: {line}"
+    if rate_hz is None or budget.share(rate_hz) <= 1.0:
+        return line
+    return (
+        f"{line}: the wire carries at most {budget.limit_hz:.0f} Hz of plain reads, not "
+        f"{rate_hz:g} Hz: cycles will be late"
+    )

@@ -48,6 +48,8 @@ class FollowingError:
         self._since_s, self._idle_s = self._memory
         self.joint = -1
         """Joint of the newest reason to stop."""
+        self.is_idle = False
+        """Whether that reason is a motor that does not push."""
         self.reset()
 
     def reset(self) -> None:
@@ -66,7 +68,8 @@ class FollowingError:
         if joint < 0:
             return None
         self.joint = joint
-        if self._idle_s[joint] >= IDLE_TIME_S:
+        self.is_idle = bool(self._idle_s[joint] >= IDLE_TIME_S)
+        if self.is_idle:
             return self._idle_fault(state, goal_rad, joint)
         for_s = state.time_s - self._since_s[joint]
         if not for_s >= self._limits.following_time_s:

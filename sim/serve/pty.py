@@ -122,6 +122,10 @@ class PtyServer:
         self._offset_s += self._clock.now_s() * (self._pace - _checked_pace(pace))
         self._pace = pace
 
+    def real_time_s(self, line_s: float) -> float:
+        """Return the time of the server's clock at a time of the line."""
+        return (line_s - self._offset_s) / self._pace
+
     def serve(self, stopped: Callable[[], bool]) -> None:
         """Serve until ``stopped()``, which is asked at least every ``IDLE_S``."""
         while not stopped():

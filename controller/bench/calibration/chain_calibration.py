@@ -70,7 +70,7 @@ class ChainCalibration:
 
     robot: RobotConfig
     ranges: tuple[JointRange, ...]
-    """Of each joint, head first; empty if no range was swept."""
+    """One value per joint, head first; empty if no range was swept."""
     notes: tuple[str, ...]
     """What a person should look at: joints with less range than the others, or without a stop."""
 

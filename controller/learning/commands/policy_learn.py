@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.learning.wave_search import (
     SearchProgress,
     search_progress,
@@ -22,6 +22,7 @@ from snakewalk.controller.learning.wave_search import (
 @command(
     "policy learn",
     examples=("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+    results=("out",),
 )
 def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
@@ -48,7 +49,6 @@ def learn_policy(
     """
     if out.suffix != ".toml":
         raise InputError(f"{out}: a policy's file ends in .toml")
-    refuse_to_overwrite([out], force)
     part_file = out.with_name(f"{out.name}.part")
     progress = search_progress(
         robot=robot, world=world, population=population, steps=steps, seed=seed

@@ -110,7 +110,7 @@ def commands(group: Any, path: str = "snakewalk") -> dict[str, set[str]]:
 
 
 def test_a_command_does_not_build_the_options_of_all(mocker: MockerFixture) -> None:
-    built = mocker.spy(command_line, "with_messages")
+    built = mocker.spy(command_line, "called")
     assert CliRunner().invoke(app, ["--help"]).exit_code == 0
     assert built.call_count == 0
     assert CliRunner().invoke(app, ["schema", "run"]).exit_code == 0

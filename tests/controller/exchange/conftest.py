@@ -12,8 +12,10 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
 from snakewalk.controller.runlog.topics import (
+    BatteryTable,
     FrictionTable,
     PathTable,
+    PoseSourceTable,
     PoseTable,
     QposTable,
     ShadowTable,
@@ -96,12 +98,18 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 centre_m=body.centre_m,
             )
             file.add(ShadowTable, time_s, position_rad=angles / 2.0, current_a=angles / 5.0)
+        source = {"position_sd_m": 0.01, "heading_sd_rad": 0.02, "latency_s": 0.1}
+        source |= {"age_s": 0.12, "arrival_s": 0.25}
+        file.add(PoseSourceTable, 0.3, sequence=4, fault="jump by 0.50 m", **source)
         file.add(WaypointTable, 0.2, waypoints_m=[[2.0, 1.0], [0.0, 3.0]])
         file.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
         walk = {"heading_error_rad": 0.2, "ramp_rad": -0.1, "eta_q": 0.7}
         file.add(WalkTable, 0.3, state=5, visited=2, candidates=4, **walk)
         friction = {"along_95": (0.11, 0.15), "across_95": (0.5, 0.6)}
         file.add(FrictionTable, 0.3, along=0.13, across=0.56, **friction)
+        windings = angles + 40.0
+        load = {"voltage_v": 11.8, "current_a": 1.5, "charge_ah": 0.01, "winding_c": windings}
+        file.add(BatteryTable, 0.3, **load)
         file.add(QposTable, 0.3, qpos=np.arange(7 + joints) / 7.0)
         file.event(0.38, "trip", "joint 7: current", level="error")
     return path
