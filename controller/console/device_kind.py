@@ -4,11 +4,15 @@ import os
 import stat
 from pathlib import Path
 
-from snakewalk.config.robot import SIMULATED
 from snakewalk.drivers.errors import PortError
 
-_OF_THE_FILE = "robot"
-"""Name for the ports in the robot's file."""
+try:
+    import termios
+except ImportError:  # Windows: opening a port reports what to do there
+    termios = None  # type: ignore[assignment]
+
+_NO_DEVICES = ("sim", "robot")
+"""Names for simulated servos, and for the ports in the robot's file."""
 _PSEUDO_TERMINALS = range(136, 144)
 """Major numbers of Linux's pseudo-terminals, which have no entry below ``/sys/dev/char``."""
 
@@ -32,7 +36,7 @@ def check_port_name(port: str | None) -> str | None:
 
 
 def _fault(name: str) -> str | None:
-    if name in (SIMULATED, _OF_THE_FILE):
+    if termios is None or name in _NO_DEVICES:
         return None
     path = Path(name)
     if path.is_symlink() and not path.exists():

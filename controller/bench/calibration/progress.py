@@ -70,12 +70,12 @@ class Journal:
     """Progress of a calibration that is going on, and the function that saves it."""
 
     known: CalibrationProgress
-    save: Callable[[CalibrationProgress], None] = lambda progress: None
+    on_change: Callable[[CalibrationProgress], None] = lambda progress: None
 
     def note(self, **found: object) -> None:
         """Add to the progress, and save it."""
         self.known = self.known.model_copy(update=found)
-        self.save(self.known)
+        self.on_change(self.known)
 
 
 class ProgressFile:
