@@ -33,6 +33,9 @@ MODULES = tuple(
         "repertoire",
         "support",
         "gym_steps",
+        "startup",
+        "busy_calibrations",
+        "light_install",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

@@ -30,6 +30,23 @@ class LoadEstimate(Protocol):
 
 
 @runtime_checkable
+class CheckingLink(Protocol):
+    """A link that compares the servos with the values written to them, once a cycle."""
+
+    checks_in_read: bool
+    """Whether ``read`` makes the check; False for a caller of ``check_servos``."""
+
+    def check_servos(self) -> None:
+        """Make the check of this cycle, once its goals are sent.
+
+        Raises:
+            DriverError: a servo is not as it was set.
+
+        """
+        ...
+
+
+@runtime_checkable
 class SoftLink(Protocol):
     """A link whose joints can hold with low currents."""
 

@@ -134,6 +134,12 @@ class RobotConfig(JointValues):
         return self
 
     @model_validator(mode="after")
+    def _tracked_body_is_on_the_spine(self) -> Self:
+        if self.pose is not None and self.pose.link >= self.link_count:
+            raise ValueError(f"pose: link {self.pose.link} of {self.link_count}: 0 is the head")
+        return self
+
+    @model_validator(mode="after")
     def _power_is_for_the_chain(self) -> Self:
         if self.power is None:
             return self
@@ -257,10 +263,12 @@ class RobotConfig(JointValues):
 
     @model_serializer(mode="wrap")
     def _without_empty_records(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave the key out of files and logs of robots with shipped models only."""
+        """Leave out the keys that most robots lack, in files and logs."""
         data: dict[str, Any] = handler(self)
         if not self.described_models:
             data.pop("described_models", None)
+        if self.pose is None:
+            data.pop("pose", None)
         return data
 
     if not TYPE_CHECKING:

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import StereoHeadConfig
+from snakewalk.config.pose import PoseConfig
 from snakewalk.config.robot.imu import ImuConfig
 from snakewalk.config.robot.joints import JointConfig
 from snakewalk.config.robot.limbs import LimbsConfig
@@ -65,6 +66,11 @@ class RobotKeys(Strict):
     imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
     stereo_head: StereoHeadConfig | None = Field(
         None, description="a table [stereo_head]; default: there is none"
+    )
+    pose: PoseConfig | None = Field(
+        None,
+        description="a table [pose]: the tracked body of an external pose source; default: the "
+        "head link's centre in the world of the run",
     )
     power: PowerConfig | None = Field(
         None, description="a table [power]; default: the cables between servos take nothing"

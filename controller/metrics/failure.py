@@ -20,6 +20,9 @@ CLAMP_SHARE = 0.2
 """Share of cycles with a clamped goal from which on the joints do not follow (ours)."""
 PROGRESS_SHARE = 0.5
 """Progress along the path over advance of the body, below which it goes elsewhere (ours)."""
+CLIMBED_RAD = float(np.radians(15.5))
+"""Steepest ground that the walk is known to climb: 20 of 20 runs complete a plane of 15 degrees
+(docs/terrain.md)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +93,13 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     progress = float(remaining[0] - remaining[-1])
     travelled = float(advanced * (times[-1] - times[0]))
     if progress < PROGRESS_SHARE * travelled:
+        steep_rad = _steepest_ahead_rad(record, float(np.median(pose.path_s_m[rows])))
+        if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
+            return Failure(
+                "climb",
+                f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path, which "
+                f"climbs by {np.degrees(steep_rad):.0f} deg there",
+            )
         error = path_error_m(record)[rows]
         return Failure(
             "steering",
@@ -103,6 +113,24 @@ def _up_rad(links_m: Floats) -> Floats:
     """Inclination (n,) of the line from tail to head of links (n, L, 3); positive uphill."""
     x, y, z = np.moveaxis(links_m[:, 0] - links_m[:, -1], -1, 0)
     return np.asarray(np.arctan2(z, np.hypot(x, y)))
+
+
+def _steepest_ahead_rad(record: RunRecord, along_m: float) -> float:
+    """Steepest inclination of the path over a body length from an arc length on, uphill positive.
+
+    Between points of the path a quarter of a body length apart; 0 without a ground or a path.
+    """
+    ground, length = record.header.ground, record.header.robot.length_m
+    if ground is None or not record.paths or not np.isfinite(along_m):
+        return 0.0
+    path_m = record.paths[-1][1][:, :2]
+    at_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(path_m, axis=0).T)))
+    due_m = np.clip(along_m + 0.25 * length * np.arange(5), 0.0, at_m[-1])
+    x, y = (np.interp(due_m, at_m, path_m[:, axis]) for axis in range(2))
+    steps_m = np.diff(due_m)
+    rises_m = np.diff(ground.elevation_m(x, y))
+    known = steps_m > 1e-6
+    return float(np.arctan(rises_m[known] / steps_m[known]).max(initial=0.0))
 
 
 def _holds_rad(record: RunRecord) -> float:

@@ -6,6 +6,8 @@ from typing import Final
 
 from snakewalk.controller.motion.command import TIMEOUT_S
 
+READY: Final = b"ready"
+"""First message of a process with a node that passes poses on."""
 _RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _SAYS_WHERE: Final = (_RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 

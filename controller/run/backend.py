@@ -9,19 +9,20 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import with_keys
 from snakewalk.config.robot import SIMULATED, RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.pose.sample import PoseFeed
 from snakewalk.controller.run.deviation import Deviation
+from snakewalk.controller.run.external.served_robot import physics_modules, simulated_line
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -42,6 +43,9 @@ from snakewalk.sim.plant import Mounting
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import motors_of
 from snakewalk.sim.servo.protection import SupplyAndAmbient
+
+if TYPE_CHECKING:
+    from snakewalk.sim.physics.plant import MujocoPlant
 
 FILE_PORTS: Final = "robot"
 """``--port`` of a robot whose file names the ports of its segments."""
@@ -68,6 +72,21 @@ class Backend:
     """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
     open_supply: Callable[[], None] | None = None
     """Opens the supply of all servos; None if some of them are real."""
+    poses: PoseFeed | None = None
+    """Poses that arrive at a rehearsal in simulated time, in place of real datagrams."""
+
+
+class RehearsedPort(Protocol):
+    """A port of simulated servos in this process and in simulated time, in place of a real one."""
+
+    @property
+    def name(self) -> str:
+        """Name of the port, for the log."""
+        ...
+
+    def open(self, run: RunConfig, robot: RobotConfig) -> Backend:
+        """Open the port; nothing of the simulation but its bytes and datagrams is known."""
+        ...
 
 
 class _SimulatedBody:
@@ -81,10 +100,8 @@ class _SimulatedBody:
         ground: HeightField | None,
         deviation: Deviation,
     ) -> None:
-        require_extra("simulated servos need", "mujoco")
-        from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
-
-        self.plant = plant.MujocoPlant(
+        plant, twin = physics_modules()
+        self.plant: MujocoPlant = plant.MujocoPlant(
             deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
         )
         self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
@@ -119,16 +136,7 @@ def simulated(
     body = made.plant
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
-    servo = robot.servo
-    line = SimLine(
-        ServoBank(robot.servo_ids, robot.servo_records, servo.baud),
-        body,
-        baud=servo.baud,
-        mounting=deviation.mounting(robot),
-        motors=motors_of(robot),
-        supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=made.imu(),
-    )
+    line = simulated_line(robot, body, deviation, made.imu())
     chain = ServoChain(
         DynamixelBus(line, robot.models_by_id),
         robot.model_copy(update={"ports": ()}),  # here they are on one wire
@@ -144,8 +152,6 @@ def simulated(
         line.firmware.hold_position()
 
     drive = line.firmware.drive
-    if deviation.torque is not None:
-        drive.torque_constant_n_m_a[:] *= deviation.torque
     return Backend(
         "sim",
         chain,

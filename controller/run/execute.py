@@ -20,6 +20,7 @@ from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (
     Backend,
+    RehearsedPort,
     is_pseudo_terminal,
     is_split,
     metal,
@@ -101,7 +102,7 @@ class Finished:
 def execute(
     prepared: PreparedRun,
     folder: Path,
-    port: str | None = None,
+    port: str | RehearsedPort | None = None,
     *,
     force: bool = False,
     stoppable: bool = True,
@@ -116,7 +117,8 @@ def execute(
     """Run on ``port``, or on the simulator where it is None; nothing else differs.
 
     ``port`` is a device or a URL, ``1-8=PORT,9-16=PORT`` where segments of the chain are on ports
-    of their own, or ``robot``, whose file says so; a port ``sim`` has simulated servos.
+    of their own, or ``robot``, whose file says so; a port ``sim`` has simulated servos. A
+    ``RehearsedPort`` serves a simulated robot in this process as if it were real.
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
@@ -137,9 +139,11 @@ def execute(
 
     """
     refuse_another_run(folder, force)
+    rehearsed = None if isinstance(port, str | None) else port
+    name = port if isinstance(port, str | None) else port.name
     run = _Execution(
-        prepared, folder, port, view, shadow, confirm, stop_requested, waypoint_commands,
-        on_progress, on_event,
+        prepared, folder, name, rehearsed, view, shadow, confirm, stop_requested,
+        waypoint_commands, on_progress, on_event,
     )  # fmt: skip
     return run.carry_out(stoppable=stoppable)
 
@@ -151,6 +155,7 @@ class _Execution:
     prepared: PreparedRun
     folder: Path
     port: str | None
+    rehearsed: RehearsedPort | None
     view: Watcher | None
     shadow: bool
     confirm: Callable[[str], bool] | None
@@ -162,7 +167,7 @@ class _Execution:
     def carry_out(self, *, stoppable: bool) -> Finished:
         """Check the plan, open backend, stop button and log, and run."""
         prepared, port, view = self.prepared, self.port, self.view
-        robot = on_ports(prepared.robot, port)
+        robot = prepared.robot if self.rehearsed else on_ports(prepared.robot, port)
         body_simulated = port is None or is_split(robot)
         _check(prepared, metal=not body_simulated, shadow=self.shadow)
         plan = prepared.check_plan()
@@ -197,7 +202,9 @@ class _Execution:
                 torque_constant_n_m_a=torque_constant_n_m_a,
                 winding=winding,
                 pose_evidence=evidence,
-                port_is_pseudo_terminal=is_pseudo_terminal(ports),
+                port_is_pseudo_terminal=(
+                    is_pseudo_terminal(ports) if self.rehearsed is None else True
+                ),
             )
             outcome, pose, mapped, source = self._loop(robot, backend, log, button, initial_pose)
         LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
@@ -206,6 +213,8 @@ class _Execution:
 
     def _backend(self, robot: RobotConfig, initial_pose: InitialPose | None) -> Backend:
         prepared, port = self.prepared, self.port
+        if self.rehearsed is not None:
+            return self.rehearsed.open(prepared.run, robot)
         if initial_pose is None:
             return metal(prepared.run, robot, port or "")
         make = simulated if port is None else split
@@ -258,7 +267,7 @@ class _Execution:
             drive = Drive(
                 link=link,
                 clock=clock,
-                sensors=Sensors(mapped.measure, backend.wire_busy_s, backend.energy),
+                sensors=Sensors(mapped.measure, backend.wire_busy_s, backend.energy, pose.health),
                 motion=source,
                 log=log,
                 robot=prepared.robot,
@@ -270,7 +279,8 @@ class _Execution:
                 on_event=self.on_event,
             )
             with _end_told(link, log, clock):
-                with raised_priority() if self.port is not None else nullcontext():
+                on_wire = self.port is not None and self.rehearsed is None
+                with raised_priority() if on_wire else nullcontext():
                     outcome = drive.run()
                 if button is not None:
                     button.end(outcome.tripped or "it had come to its end")

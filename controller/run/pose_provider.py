@@ -20,6 +20,7 @@ from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.runtime.drive import OnEvent, PoseSource
+from snakewalk.controller.runtime.pose_hold import PoseHealth
 from snakewalk.drivers.types import BodyPose, JointState
 
 OnPicture = Callable[[Image, float], None]
@@ -131,6 +132,8 @@ class PoseProvider:
     measure: PoseSource
     source_facts: Callable[[], dict[str, float | int]] = dict
     """Numbers of the source itself, for example the frames of a camera."""
+    health: PoseHealth | None = None
+    """Whether the pose can be trusted; None of a source that is always believed."""
     error: PoseError | None = None
     """Set at the end of a run whose pose was estimated while the simulator knew the true one."""
 
@@ -270,7 +273,7 @@ class SimulatorPose(_Reckoned):
         """Return a fault where servos are on a port."""
         if not on_port:
             return []
-        return ["pose: servos on a port have no simulator; take camera, imu or joints"]
+        return ["pose: servos on a port have no simulator; use udp, camera, imu or joints"]
 
 
 def _rms(values: Floats) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.drivers.bus.budget import robot_budget
+from snakewalk.drivers.bus.budget import check_ages, robot_budget
 from snakewalk.drivers.protocol.registers import CURRENT_POSITION_MODE
 
 GAIT_PITCH_SHARE = 0.75
@@ -33,11 +33,11 @@ def check_supply(robot: RobotConfig) -> None:
 
 
 def check_servos(run: RunConfig, robot: RobotConfig) -> None:
-    """Refuse a wrong supply, a cycle longer than its period, and a current that no servo reaches.
+    """Reject a wrong supply, a cycle that the bus cannot carry, and a current out of reach.
 
     Raises:
-        InputError: with the model's voltages; with the highest rate that fits; with the current at
-            which the model stalls.
+        InputError: with the model's voltages; with the highest rate that fits, or the age of the
+            values; with the current at which the model stalls.
 
     """
     check_supply(robot)
@@ -48,7 +48,14 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
             raise InputError(f"run {run.name}: {fault}") from None
     _check_hold(run, robot)
     _check_fuse(robot)
-    robot_budget(robot, robot.servo.baud, fast=True).check(run.cycle_hz)
+    budget, safety = robot_budget(robot, robot.servo.baud, fast=True), run.safety
+    budget.check(run.cycle_hz)
+    check_ages(
+        budget,
+        run.cycle_hz,
+        stale_limit_s=safety.stale_limit_s,
+        watchdog_s=safety.watchdog_s,
+    )
 
 
 def _check_hold(run: RunConfig, robot: RobotConfig) -> None:

@@ -138,6 +138,8 @@ class Topic:
     """Whether rows are printed with a fixed number of digits, which is quicker."""
     only_changes: bool
     """Whether a row that differs from the last one only in time is left out."""
+    is_optional: bool
+    """Whether a log has the topic only if it has a row."""
     watched: Watched
     """Rows that a page and a ROS node receive: all, the newest, or none."""
 
@@ -176,7 +178,12 @@ _registered: list[type[Table]] = []
 
 @dataclass_transform(frozen_default=True)
 def topic(
-    name: str, *, is_fast: bool = False, only_changes: bool = False, watched: Watched = "newest"
+    name: str,
+    *,
+    is_fast: bool = False,
+    only_changes: bool = False,
+    is_optional: bool = False,
+    watched: Watched = "newest",
 ) -> Callable[[type[T]], type[T]]:
     """Return a decorator that makes a class the table of a topic and registers it."""
 
@@ -184,7 +191,7 @@ def topic(
         table = dataclass(frozen=True, slots=True)(made)
         hints = get_type_hints(table, include_extras=True)
         columns = {each.name: _column(hints[each.name]) for each in fields(table)}  # type: ignore[arg-type]
-        table.topic = Topic(name, columns, is_fast, only_changes, watched)
+        table.topic = Topic(name, columns, is_fast, only_changes, is_optional, watched)
         _registered.append(table)
         return table
 

@@ -22,6 +22,7 @@ from snakewalk.controller.runlog.topics import (
     FrictionTable,
     ImuTable,
     PathTable,
+    PoseSourceTable,
     PoseTable,
     QposTable,
     ShadowTable,
@@ -202,6 +203,7 @@ class RunRecord:
     qpos: QposTable
     shadow: ShadowTable
     imu: ImuTable
+    pose_source: PoseSourceTable
     paths: tuple[tuple[float, Floats], ...]
     """Paths in force from a time on; the first is the plan's, at 0."""
     waypoints: tuple[tuple[float, Floats], ...]

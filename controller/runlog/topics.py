@@ -234,6 +234,20 @@ class PoseTable(Table):
     target: Annotated[Ints, Column("index of the next waypoint", "integer", default=0)]
 
 
+@topic("/pose_source", is_optional=True, watched="")
+class PoseSourceTable(Table):
+    """State of an external pose source; times are those of the cycles."""
+
+    time_s: Annotated[Floats, _TIME]
+    age_s: Annotated[Floats, _optional("since the newest pose that was used was measured")]
+    position_sd_m: Annotated[Floats, Column("standard deviation of the head's position")]
+    heading_sd_rad: Annotated[Floats, Column("standard deviation of its heading")]
+    latency_s: Annotated[Floats, Column("estimated delay that the stamps do not show")]
+    sequence: Annotated[Ints, Column("of the newest pose that was used", "integer", default=-1)]
+    arrival_s: Annotated[Floats, _optional("when the newest pose arrived")]
+    fault: Annotated[Texts, Column("why the pose is not trusted", "text", default="")]
+
+
 @topic("/path", watched="all")
 class PathTable(Table):
     """Paths that replaced the plan's, each in force from its time."""

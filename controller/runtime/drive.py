@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from snakewalk.controller.runlog.topics import (
     BatteryTable,
     FrictionTable,
     PathTable,
+    PoseSourceTable,
     PoseTable,
     WalkTable,
     WaypointTable,
@@ -30,6 +31,7 @@ from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor
 from snakewalk.controller.runtime.loop import Tick, ticks
+from snakewalk.controller.runtime.pose_hold import PoseHealth, PoseHold
 from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
@@ -146,6 +148,8 @@ class Sensors:
     """Time that bytes have spent on the wire so far; NaN if it is not counted."""
     energy: Callable[[], MotorEnergy] = MotorEnergy
     """Energy that the motors have drawn and delivered so far."""
+    pose_health: PoseHealth | None = None
+    """Whether the pose can be trusted; None of a source that is always believed."""
 
 
 class Drive:
@@ -169,6 +173,8 @@ class Drive:
     ) -> None:
         self._observer = observer
         self._link, self._clock, self._pose = link, clock, sensors.pose
+        health = sensors.pose_health
+        self._pose_hold = None if health is None else PoseHold(health, self._on_pose)
         self._motion, self._path = motion, path_progress(motion)
         self._open = motion if isinstance(motion, OpenWaypoints) else None
         self._waypoints_m = None if self._open is None else self._open.waypoints_m
@@ -226,7 +232,7 @@ class Drive:
                 pose = self._pose(state)
                 view = spine.in_world(pose, state.position_rad)
                 self._displacement_m = (
-                    view.advance_since_m(self._last) if self._last is not None else 0.0
+                    view.unbiased_advance_since_m(self._last) if self._last is not None else 0.0
                 )
                 self._find_friction(view)
                 if self._run.waypoints_m:  # gaits may roll as they please
@@ -237,23 +243,19 @@ class Drive:
                     sent = self._link.last_verdict
                     before_rad = state.position_rad if sent is None else sent.goal_rad
                     rate = self._derating.update(state, before_rad, period_s)
-                    goal = self._steer(period_s * rate, view)
+                    goal = self._steer_or_hold(period_s, rate, view)
                     if self._compliance is not None:
                         goal = self._compliance.step(goal, state, period_s)
                 self._send(tick, state, pose, view, goal)
-                if self._link.tripped or motion.done:
+                if self._link.tripped or motion.done or self._pose_failure:
                     break
+            tripped = self._link.tripped or self._pose_failure
+            if tripped:
+                log.event(clock.now_s(), "trip", tripped, "error")
             if self._link.tripped:
-                log.event(clock.now_s(), "trip", self._link.tripped, "error")
                 self._hold_out(period_s)
-            tripped = self._link.tripped
-        if not self._run.waypoints_m:
-            end = "the motion came to its end" if motion.done else "the motion was cut off"
-        elif path.reached == self._waypoints:
-            end = "every waypoint reached"
-        else:
-            end = f"{path.reached} waypoints reached"
-        log.event(clock.now_s(), "stop", f"torque off; {end}")
+                tripped = self._link.tripped
+        log.event(clock.now_s(), "stop", f"torque off; {self._end_text()}")
         duration_s = clock.now_s() - start_s
         return Outcome(
             path.reached,
@@ -264,6 +266,15 @@ class Drive:
             self._waypoints,
             self._derating.least,
         )
+
+    def _end_text(self) -> str:
+        reached = self._path.reached
+        if not self._run.waypoints_m:
+            is_done = self._motion.done
+            return "the motion came to its end" if is_done else "the motion was cut off"
+        if reached == self._waypoints:
+            return "every waypoint reached"
+        return f"{reached} waypoints reached"
 
     def _hold_out(self, period_s: float) -> None:
         """Go on reading while a trip holds the body, until its torque is off."""
@@ -332,6 +343,23 @@ class Drive:
         self._log.event(self._clock.now_s(), kind, text, "warning")
         self._on_event(kind, text)
 
+    def _on_pose(self, level: Literal["info", "warning"], text: str) -> None:
+        self._log.event(self._clock.now_s(), "pose", text, level)
+        self._on_event("pose", text)
+
+    @property
+    def _pose_failure(self) -> str | None:
+        return None if self._pose_hold is None else self._pose_hold.failure
+
+    def _steer_or_hold(self, period_s: float, rate: float, view: BodyView) -> Floats:
+        """Return the goals of this cycle; without a pose the motion pauses."""
+        hold = self._pose_hold
+        if hold is not None:
+            rate *= hold.rate(self._clock.now_s(), period_s)
+            if hold.is_held:
+                return self._motion.goal_rad()
+        return self._steer(period_s * rate, view)
+
     def _steer(self, period_s: float, view: BodyView) -> Floats:
         path, log, now_s = self._path, self._log, self._clock.now_s()
         reached, missed = path.reached, path.missed
@@ -363,7 +391,11 @@ class Drive:
         if self._slip_monitor.update(path.pulse_m_s * period_s, self._displacement_m):
             self._alarms += 1
             share = self._slip_monitor.window.share if self._slip_monitor.window else float("nan")
-            text = f"the body makes {share:.0%} of its predicted way: is the ground too slippery?"
+            text = f"the body moves {share:.0%} of the predicted distance"
+            if self._friction_monitor is not None and self._friction_monitor.confirms_file:
+                text += "; the friction found is that of the world's file, so it is not the ground"
+            else:
+                text += ": is the ground too slippery?"
             log.event(now_s, "alarm", text, "warning")
         return goal
 
@@ -411,6 +443,8 @@ class Drive:
             path_s_m=along_m,
             target=path.reached,
         )
+        if self._pose_hold is not None:
+            self._log.add(PoseSourceTable, tick.deadline_s, **self._pose_hold.health.row())
         self._last = view
         self._on_progress(
             Progress(

@@ -185,6 +185,11 @@ class FrictionMonitor:
                 self._use(friction)
         return found
 
+    @property
+    def confirms_file(self) -> bool:
+        """Whether the newest span that was judged agrees with the friction of the world's file."""
+        return self._held > 0
+
     def event_text(self) -> str | None:
         """A line when the friction that is reckoned with has changed notably since the last one."""
         used, reported = self._used, self._reported

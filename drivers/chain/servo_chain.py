@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.budget import WireBudget, robot_budget
+from snakewalk.drivers.bus.budget import WireBudget, plain_reads_text, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
@@ -91,6 +91,8 @@ class ServoChain:
         given up, and when replies get lost again and again."""
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
+        self.checks_in_read = True
+        """Whether ``read`` calls ``check_servos``; a ``SafeLink`` calls it after the goals."""
         self._bus = bus
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
@@ -110,6 +112,7 @@ class ServoChain:
         self._prepare_reads(fast=True)
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
+        self._has_time: bool | None = None
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
@@ -217,7 +220,7 @@ class ServoChain:
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
-        self._reads = 0
+        self._reads, self._has_time = 0, None
         self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
@@ -329,8 +332,8 @@ class ServoChain:
         Where no joint could be read nothing else is asked: that is put off to the next call.
 
         Raises:
-            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
-                has written to it), or its watchdog has stopped it or is not armed.
+            BusError: a servo holds another goal than the one sent to it; raised by
+                ``check_servos``, if ``checks_in_read``.
             PortError: the port is gone.
 
         """
@@ -347,7 +350,11 @@ class ServoChain:
         if read > 0:  # else what is asked beside it waits, too, and the state grows stale
             self._reads += 1
             is_alone = not self._read_slow(measured_at_s)
-            self._check_liveness(has_time=is_alone and reply.complete)
+            self._has_time = is_alone and reply.complete
+            if self._liveness is not None:
+                self._check(self._liveness.check_goals, self._has_time)
+            if self.checks_in_read:
+                self.check_servos()
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -376,20 +383,32 @@ class ServoChain:
             self.on_event(line)
         return measured_at_s
 
-    def _check_liveness(self, *, has_time: bool) -> None:
-        """Check torque, watchdogs, settings; where a servo tells an alarm, that is the reason.
+    def check_servos(self) -> None:
+        """Check torque, watchdogs and settings of the servos, one register in a cycle.
 
-        An alarm that switches a servo off may come between the group read and the check.
+        After a read without a reply there is no check.
 
-        Args:
-            has_time: the state is all that was read in this cycle, and all servos replied.
+        Raises:
+            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
+                has written to it), or its watchdog has stopped it or is not armed.
+            PortError: the port is gone.
 
         """
-        if not self._armed or self._liveness is None or self._readings.alert:
+        has_time, self._has_time = self._has_time, None
+        if has_time is not None and self._liveness is not None:
+            self._check(self._liveness.check, has_time)
+
+    def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> None:
+        """Make a check; an alarm of a servo is the reason for what the check finds.
+
+        An alarm that switches a servo off may come between the group read and the check.
+        """
+        if not self._armed or self._readings.alert:
             return
         try:
-            asked = self._liveness.check(self._reads - 1, has_time=has_time)
+            asked = check(self._reads - 1, has_time=has_time)
             if asked is not None:
+                self._has_time = None  # for another check in this cycle
                 self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
             self._take(self._cycle.read(), again=True)
@@ -436,20 +455,10 @@ class ServoChain:
         return robot_budget(self.robot, self._port.getBaudRate(), fast=fast)
 
     def _report_plain_reads(self) -> None:
-        """Tell that fast reads were given up, and whether the wire still carries the rate."""
         self._fast_reads = False
-        line = (
-            f"fast sync reads given up after {FAST_FAILURES} failures in a row, plain from now on"
-        )
-        if len(self._bus.parts) > 1:
-            line = f"{', '.join(self._cycle.given_up_on)}: {line}"
+        ports = self._cycle.given_up_on if len(self._bus.parts) > 1 else ()
         budget = self._budget(fast=False)
-        if self._rate_hz is not None and budget.share(self._rate_hz) > 1.0:
-            line += (
-                f": the wire carries at most {budget.limit_hz:.0f} Hz of plain reads, not "
-                f"{self._rate_hz:g} Hz: cycles will be late"
-            )
-        self.on_event(line)
+        self.on_event(plain_reads_text(budget, self._rate_hz, FAST_FAILURES, ports))
 
     def _send_goals(self, goal_rad: Floats) -> Int32s:
         goals = self._goals.encode(goal_rad)

@@ -11,7 +11,7 @@ from typing import Any
 
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
-from snakewalk.drivers.link import ExplainingLink, JointLink, SoftLink
+from snakewalk.drivers.link import CheckingLink, ExplainingLink, JointLink, SoftLink
 from snakewalk.drivers.safety.chain_load import ChainLoad
 from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
@@ -82,6 +82,10 @@ class SafeLink:
         """Interruptions and overloads that were recovered from."""
         self._tripped_by: str | None = None
         self._link = link
+        self._check_servos: Callable[[], None] = lambda: None
+        if isinstance(link, CheckingLink):
+            # after the goals, so that the time from a state to its goals is the same in all cycles
+            link.checks_in_read, self._check_servos = False, link.check_servos
         self._recovery = recovery
         self._limits = limits
         self._limits_at_start = replace(limits, voltage_time_s=0.0)
@@ -262,12 +266,13 @@ class SafeLink:
             self._refuse_if_tripped()
         try:
             self._link.write(JointCommand(command.time_s, verdict.goal_rad))
-        except DriverError as fault:
-            self._recover(str(fault), fault)
-        else:  # if the program stood still in between, the next step counts from here
+            # if the program stood still in between, the next step counts from here
             sent_s = self._clock.now_s()
             if sent_s != now_s:
                 self._memory = verdict.memory._replace(time_s=sent_s)
+            self._check_servos()
+        except DriverError as fault:
+            self._recover(str(fault), fault)
 
     def request_stop(self, reason: str, *, may_hold: bool = False) -> None:
         """Latch at the next read or write; may be called from another thread (a stop button).

@@ -19,6 +19,7 @@ NAMES = (
     "read_log",
     "sweep",
     "learn_wave",
+    "send_pose",
 )
 WITH_TORCH = "learn_policy"
 """Trains with packages that are no extra of ours; that it ran is told in docs/policies.md."""

@@ -7,6 +7,7 @@ import select
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,28 +16,33 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
-from snakewalk.config.loader import load, load_robot, load_world
+from snakewalk.config.loader import load
+from snakewalk.controller.bench.commands.serve_options import (
+    At,
+    OfRun,
+    PoseOut,
+    SimulatedRobot,
+    Tracker,
+    TruthFile,
+)
 from snakewalk.controller.bench.live_table import LiveScreen, MakeDecoder, Snapshot
-from snakewalk.controller.console import completion
+from snakewalk.controller.bench.served_body import PosePublisher, ServedBody
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json
+from snakewalk.controller.console.options import Force, Json, World
 from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.run.external.served_robot import ServedRobot
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.plant import Mounting
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu
 from snakewalk.sim.serve.console import Console
 from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows
 from snakewalk.sim.serve.recorded_line import RecordedLine
-from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.motor import motors_of
-from snakewalk.sim.servo.protection import SupplyAndAmbient
 from snakewalk.sim.sniff.decode import Decoder
 from snakewalk.sim.sniff.trace import TraceWriter
 
@@ -59,13 +65,6 @@ Servos = Annotated[
     str | None,
     typer.Option(help="IDS[:MODEL],... on a bench: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
 ]
-SimulatedRobot = Annotated[
-    str | None,
-    typer.Option(
-        help="shipped robot or a TOML file, in MuJoCo on flat ground",
-        autocompletion=completion.ROBOTS,
-    ),
-]
 BenchImu = Annotated[
     str | None,
     typer.Option(help="ID[:MODEL] of an IMU beside --servos, level and still: 200:imu_to_dxl"),
@@ -87,6 +86,13 @@ WithConsole = Annotated[
 def serve(
     servos: Servos = None,
     robot: SimulatedRobot = None,
+    world: World = None,
+    run: OfRun = None,
+    at: At = None,
+    pose_out: PoseOut = None,
+    tracker: Tracker = None,
+    truth: TruthFile = None,
+    seed: Annotated[int, typer.Option(help="of the noise of the poses")] = 0,
     imu: BenchImu = None,
     baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
     pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,
@@ -103,46 +109,65 @@ def serve(
     """Serve simulated servos at a serial device, in real time, with a live table."""
     if PtyServer is None:
         raise InputError("bus serve: pseudo-terminals are for Linux and macOS")
-    if sum(each is not None for each in (servos, robot, play)) > 1:
-        raise InputError("give one of --servos, --robot and --play")
+    body = ServedBody(
+        robot=robot, world=world, run=run, at=at, pose_out=pose_out, tracker=tracker,
+        truth=truth, seed=seed,
+    )  # fmt: skip
+    body.check()
+    if sum(each is not None for each in (servos, robot or run, play)) > 1:
+        raise InputError("give one of --servos, --robot, --run and --play")
     if play is not None and (imu is not None or faults is not None):
         raise InputError("--play: has what was recorded; leave --imu and --faults out")
-    if imu is not None and robot is not None:
+    if imu is not None and body.is_given:
         raise InputError("--imu: with --robot, its file says it: table [imu]")
     _check_serving(latency, for_s, record, link)
-    refuse_to_overwrite([record], force)
+    refuse_to_overwrite([record, truth], force)
     refuse_to_overwrite([link], force=True)
-    what, line, traffic, make_decoder, player = _served(
-        play, baud, partial(_simulated, servos, robot, imu, baud, faults)
-    )
-    console = None
-    if with_console:
-        console = _console(line, player, as_json)
-    line.usb_latency_s = latency * 1e-3
-    line.taps.append(traffic)
-    clock = WallClock()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the link goes, the record is whole
-    with raised_priority(), PtyServer(line, clock, pace=pace, link=link) as server:
-        out = record.open("w", encoding="utf-8") if record is not None else None
-        if out is not None:
-            line.taps.append(TraceWriter(out))
+    with ExitStack() as stack:
+        served = stack.enter_context(body.make(baud)) if body.is_given else None
+        what, line, traffic, make_decoder, player = _served(
+            play, baud, partial(_simulated, servos, served, imu, baud, faults)
+        )
+        console = _console(line, player, as_json) if with_console else None
+        line.usb_latency_s = latency * 1e-3
+        line.taps.append(traffic)
+        clock = WallClock()
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # files are closed
+        stack.enter_context(raised_priority())
+        server = stack.enter_context(PtyServer(line, clock, pace=pace, link=link))
+        publish = _publisher(stack, served, body, server)
+        if record is not None:
+            line.taps.append(TraceWriter(stack.enter_context(record.open("w", encoding="utf-8"))))
         _announce(server, what, line, as_json)
+
+        def ended() -> bool:
+            publish()
+            return for_s is not None and clock.now_s() >= for_s
+
         try:
-            ended = lambda: for_s is not None and clock.now_s() >= for_s  # noqa: E731
             if console is not None:
                 _converse(server, console, ended)
             else:
                 _run(server, traffic, make_decoder, clock, ended, as_json)
         except KeyboardInterrupt:
             print(file=sys.stderr)
-        finally:
-            if out is not None:
-                out.close()
         late_share = server.missed_s / max(clock.now_s() * pace, 1e-9)
     if as_json:
         _print_counts(traffic, server)
     else:
         _tell_what_was_lost(late_share, server.output_flushes)
+
+
+def _publisher(
+    stack: ExitStack, served: ServedRobot | None, body: ServedBody, server: "PtyServer"
+) -> Callable[[], None]:
+    """Return a function that sends the poses that are due."""
+    if served is None or body.pose_out is None:
+        return lambda: None
+    served.tracker.clock = server.real_time_s
+    publisher = PosePublisher(served.tracker, served.line.clock.now_s, body.address())
+    stack.callback(publisher.close)
+    return publisher
 
 
 def _print_counts(traffic: LiveTable, server: "PtyServer") -> None:
@@ -200,17 +225,17 @@ def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served
 
 def _simulated(
     servos: str | None,
-    robot: str | None,
+    served: ServedRobot | None,
     imu: str | None,
     baud: int | None,
     faults: Path | None,
 ) -> "Served":
     """Simulated servos, as ``_served`` has them."""
     spec = parse_chain(servos or "1-4")
-    if robot is None:
+    if served is None:
         line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
     else:
-        line = _robot_line(robot, baud)
+        line = served.line
     player = None
     if faults is not None:
         player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
@@ -222,24 +247,6 @@ def _simulated(
     models = dict(zip(line.bank.ids, line.bank.facts, strict=True))
     decoder = partial(Decoder, line.bank.facts[0], models)
     return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
-
-
-def _robot_line(name: str, baud: int | None) -> SimLine:
-    from snakewalk.sim.physics.plant import MujocoPlant, plant_imu  # noqa: PLC0415  an extra
-
-    robot = load_robot(name)
-    rate = baud or robot.servo.baud
-    bank = ServoBank(robot.servo_ids, robot.servo_records, rate)
-    plant = MujocoPlant(robot, load_world("flat"))
-    return SimLine(
-        bank,
-        plant,
-        baud=rate,
-        mounting=Mounting.of(robot),
-        motors=motors_of(robot),
-        supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=plant_imu(robot, plant, rate),
-    )
 
 
 def _announce(server: "PtyServer", what: ChainSpec, line: "Wire", as_json: bool) -> None:

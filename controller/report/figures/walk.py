@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from snakewalk.config.arrays import Bools, Ints
 from snakewalk.controller.figures.style import (
     AMBER,
     BLUE,
@@ -27,11 +28,14 @@ def walk_figure(record: RunRecord) -> Figure | None:
     figure, panels = canvas(2 if many else 1, 5.4 if many else 3.0)
     if many:
         states = panels[0]
-        _, first = np.unique(walk.state, return_index=True)
-        new = np.isin(number - 1, first)
         states.plot(number, walk.state, color="#dbe3ea", linewidth=0.8, zorder=1)
         size = float(np.clip(1800 / steps, 6, 26))
-        for chosen, colour, label in ((new, GREEN, "new state"), (~new, GREY, "seen before")):
+        for chosen, colour, label in zip(
+            _kinds_of_decision(walk.state),
+            (GREEN, BLUE, AMBER),
+            ("state started", "state continued", "state repeated"),
+            strict=True,
+        ):
             states.scatter(
                 number[chosen], walk.state[chosen], s=size, color=colour, label=label, zorder=2
             )
@@ -61,3 +65,11 @@ def walk_figure(record: RunRecord) -> Figure | None:
     aim.xaxis.set_major_locator(MaxNLocator(integer=True))
     legend_above(aim)
     return figure
+
+
+def _kinds_of_decision(state: Ints) -> tuple[Bools, Bools, Bools]:
+    """Return which decisions (n,) start a state, continue that before, or repeat an earlier one."""
+    _, first = np.unique(state, return_index=True)
+    starts = np.isin(np.arange(len(state)), first)
+    continues = np.append(False, state[1:] == state[:-1])
+    return starts, continues, ~starts & ~continues

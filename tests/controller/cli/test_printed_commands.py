@@ -88,6 +88,10 @@ NOT_RUN = {
     "synthesise -o": "walks over all hills: test_synthesise_command.py",
     "fish match top.mp4 -o": "searches every frame: test_fish_command.py",
     "identify": PENDULUM,
+    "pose check": "needs a sender: tests/docs/test_rehearsal_page.py",
+    "rehearse": "makes whole runs: tests/controller/rehearsal",
+    "judge": "needs a served run: tests/controller/rehearsal",
+    "--pose-out": "needs a client: tests/controller/rehearsal",
 }
 """Command, or option, and why no line with it is run here."""
 
@@ -406,8 +410,11 @@ def _parameter(page: Path) -> Any:
     return pytest.param(page, id=name, marks=() if tour else pytest.mark.slow)
 
 
-RUN_PAGES = [_parameter(page) for page in PAGES if printed(page)]
-"""The tour is run always; all of them take more than a minute."""
+RUN_PAGES = [
+    _parameter(page) for page in PAGES if printed(page) and not page.name.startswith("add-")
+]
+"""The tour is run always; all of them need more than a minute. Pages that add something to
+snakewalk have tests of their own in ``tests/docs``."""
 
 
 @pytest.fixture(scope="session")

@@ -15,6 +15,7 @@ from snakewalk.controller.runlog.topics import (
     BatteryTable,
     FrictionTable,
     PathTable,
+    PoseSourceTable,
     PoseTable,
     QposTable,
     ShadowTable,
@@ -97,6 +98,9 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 centre_m=body.centre_m,
             )
             file.add(ShadowTable, time_s, position_rad=angles / 2.0, current_a=angles / 5.0)
+        source = {"position_sd_m": 0.01, "heading_sd_rad": 0.02, "latency_s": 0.1}
+        source |= {"age_s": 0.12, "arrival_s": 0.25}
+        file.add(PoseSourceTable, 0.3, sequence=4, fault="jump by 0.50 m", **source)
         file.add(WaypointTable, 0.2, waypoints_m=[[2.0, 1.0], [0.0, 3.0]])
         file.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
         walk = {"heading_error_rad": 0.2, "ramp_rad": -0.1, "eta_q": 0.7}

@@ -12,6 +12,8 @@ from snakewalk.controller.runlog.topics import TABLES
 
 UNITS = ("_rad", "_rad_s", "_a", "_ah", "_s", "_m", "_m_s", "_c", "_v", "_j")
 UNITLESS = {
+    "fault",
+    "sequence",
     *("verdict", "reason", "joints", "target", "level", "kind", "text", "number", "key", "value"),
     *("state", "visited", "candidates", "eta_q", "along", "across"),
     *(f"{of}_95_{bound}" for of in ("along", "across") for bound in ("low", "high")),

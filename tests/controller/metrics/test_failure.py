@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import roll_rad
 from snakewalk.controller.runlog.record import Event, PlanSummary, RunRecord
@@ -160,3 +161,17 @@ def test_progress_goes_on_over_a_path_that_was_laid_again(record: RunRecord) -> 
 def test_roll_beyond_a_right_angle(record: RunRecord, roll_deg: float) -> None:
     rotation = made(record, roll_deg=roll_deg).pose.rotation[-1:]
     assert np.degrees(roll_rad(rotation)) == pytest.approx([roll_deg])
+
+
+@pytest.mark.parametrize(("slope_deg", "cause"), [(18.0, "climb"), (10.0, "steering")])
+def test_a_path_too_steep_to_climb_is_no_fault_of_steering(
+    record: RunRecord, slope_deg: float, cause: str
+) -> None:
+    """A body that slides aside on a steep plane advances, but not along its path."""
+    x_m = np.arange(-1.0, 32.0, 0.5)
+    height_m = np.tile(np.tan(np.radians(slope_deg)) * np.maximum(x_m, 0.0), (9, 1))
+    log = made(record, progress=0.1)
+    ground = HeightField(height_m, 0.5, -1.0, -2.0)
+    header = dataclasses.replace(log.header, ground=ground)
+    found = failure(dataclasses.replace(log, header=header))
+    assert found.cause == cause

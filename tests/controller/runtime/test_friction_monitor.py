@@ -65,7 +65,9 @@ def watched(friction: FrictionConfig) -> tuple[list[FoundFriction], list[Frictio
     """What is found of 30 s, and what is to be reckoned with."""
     used: list[FrictionConfig] = []
     monitor = FrictionMonitor(FILE, OnPaper(), CYCLE_S, used.append)
+    assert not monitor.confirms_file  # before a span is judged
     told = [monitor.update(view, joints_rad(0.0)) for view in sliding(friction, 30.0)]
+    assert monitor.confirms_file == (not used)
     return [found for found in told if found is not None], used
 
 

@@ -1,0 +1,48 @@
+"""Options of ``snakewalk bus serve`` that concern a robot on its ground."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.console import completion
+
+SimulatedRobot = Annotated[
+    str | None,
+    typer.Option(
+        help="shipped robot or a TOML file, in MuJoCo on the ground of --world",
+        autocompletion=completion.ROBOTS,
+    ),
+]
+OfRun = Annotated[
+    str | None,
+    typer.Option(
+        "--run",
+        help="robot, world and start of a shipped run or a RUN.toml, instead of --robot",
+        autocompletion=completion.RUNS,
+    ),
+]
+At = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y[,DEG]",
+        help="where the head lies and the body points to; default: that of --run, else 0,0,0",
+    ),
+]
+PoseOut = Annotated[
+    str | None,
+    typer.Option(metavar="udp:HOST:PORT", help="publish the robot's pose there"),
+]
+Tracker = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=VALUE",
+        help="noise_m, noise_deg, delay_s, dropout_every_s, ... of these poses; may be repeated",
+    ),
+]
+TruthFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--truth", help="write where the robot really was, for `snakewalk judge`, JSON lines"
+    ),
+]

@@ -1,0 +1,218 @@
+"""The head's pose from an external source: checked, dated, and carried on by dead reckoning.
+
+Every pose that arrives is judged. A pose that cannot be used is named and left out; dead reckoning
+bridges it with growing uncertainty. If no pose could be used for ``max_age_s``, ``fault`` says why,
+and the run holds.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.pose import PoseConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.pose.latency import LatencyEstimate
+from snakewalk.controller.pose.motion_check import MotionCheck
+from snakewalk.controller.pose.motion_history import Moment, MotionHistory
+from snakewalk.controller.pose.pose_filter import PoseFilter
+from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, UnusablePoseError
+from snakewalk.controller.pose.sender_clock import SenderClock
+from snakewalk.controller.pose.tracked_body import TrackedBody
+from snakewalk.drivers.types import BodyPose, JointState
+
+AGAIN_S: Final = 10.0
+"""The same fault is reported again after this time (ours)."""
+RESTART_S: Final = 1.0
+"""After such a silence another sender on the same host replaces the first one (ours)."""
+FROZEN: Final = 10
+FROZEN_M: Final = 0.03
+"""This many equal poses in a row are stale if the head has moved so far meanwhile (ours)."""
+
+
+class ExternalPose:
+    """Call with each joint state, in order of time; returns the estimated pose."""
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        config: PoseConfig,
+        feed: PoseFeed,
+        reckoning: Callable[[JointState], BodyPose],
+        on_event: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        self._config, self._feed, self._reckoning, self._on_event = (
+            config,
+            feed,
+            reckoning,
+            on_event,
+        )
+        self._body = TrackedBody(robot, config)
+        self._history = MotionHistory(robot.joint_count)
+        self._filter = PoseFilter(robot)
+        self._clock, self._check = SenderClock(), MotionCheck()
+        self._latency = LatencyEstimate(config.latency_s)
+        self._sender: str | None = None
+        self._frame = config.frame
+        self._newest: ArrivedPose | None = None
+        self._early: list[ArrivedPose] = []
+        self._equal: tuple[int, np.ndarray, np.ndarray] = (0, np.zeros(12), np.zeros(2))
+        self._now_s = self._used_s = -np.inf
+        self._used: PoseSample | None = None
+        self._reason = ""
+        self._reported: dict[str, float] = {}
+        self.counts = dict.fromkeys(("poses", "used", "lost", "rejected", "restarts"), 0)
+        """Poses that arrived, that were used, that never arrived, that were rejected."""
+
+    def keep(self, early: list[ArrivedPose]) -> None:
+        """Accept poses that arrived before the first joint state."""
+        self._early += early
+
+    def __call__(self, state: JointState) -> BodyPose:
+        """Advance to the state's time, and use the poses that have arrived."""
+        odometry = self._reckoning(state)
+        place = np.array([*odometry.head_in_world_m[:2], odometry.heading_rad])
+        moment = Moment(state.time_s, place, np.array(state.position_rad))
+        self._history.add(moment)
+        self._filter.advance(self._history.at(state.time_s))
+        self._now_s = state.time_s
+        arrived = [*self._early, *self._feed.arrived(state.time_s)]
+        self._early.clear()
+        for each in arrived:
+            self._accept(each)
+        return self._filter.pose(state.time_s)
+
+    def fault(self) -> str | None:
+        """Return why the pose cannot be trusted any more; None while it can."""
+        if self._check.fault is not None:
+            return self._check.fault
+        age_s = self._now_s - self._used_s
+        if age_s <= self._config.max_age_s:
+            return None
+        return f"no usable pose for {age_s:.1f} s: {self._reason or 'nothing arrived'}"
+
+    def facts(self) -> dict[str, float | int]:
+        """Return numbers for the log and for a command's answer."""
+        counts = {f"poses_{key}": value for key, value in self.counts.items() if key != "poses"}
+        return {
+            "poses": self.counts["poses"],
+            **counts,
+            "pose_latency_s": round(self._latency.latency_s, 3),
+            "sender_drift_ppm": round(1e6 * self._clock.drift, 1),
+        }
+
+    def row(self) -> dict[str, Any]:
+        """Return a row of the log."""
+        used = self._used
+        return {
+            "age_s": self._now_s - self._used_s if np.isfinite(self._used_s) else float("nan"),
+            "position_sd_m": self._filter.position_sd_m,
+            "heading_sd_rad": self._filter.heading_sd_rad,
+            "latency_s": self._latency.latency_s,
+            "sequence": -1 if used is None else used.sequence,
+            "arrival_s": float("nan") if self._newest is None else self._newest.arrival_s,
+            "fault": self.fault() or "",
+        }
+
+    def _accept(self, arrived: ArrivedPose) -> None:
+        """Judge a pose, and use it if nothing is wrong with it."""
+        self.counts["poses"] += 1
+        sample = arrived.sample
+        if isinstance(sample, UnusablePoseError):
+            self._reject("damaged", str(sample))
+            return
+        if not self._is_of_first_sender(arrived) or not self._is_next(sample, arrived):
+            return
+        if self._frame is None:
+            self._frame = sample.frame
+        if sample.frame != self._frame:
+            self._reject("frame", f"wrong frame: {sample.frame!r}, expected {self._frame!r}")
+            return
+        self._clock.add(sample.time_s, arrived.arrival_s)
+        stamped_s = self._clock.local_s(sample.time_s, arrived.arrival_s)
+        measured_s = stamped_s - self._latency.latency_s
+        if self._filter.is_placed and self._now_s - measured_s > self._config.max_age_s:
+            late_s = self._now_s - measured_s
+            self._reject("late", f"stale: poses arrive {late_s:.1f} s after they were measured")
+            return
+        self._use(sample, stamped_s, measured_s)
+
+    def _use(self, sample: PoseSample, stamped_s: float, measured_s: float) -> None:
+        then = self._history.at(measured_s)
+        measured = self._body.head(sample, then.joint_rad)
+        heading = float(np.arctan2(measured.rotation[1, 0], measured.rotation[0, 0]))
+        self._latency.add(stamped_s, heading, self._history)
+        if self._is_frozen(sample, then):
+            self._reject("frozen", "stale: the same pose is sent while the head moves")
+            return
+        self._check.add(measured, then)
+        if self._check.fault is not None:
+            self._reject("contradiction", self._check.fault)
+            return
+        off = self._filter.innovation(measured, then)
+        if self._filter.is_placed and off.is_jump:
+            self._reject(
+                "jump",
+                f"jump by {off.distance_m:.2f} m and {np.degrees(off.angle_rad):.0f} degrees",
+            )
+            return
+        self._filter.update(measured, then, off)
+        self.counts["used"] += 1
+        self._used, self._used_s, self._reason = sample, measured_s, ""
+
+    def _is_of_first_sender(self, arrived: ArrivedPose) -> bool:
+        if self._sender is None:
+            self._sender = arrived.sender
+        if arrived.sender == self._sender:
+            return True
+        assert self._newest is not None
+        same_host = arrived.sender.rpartition(":")[0] == self._sender.rpartition(":")[0]
+        if same_host and arrived.arrival_s - self._newest.arrival_s > RESTART_S:
+            self._restart(f"another sender on the same host, {arrived.sender}")
+            self._sender = arrived.sender
+            return True
+        self._reject(
+            f"sender {arrived.sender}",
+            f"two senders: {arrived.sender} is ignored, {self._sender} was first; stop one of them",
+            counts_as_reason=False,
+        )
+        return False
+
+    def _is_next(self, sample: PoseSample, arrived: ArrivedPose) -> bool:
+        """Whether a pose follows the newest one; a sender that starts again is reported."""
+        newest, before = self._newest, None
+        if newest is not None and isinstance(newest.sample, PoseSample):
+            before = newest.sample
+        if before is not None and sample.sequence <= before.sequence:
+            is_late = abs(sample.time_s - before.time_s) < RESTART_S
+            if is_late and before.sequence - sample.sequence < 1000:
+                self._reject("order", "a pose arrived twice or out of order")
+                return False
+            self._restart(f"its sequence begins again at {sample.sequence}")
+        elif before is not None:
+            self.counts["lost"] += sample.sequence - before.sequence - 1
+        self._newest = arrived
+        return True
+
+    def _restart(self, why: str) -> None:
+        self.counts["restarts"] += 1
+        self._newest, self._clock, self._check = None, SenderClock(), MotionCheck()
+        self._on_event(f"restarted sender: {why}; its clock is estimated again")
+
+    def _is_frozen(self, sample: PoseSample, then: Moment) -> bool:
+        values = np.concatenate([sample.position_m, sample.rotation.ravel()])
+        count, last, place = self._equal
+        if not np.array_equal(values, last):
+            self._equal = (1, values, then.place[:2].copy())
+            return False
+        self._equal = (count + 1, last, place)
+        moved_m = float(np.hypot(*(then.place[:2] - place)))
+        return count + 1 >= FROZEN and moved_m > FROZEN_M
+
+    def _reject(self, kind: str, text: str, *, counts_as_reason: bool = True) -> None:
+        self.counts["rejected"] += 1
+        if counts_as_reason:
+            self._reason = text
+        if self._now_s - self._reported.get(kind, -np.inf) >= AGAIN_S:
+            self._reported[kind] = self._now_s
+            self._on_event(f"{text}; the pose is left out")

@@ -1,0 +1,120 @@
+"""Statistics of the poses that arrive: rate, delay, noise, frame and senders."""
+
+from collections import deque
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.pose import PoseConfig
+from snakewalk.controller.pose.pose_filter import rotation_vector
+from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError, turned
+from snakewalk.controller.pose.sender_clock import SenderClock
+
+MOST: Final = 2000
+"""Newest poses that count."""
+
+
+class FeedStatistics:
+    """Call ``add`` with each pose that arrives."""
+
+    def __init__(self, config: PoseConfig) -> None:
+        self._config = config
+        self._clock = SenderClock()
+        self._poses: deque[tuple[float, float, PoseSample]] = deque(maxlen=MOST)
+        """Arrival, delay and pose."""
+        self.invalid = self.lost = 0
+        """Messages without a usable pose; poses that are missing in the sequence."""
+        self.last_fault = ""
+        self.senders: list[str] = []
+        self.frames: list[str] = []
+
+    def add(self, arrived: ArrivedPose) -> None:
+        """Count a message."""
+        if arrived.sender not in self.senders:
+            self.senders.append(arrived.sender)
+        sample = arrived.sample
+        if isinstance(sample, UnusablePoseError):
+            self.invalid += 1
+            self.last_fault = str(sample)
+            return
+        if sample.frame not in self.frames:
+            self.frames.append(sample.frame)
+        if self._poses:
+            self.lost += max(sample.sequence - self._poses[-1][2].sequence - 1, 0)
+        self._clock.add(sample.time_s, arrived.arrival_s)
+        late_s = arrived.arrival_s - self._clock.local_s(sample.time_s, arrived.arrival_s)
+        self._poses.append((arrived.arrival_s, late_s, sample))
+
+    @property
+    def newest(self) -> PoseSample | None:
+        """The newest pose."""
+        return self._poses[-1][2] if self._poses else None
+
+    def faults(self) -> list[str]:
+        """Return contradictions among the messages, one line each."""
+        found = []
+        if not self._poses:
+            found.append(self.last_fault or "nothing arrived; start the sender")
+        if len(self.senders) > 1:
+            found.append(f"two senders: {', '.join(self.senders)}; stop one of them")
+        if len(self.frames) > 1:
+            found.append(f"wrong frame: poses name {', '.join(self.frames)}; send one frame")
+        return found
+
+    def facts(self) -> dict[str, Any]:
+        """Return the numbers, for a command's answer."""
+        facts: dict[str, Any] = {
+            "poses": len(self._poses),
+            "invalid": self.invalid,
+            "lost": self.lost,
+            "senders": list(self.senders),
+            "frame": self.frames[0] if self.frames else None,
+        }
+        if not self._poses:
+            return facts
+        arrival_s = np.array([row[0] for row in self._poses])
+        late_s = np.array([row[1] for row in self._poses])
+        span_s = float(arrival_s[-1] - arrival_s[0])
+        position_m, axes = self._in_world(self._poses[-1][2])
+        return facts | {
+            "rate_hz": round((len(self._poses) - 1) / span_s, 1) if span_s > 0.0 else None,
+            "longest_gap_s": _rounded(np.diff(arrival_s).max(initial=0.0)),
+            "jitter_mean_s": _rounded(late_s.mean()),
+            "jitter_max_s": _rounded(late_s.max()),
+            "noise_m": self._noise_m(),
+            "noise_deg": self._noise_deg(),
+            "position_m": [_rounded(value) for value in position_m],
+            "heading_deg": round(float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))), 1),
+            "up": [round(float(value), 3) for value in axes[:, 2]],
+        }
+
+    def _in_world(self, sample: PoseSample) -> tuple[Floats, Floats]:
+        """Return centre (3,) and axes (3, 3) of the link that carries the body."""
+        config, world = self._config, turned(self._config.world_deg)
+        axes = world @ sample.rotation @ turned(config.offset_deg).T
+        body_m = np.array(config.world_m) + world @ sample.position_m
+        return body_m - axes @ np.array(config.offset_m), axes
+
+    def _noise_m(self) -> float | None:
+        """Standard deviation of a coordinate; slow motion does not count."""
+        positions = np.array([sample.position_m for _, _, sample in self._poses])
+        if len(positions) < 10:
+            return None
+        return _rounded(np.sqrt(np.mean(np.diff(positions, 2, axis=0) ** 2) / 6.0))
+
+    def _noise_deg(self) -> float | None:
+        """Standard deviation of an angle; slow motion does not count."""
+        rotations = [sample.rotation for _, _, sample in self._poses]
+        if len(rotations) < 10:
+            return None
+        steps = np.array([
+            rotation_vector(two @ one.T)
+            for one, two in pairwise(rotations)
+        ])  # fmt: skip
+        return round(float(np.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0))), 2)
+
+
+def _rounded(value: float) -> float:
+    return round(float(value), 4)

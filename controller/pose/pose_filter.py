@@ -1,0 +1,242 @@
+"""Dead reckoning corrected by measured poses that arrive late: a Kalman filter for the head's pose.
+
+The joints show how the body moved since a pose was measured; that motion is added to the measured
+pose. The filter estimates the head's position and the attitude of the whole body, whose mean frame
+turns slowly while the head swings. Position and attitude have a covariance each; the coupling
+between them is neglected. Dead reckoning adds uncertainty with time and with the distance.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import SpineLinks
+from snakewalk.controller.pose.motion_history import Moment
+from snakewalk.controller.pose.tracked_body import HeadMeasurement
+from snakewalk.drivers.attitude import rotation_by
+from snakewalk.drivers.types import BodyPose
+
+SLIP_SHARE: Final = 0.15
+"""Standard deviation of dead-reckoned speed and rate, over their magnitude (ours)."""
+SLIP_TIME_S: Final = 0.5
+"""How long one such error lasts (ours)."""
+DRIFT_M2_S: Final = 2e-4
+"""Growth of the variance of each coordinate at rest: 14 mm in a second (ours)."""
+DRIFT_RAD2_S: Final = 1e-3
+"""Growth of the variance of the heading at rest: 1.8 degrees in a second (ours)."""
+RISE_M2_S: Final = 2e-4
+"""The same of the height, which dead reckoning does not know (ours)."""
+TILT_RAD2_S: Final = 5e-2
+"""The same of roll and pitch of the body: it may roll over within half a second (ours)."""
+JUMP_SD: Final = 5.0
+JUMP_M: Final = 0.10
+JUMP_RAD: Final = 0.45
+"""A measurement is a jump beyond this many standard deviations and beyond these errors of position
+and heading (ours). Roll and pitch are free: a body may roll over quickly."""
+LEAST_LEVEL: Final = 0.5
+"""Least horizontal part of a direction that has a heading (ours)."""
+SLIDE_M_S: Final = 0.3
+SLIDE_RAD_S: Final = 0.5
+SLIDE_S: Final = 0.5
+"""How fast a body may slide and turn without its joints, and for how long at most (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Innovation:
+    """Difference between a measurement and the prediction for its time."""
+
+    position_m: Floats
+    """(3,)"""
+    turn_rad: Floats
+    """(3,) rotation vector in the world."""
+    is_jump: bool
+
+    @property
+    def distance_m(self) -> float:
+        """Length of the difference in position."""
+        return float(np.linalg.norm(self.position_m))
+
+    @property
+    def angle_rad(self) -> float:
+        """Angle of the difference in attitude."""
+        return float(np.linalg.norm(self.turn_rad))
+
+
+class PoseFilter:
+    """Call ``advance`` in each cycle and ``update`` with each measurement, in order of time."""
+
+    def __init__(self, robot: RobotConfig) -> None:
+        self._spine = SpineLinks.of(robot)
+        self._last: Moment | None = None
+        self._frames: deque[tuple[Moment, Floats]] = deque(maxlen=3)
+        """Mean frames of the newest moments: each is needed several times in a cycle."""
+        self._head_m = np.zeros(3)
+        self._body = np.eye(3)
+        self._shape = np.eye(3)
+        """Mean frame of the links in the axes of the head link, for the newest joints."""
+        self._measured_s = -np.inf
+        """When the newest measurement that was used was made."""
+        self._frame_rad = 0.0
+        """Heading of the frame of dead reckoning in the world."""
+        self.is_placed = False
+        """Whether a measurement has placed the body."""
+        self.position_covariance = np.zeros((3, 3))
+        self.turn_covariance = np.zeros((3, 3))
+
+    @property
+    def position_sd_m(self) -> float:
+        """Standard deviation of the horizontal position of the head."""
+        return float(np.sqrt(0.5 * self.position_covariance[:2, :2].trace()))
+
+    @property
+    def heading_sd_rad(self) -> float:
+        """Standard deviation of the heading."""
+        return float(np.sqrt(self.turn_covariance[2, 2]))
+
+    def pose(self, time_s: float) -> BodyPose:
+        """Return the head's pose at the newest moment."""
+        return BodyPose(time_s, self._head_m.copy(), self._body @ self._shape.T)
+
+    def advance(self, moment: Moment) -> None:
+        """Move the body as dead reckoning does since the last call, and grow the uncertainty."""
+        before, self._last = self._last, moment
+        self._shape = self._mean_frame(moment)
+        if before is None:
+            self._align()
+            return
+        step_s = moment.time_s - before.time_s
+        turn, way = self._motion(before, moment)
+        self._head_m[:2] += way
+        self._body = rotation_by(np.array([0.0, 0.0, turn])) @ self._body
+        if step_s > 0.0:
+            slip = 2.0 * SLIP_TIME_S * SLIP_SHARE**2 / step_s
+            moved, turned = slip * float(way @ way), slip * turn * turn
+            across = DRIFT_M2_S * step_s + moved
+            rise = RISE_M2_S * step_s + 0.5 * moved
+            tilt = TILT_RAD2_S * step_s
+            self.position_covariance += np.diag([across, across, rise])
+            self.turn_covariance += np.diag([tilt, tilt, DRIFT_RAD2_S * step_s + turned])
+
+    def innovation(self, measured: HeadMeasurement, then: Moment) -> Innovation:
+        """Compare a measurement with the prediction for its moment."""
+        assert self._last is not None
+        turn, way = self._motion(then, self._last)
+        head_m = self._head_m - np.append(way, 0.0)
+        body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
+        seen = measured.rotation @ self._mean_frame(then)
+        off_m, off_rad = measured.position_m - head_m, rotation_vector(seen @ body.T)
+        gap_s = min(max(then.time_s - self._measured_s, 0.0), SLIDE_S)
+        far = _deviations(off_m, self.position_covariance + measured.position_covariance)
+        variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
+        turn_rad = abs(_turn_between(body[:, 0], seen[:, 0]))
+        is_jump = bool(
+            (far > JUMP_SD and np.linalg.norm(off_m) > JUMP_M + SLIDE_M_S * gap_s)
+            or (
+                (turn_rad > JUMP_SD * np.sqrt(variance))
+                and turn_rad > JUMP_RAD + SLIDE_RAD_S * gap_s
+            )
+        )
+        return Innovation(off_m, off_rad, is_jump)
+
+    def update(self, measured: HeadMeasurement, then: Moment, off: Innovation) -> None:
+        """Correct the pose by a measurement and its innovation; the first one places the body."""
+        self._measured_s = then.time_s
+        if not self.is_placed:
+            self.is_placed = True
+            self.position_covariance = measured.position_covariance.copy()
+            self.turn_covariance = measured.rotation_covariance.copy()
+            self._head_m += off.position_m
+            self._body = rotation_by(off.turn_rad) @ self._body
+            self._align()
+            return
+        gain, self.position_covariance = _corrected(
+            self.position_covariance, measured.position_covariance
+        )
+        self._head_m += gain @ off.position_m
+        gain, self.turn_covariance = _corrected(self.turn_covariance, measured.rotation_covariance)
+        self._body = rotation_by(gain @ off.turn_rad) @ self._body
+        self._align()
+
+    def _motion(self, before: Moment, after: Moment) -> tuple[float, Floats]:
+        """Return how dead reckoning turned the body and moved the head, in the world."""
+        turn = self._body_heading(after) - self._body_heading(before)
+        c, s = np.cos(self._frame_rad), np.sin(self._frame_rad)
+        x, y = after.place[:2] - before.place[:2]
+        return _wrapped(turn), np.array([c * x - s * y, s * x + c * y])
+
+    def _align(self) -> None:
+        """Turn the frame of dead reckoning so that the body has its heading."""
+        assert self._last is not None
+        heading = float(np.arctan2(self._body[1, 0], self._body[0, 0]))
+        self._frame_rad = _wrapped(heading - self._body_heading(self._last))
+
+    def _body_heading(self, moment: Moment) -> float:
+        frame = self._mean_frame(moment)
+        return float(moment.place[2] + np.arctan2(frame[1, 0], frame[0, 0]))
+
+    def _mean_frame(self, moment: Moment) -> Floats:
+        """Return the mean axes (3, 3) of the links, in those of the head link."""
+        for known, frame in self._frames:
+            if known is moment:
+                return frame
+        frame = self._mean_axes(moment.joint_rad)
+        self._frames.append((moment, frame))
+        return frame
+
+    def _mean_axes(self, joint_rad: Floats) -> Floats:
+        at_origin = BodyPose(0.0, np.zeros(3), np.eye(3))
+        rotation = self._spine.in_world(at_origin, joint_rad).rotation
+        forward, up = rotation[:, :, 0].mean(axis=0), rotation[:, :, 2].mean(axis=0)
+        forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
+        left = _cross(up, forward)
+        left = left / max(float(np.linalg.norm(left)), 1e-9)
+        return np.stack([forward, left, _cross(forward, left)], axis=1)
+
+
+def rotation_vector(rotation: Floats) -> Floats:
+    """Return the rotation vector (3,) of a rotation matrix, below a half turn."""
+    r = rotation
+    axis = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    sine, cosine = 0.5 * float(np.linalg.norm(axis)), 0.5 * (float(r.trace()) - 1.0)
+    angle = float(np.arctan2(sine, cosine))
+    if sine > 1e-9:
+        return axis * (angle / (2.0 * sine))
+    if cosine > 0.0:
+        return 0.5 * axis
+    column = int(r.diagonal().argmax())  # a half turn
+    along = r[:, column] + np.eye(3)[column]
+    return np.asarray(np.pi * along / np.linalg.norm(along))
+
+
+def _wrapped(angle_rad: float) -> float:
+    return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
+
+
+def _turn_between(one: Floats, two: Floats) -> float:
+    """Return the angle between two directions in the horizontal plane; 0 of a steep one."""
+    if min(np.hypot(*one[:2]), np.hypot(*two[:2])) < LEAST_LEVEL:
+        return 0.0
+    return float(np.arctan2(one[0] * two[1] - one[1] * two[0], one[0] * two[0] + one[1] * two[1]))
+
+
+def _deviations(error: Floats, covariance: Floats) -> float:
+    """Return the length of an error (3,) in standard deviations."""
+    return float(np.sqrt(error @ np.linalg.solve(covariance, error)))
+
+
+def _corrected(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """Return the gain (3, 3) of a measurement, and the covariance after it."""
+    gain = prior @ np.linalg.inv(prior + noise)
+    keep = np.eye(3) - gain
+    after = keep @ prior @ keep.T + gain @ noise @ gain.T
+    return gain, 0.5 * (after + after.T)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.array([
+        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    ])  # fmt: skip

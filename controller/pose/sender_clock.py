@@ -1,0 +1,58 @@
+"""The clock of a sender on the clock of the run: offset and drift from the quickest messages.
+
+A message arrives after it was stamped, by a delay that varies. The smallest difference between
+arrival and stamp belongs to the quickest message, so the line under all differences is the offset
+of the clocks plus the smallest delay; its slope is the drift.
+"""
+
+from collections import deque
+from typing import Final
+
+import numpy as np
+
+BIN_S: Final = 1.0
+"""Time over which the smallest difference counts (ours)."""
+BINS: Final = 60
+DRIFT_AFTER: Final = 15
+"""Bins after which the drift is estimated (ours)."""
+MOST_DRIFT: Final = 5e-4
+"""Clocks of computers drift by at most some 100 ppm; more is not believed (ours)."""
+
+
+class SenderClock:
+    """Estimates when a stamp was made, in time of the run."""
+
+    def __init__(self) -> None:
+        self._bins: deque[tuple[float, float]] = deque(maxlen=BINS)
+        """Arrival and difference of the quickest message of each bin."""
+        self._bin_ends_s = -np.inf
+        self.drift = 0.0
+        """Seconds per second by which the offset grows; 0 until it is known."""
+
+    def add(self, stamp_s: float, arrival_s: float) -> None:
+        """Accept the stamp of a message and its arrival."""
+        difference = arrival_s - stamp_s
+        if arrival_s >= self._bin_ends_s:
+            self._bin_ends_s = arrival_s + BIN_S
+            self._bins.append((arrival_s, difference))
+            self._fit()
+        elif difference < self._bins[-1][1]:
+            self._bins[-1] = (arrival_s, difference)
+
+    def offset_s(self, at_s: float) -> float:
+        """Return time of the run minus time of the sender, with the smallest delay, at a time."""
+        return min(value + self.drift * (at_s - time_s) for time_s, value in self._bins)
+
+    def local_s(self, stamp_s: float, arrival_s: float) -> float:
+        """Return when a message was stamped, as if the quickest message had no delay."""
+        return min(stamp_s + self.offset_s(arrival_s), arrival_s)
+
+    def _fit(self) -> None:
+        """Fit the drift to the smallest differences of whole bins."""
+        whole = list(self._bins)[:-1]
+        if len(whole) < DRIFT_AFTER:
+            return
+        time_s, value = (np.array(column) for column in zip(*whole, strict=True))
+        time_s = time_s - time_s.mean()
+        slope = float((time_s * (value - value.mean())).sum() / (time_s * time_s).sum())
+        self.drift = min(max(slope, -MOST_DRIFT), MOST_DRIFT)

@@ -1,0 +1,117 @@
+"""Poses in UDP datagrams."""
+
+import socket
+import threading
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Final
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.pose.datagram import MOST_BYTES, decode_pose
+from snakewalk.controller.pose.sample import ArrivedPose, UnusablePoseError
+from snakewalk.drivers.clock import Clock
+
+LOCAL: Final = "127.0.0.1"
+MOST_WAITING: Final = 2000
+"""Poses that wait to be read; older ones are dropped (ours)."""
+_LOOK_S: Final = 0.2
+
+
+def parse_address(text: str, option: str = "--pose udp") -> tuple[str, int]:
+    """Return host and port of ``PORT`` or ``HOST:PORT``.
+
+    Raises:
+        InputError: the port is missing.
+
+    """
+    host, _, port = text.rpartition(":")
+    if not port.isascii() or not port.isdigit() or not 0 < int(port) < 65536:
+        raise InputError(f"{option}:{text}: expected PORT or HOST:PORT; for example 9870")
+    return host.strip("[]") or LOCAL, int(port)
+
+
+def decoded(data: bytes, sender: str, arrival_s: float) -> ArrivedPose:
+    """Return the pose of a datagram, or why it contains none."""
+    try:
+        return ArrivedPose(arrival_s, sender, decode_pose(data))
+    except UnusablePoseError as fault:
+        return ArrivedPose(arrival_s, sender, fault)
+
+
+class UdpFeed:
+    """Receives datagrams in a thread of its own, which notes when each arrived.
+
+    Raises:
+        InputError: the address cannot be bound.
+
+    """
+
+    def __init__(self, host: str, port: int, clock: Clock) -> None:
+        self._clock = clock
+        self._waiting: deque[ArrivedPose] = deque(maxlen=MOST_WAITING)
+        try:
+            family = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0][0]
+            self._socket = socket.socket(family, socket.SOCK_DGRAM)
+            self._socket.bind((host, port))
+        except OSError as error:
+            raise InputError(
+                f"pose udp:{host}:{port}: cannot be bound ({error.strerror or error}); end the "
+                "program that uses the port, or choose another one"
+            ) from None
+        self._socket.settimeout(_LOOK_S)
+        self.port: int = self._socket.getsockname()[1]
+        """The port that is bound."""
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+        self._thread.start()
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived since the last call."""
+        found = []
+        while self._waiting:
+            found.append(self._waiting.popleft())
+        return found
+
+    def close(self) -> None:
+        """Stop receiving."""
+        self._ended.set()
+        self._thread.join()
+        self._socket.close()
+
+    def _receive(self) -> None:
+        while not self._ended.is_set():
+            with suppress(TimeoutError):
+                try:
+                    data, address = self._socket.recvfrom(MOST_BYTES)
+                except ConnectionError:  # an answer to a datagram that was sent earlier
+                    continue
+                sender = f"{address[0]}:{address[1]}"
+                self._waiting.append(decoded(data, sender, self._clock.now_s()))
+
+
+class UdpSender:
+    """Sends datagrams to an address; a missing receiver is ignored.
+
+    Raises:
+        InputError: the host is unknown.
+
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        try:
+            family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        except OSError as error:
+            raise InputError(f"udp:{host}:{port}: unknown host ({error.strerror})") from None
+        self._address = address
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def send(self, data: bytes) -> None:
+        """Send a datagram; returns at once."""
+        with suppress(OSError):
+            self._socket.sendto(data, self._address)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()

@@ -1,0 +1,1 @@
+"""Commands that judge and rehearse runs, one command per file."""

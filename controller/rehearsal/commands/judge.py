@@ -1,0 +1,29 @@
+"""``snakewalk judge``: compare a run with the truth of the robot that was served."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import Json, show
+from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.rehearsal.judgement import judge as judged
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runlog.truth import read_truth
+
+
+@command("judge", group=JOB, examples=("judge truth.jsonl runs/my-run/log.mcap",))
+def judge(
+    truth: Annotated[Path, typer.Argument(help="file of `snakewalk bus serve --truth`")],
+    log: Annotated[Path, typer.Argument(help="log.mcap of the run")],
+    as_json: Json = False,
+) -> None:
+    """Compare a run with the truth of the served robot; 1 unless it truly arrived and says so."""
+    record = read_log(log)
+    numbers = summary(record)
+    found = judged(read_truth(truth), record, numbers.trip, numbers.outcome)
+    facts = found.facts()
+    show(facts if as_json else {"verdict": found.text, **facts}, as_json)
+    if not found.has_arrived or not found.is_true or found.claimed < found.waypoints:
+        raise SystemExit(1)

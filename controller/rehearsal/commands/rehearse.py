@@ -1,0 +1,138 @@
+"""``snakewalk rehearse``: many runs against served robots, in simulated time."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import fmean
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import checked
+from snakewalk.config.pose import TrackerConfig
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import FirstSeed, Json, console, key_values
+from snakewalk.controller.console.pool import each
+from snakewalk.controller.console.progress import show_progress
+from snakewalk.controller.rehearsal.rehearsal import RUNS, RehearsalCase, case_of, rehearse
+
+_TRACKER = {"noise_m": 0.01, "noise_deg": 3.0, "delay_s": 0.1}
+"""Noise and delay that the walk must tolerate."""
+
+
+@command(
+    "rehearse",
+    group=JOB,
+    examples=("rehearse flat-slalom --seeds 3", "rehearse --errors --seeds 20 -o errors.jsonl"),
+)
+def rehearse_runs(
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="shipped runs, or RUN.toml files; default: six on hills, ramps, steps and a floor",
+            autocompletion=completion.RUNS,
+        ),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="number of seeds of each run")] = 3,
+    first_seed: FirstSeed = 0,
+    errors: Annotated[
+        bool,
+        typer.Option(
+            "--errors",
+            help="wrong friction and mass, a weak servo, horns off by 2 degrees, goals 40 ms late",
+        ),
+    ] = False,
+    tracker: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=VALUE",
+            help="of the simulated tracker; default: noise_m=0.01 noise_deg=3 delay_s=0.1",
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", dir_okay=False, help="results, JSON lines; continued if there"),
+    ] = Path("rehearsal.jsonl"),
+    as_json: Json = False,
+) -> None:
+    """Rehearse runs against served robots in simulated time; 1 if one did not truly arrive."""
+    given = {**_TRACKER, **dict(key_values("--tracker", tracker))}
+    config = checked(TrackerConfig, given, "--tracker")
+    planned = [
+        RehearsalCase(run, seed, errors, config)
+        for seed in range(first_seed, first_seed + seeds)
+        for run in runs or RUNS
+    ]
+    results = _results(out)
+    missing = [case for case in planned if case.key not in results]
+    with out.open("a", encoding="utf-8") as file:
+        finished = each(rehearse, missing, workers=workers)
+        for case, row in show_progress(finished, "rehearsals", len(missing)):
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            results[case.key] = row
+    rows = [results[case.key] for case in planned]
+    if as_json:
+        print(json.dumps({"rehearsals": rows, "file": str(out)}))
+    else:
+        console.print(_table(rows))
+    if not all(row.get("has_arrived", False) for row in rows):
+        raise SystemExit(1)
+
+
+def _results(path: Path) -> dict[tuple[str, int, bool, str], dict[str, Any]]:
+    """Return the results in a file, by case.
+
+    Raises:
+        InputError: it is damaged.
+
+    """
+    found: dict[tuple[str, int, bool, str], dict[str, Any]] = {}
+    if not path.exists():
+        return found
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            row = parse_json(line)
+            found[case_of(row).key] = row
+        except (ValueError, KeyError, TypeError):
+            raise InputError(
+                f"{path}: line {number} is no rehearsal; remove it, or choose another file"
+            ) from None
+    return found
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> Table:
+    table = Table(box=None)
+    for head in ("run", "truly there", "false claims", "path m", "pose m", "pose deg", "why not"):
+        table.add_column(head, justify="left" if head in {"run", "why not"} else "right")
+    for run in dict.fromkeys(row["run"] for row in rows):
+        table.add_row(*_cells(run, [row for row in rows if row["run"] == run]))
+    return table
+
+
+def _cells(run: str, rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    judged = [row for row in rows if "error" not in row]
+
+    def mean(key: str, digits: int) -> str:
+        values = [row[key] for row in judged if row[key] is not None]
+        return f"{fmean(values):.{digits}f}" if values else ""
+
+    why = [
+        row.get("error") or f"seed {row['seed']}: {row['outcome']}"
+        for row in rows
+        if not row.get("has_arrived", False)
+    ]
+    return (
+        run,
+        f"{sum(row['has_arrived'] for row in judged)} of {len(rows)}",
+        str(sum(not row["is_true"] for row in judged)),
+        mean("path_error_mean_m", 2),
+        mean("pose_error_rms_m", 3),
+        mean("heading_error_rms_deg", 1),
+        "; ".join(why),
+    )

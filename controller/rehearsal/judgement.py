@@ -1,0 +1,174 @@
+"""Judgement of a run on a served robot by the truth of the server."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.metrics.path_error import distance_m, waypoint_times_s
+from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.truth import Truth
+
+MARGIN_M: Final = 0.02
+"""How much farther than its radius a waypoint may be from the true body: twice the noise of a
+tracker of 1 cm (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """A run compared with the truth."""
+
+    waypoints: int
+    claimed: int
+    """Waypoints that the run says it reached."""
+    truly_reached: int
+    """Waypoints that the body truly came to, in order, within their radius and ``MARGIN_M``."""
+    closest_m: tuple[float, ...]
+    """Least distance of the true body from each waypoint, after the waypoint before."""
+    outcome: str
+    """Outcome that the run's summary states."""
+    tripped: str | None
+    path_error_mean_m: float | None
+    """Distance of the true body from the path."""
+    path_error_max_m: float | None
+    pose_error_rms_m: float | None
+    """Distance of the run's head from the true one; None without datagrams that date it."""
+    pose_error_max_m: float | None
+    heading_error_rms_deg: float | None
+    travelled_m: float
+    """Length of the true way of the body, with its steps of 0.1 s and less left out."""
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether the body truly came to every waypoint, without a trip."""
+        return self.truly_reached == self.waypoints and self.tripped is None
+
+    @property
+    def is_true(self) -> bool:
+        """Whether the run claims no waypoint that the body did not come to."""
+        return self.claimed <= self.truly_reached
+
+    @property
+    def text(self) -> str:
+        """One line for a reader."""
+        said = f"the body truly came to {self.truly_reached} of {self.waypoints} waypoints"
+        claim = f"the run claims {self.claimed}"
+        return f"{said}; {claim}" + ("" if self.is_true else ": that is false")
+
+    def facts(self) -> dict[str, Any]:
+        """Return the judgement for a command's answer."""
+        return {
+            **asdict(self),
+            "closest_m": list(self.closest_m),
+            "has_arrived": self.has_arrived,
+            "is_true": self.is_true,
+        }
+
+
+def judge(truth: Truth, record: RunRecord, tripped: str | None, outcome: str) -> Judgement:
+    """Compare a run with the truth of the robot that was served.
+
+    Args:
+        truth: of the server.
+        record: log of the run.
+        tripped: why the run was stopped, or None.
+        outcome: of the run's summary.
+
+    """
+    plan = record.header.plan
+    reached, closest = true_arrivals(
+        truth.centre_m[:, :2], plan.waypoints_m, plan.waypoint_radius_m + MARGIN_M
+    )
+    off_path_m = _off_path_m(truth, record)
+    head_m, heading_rad = pose_errors(truth, record)
+    steps_m = truth.centre_m[:: _stride(truth), :2]
+    return Judgement(
+        waypoints=len(plan.waypoints_m),
+        claimed=len(waypoint_times_s(record.pose, plan)),
+        truly_reached=reached,
+        closest_m=tuple(round(float(value), 3) for value in closest),
+        outcome=outcome,
+        tripped=tripped,
+        path_error_mean_m=_mean(off_path_m),
+        path_error_max_m=_largest(off_path_m),
+        pose_error_rms_m=_rms(head_m),
+        pose_error_max_m=_largest(head_m),
+        heading_error_rms_deg=_rms(np.degrees(heading_rad)),
+        travelled_m=round(float(np.hypot(*np.diff(steps_m, axis=0).T).sum()), 3),
+    )
+
+
+def true_arrivals(
+    centre_m: Floats, waypoints_m: Floats, radius_m: float
+) -> tuple[int, list[float]]:
+    """Return the waypoints (w, 2) that a way (n, 2) comes to in order, and least distances."""
+    first, reached, closest = 0, 0, []
+    for waypoint_m in waypoints_m:
+        away_m = np.hypot(*(centre_m[first:] - waypoint_m).T)
+        closest.append(float(away_m.min()) if len(away_m) else np.inf)
+        within = np.flatnonzero(away_m <= radius_m)
+        if reached < len(closest) - 1:
+            continue
+        if len(within):
+            reached += 1
+            first += int(within[0])
+    return reached, closest
+
+
+def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
+    """Return how far the run's head was off in position (n,) and heading (n,).
+
+    The clocks are compared by the datagrams: the quickest one arrives when the server sent it.
+    """
+    source, pose = record.pose_source, record.pose
+    none = np.zeros(0), np.zeros(0)
+    if not len(source.time_s):
+        return none
+    row = {int(sequence): k for k, sequence in enumerate(truth.sequence)}
+    rows = np.array([row.get(int(sequence), -1) for sequence in source.sequence])
+    known = (rows >= 0) & np.isfinite(source.arrival_s)
+    known[known] = np.isfinite(truth.sent_s[rows[known]])
+    if not known.any():
+        return none
+    offset_s = float((source.arrival_s[known] - truth.sent_s[rows[known]]).min())
+    at_s = pose.time_s - offset_s
+    within = (at_s >= truth.time_s[0]) & (at_s <= truth.time_s[-1])
+    at_s = at_s[within]
+    true_m = np.stack([np.interp(at_s, truth.time_s, truth.head_m[:, k]) for k in range(2)], 1)
+    heading = np.unwrap(np.arctan2(truth.rotation[:, 1, 0], truth.rotation[:, 0, 0]))
+    true_rad = np.interp(at_s, truth.time_s, heading)
+    found = pose.rotation[within]
+    turn = np.arctan2(found[:, 1, 0], found[:, 0, 0]) - true_rad
+    return (
+        np.hypot(*(pose.head_m[within, :2] - true_m).T),
+        np.abs(np.arctan2(np.sin(turn), np.cos(turn))),
+    )
+
+
+def _off_path_m(truth: Truth, record: RunRecord) -> Floats:
+    """Distance (n,) of the true body from the nearest of the run's paths."""
+    centre_m = truth.centre_m[:: _stride(truth), :2]
+    anywhere = np.full(len(centre_m), np.nan)
+    off = [distance_m(centre_m, path_m[:, :2], anywhere) for _, path_m in record.paths]
+    return np.asarray(np.min(off, axis=0))
+
+
+def _stride(truth: Truth) -> int:
+    """Rows in 0.1 s."""
+    if len(truth.time_s) < 2:
+        return 1
+    period_s = (truth.time_s[-1] - truth.time_s[0]) / (len(truth.time_s) - 1)
+    return max(round(0.1 / float(period_s)), 1)
+
+
+def _mean(values: Floats) -> float | None:
+    return round(float(values.mean()), 4) if values.size else None
+
+
+def _largest(values: Floats) -> float | None:
+    return round(float(values.max()), 4) if values.size else None
+
+
+def _rms(values: Floats) -> float | None:
+    return round(float(np.sqrt(np.mean(values * values))), 4) if values.size else None

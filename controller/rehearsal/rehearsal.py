@@ -1,0 +1,123 @@
+"""Rehearsals of runs in simulated time: a served robot with errors, a tracker, and a judgement."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.pose import TrackerConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.rehearsal.judgement import judge
+from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
+from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.runlog.truth import read_truth
+
+RUNS: Final = (
+    *("jacksboro-traverse", "jacksboro-around", "random-10", "ramp-10-up", "steps-4cm"),
+    "flat-slalom",
+)
+"""Runs that are rehearsed by default."""
+START_SD_M: Final = 0.05
+START_SD_DEG: Final = 5.0
+"""How accurately the robot is laid down at the start (ours)."""
+FRICTION: Final = 1.25
+MASS: Final = 1.15
+WEAK: Final = 0.7
+HORN_DEG: Final = 2.0
+LATE_S: Final = 0.04
+"""Combined errors: factor on friction and mass or its inverse, torque of one servo, standard
+deviation of the horns, and delay of the goals (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RehearsalCase:
+    """A run to rehearse."""
+
+    run: str
+    seed: int
+    has_errors: bool
+    """Whether the robot and its ground have all the errors."""
+    tracker: TrackerConfig
+
+    @property
+    def key(self) -> tuple[str, int, bool, str]:
+        """Identity in a file of results."""
+        return self.run, self.seed, self.has_errors, self.tracker.model_dump_json()
+
+
+def rehearse(case: RehearsalCase) -> dict[str, Any]:
+    """Rehearse a run; returns the case and its judgement, ready for JSON."""
+    with TemporaryDirectory() as folder:
+        return {**described(case), **_judged(case, Path(folder))}
+
+
+def described(case: RehearsalCase) -> dict[str, Any]:
+    """Return a case, ready for JSON."""
+    return {
+        "run": case.run,
+        "seed": case.seed,
+        "has_errors": case.has_errors,
+        "tracker": case.tracker.model_dump(),
+    }
+
+
+def case_of(row: dict[str, Any]) -> RehearsalCase:
+    """Return the case of a row.
+
+    Raises:
+        KeyError, ValueError: the row contains no case.
+
+    """
+    tracker = TrackerConfig.model_validate(row["tracker"])
+    return RehearsalCase(row["run"], row["seed"], row["has_errors"], tracker)
+
+
+def errors_of(robot: RobotConfig, rng: np.random.Generator) -> Deviation:
+    """Draw errors of friction, mass, one servo and the horns."""
+    along, across, mass = (
+        factor ** rng.choice([-1.0, 1.0]) for factor in (FRICTION, FRICTION, MASS)
+    )
+    torque = np.ones(robot.joint_count)
+    torque[rng.integers(robot.joint_count)] = WEAK
+    return Deviation(
+        float(along),
+        float(across),
+        (float(mass) - 1.0) * np.array(robot.link_masses_kg),
+        torque,
+        np.radians(HORN_DEG) * rng.standard_normal(robot.joint_count),
+    )
+
+
+def _judged(case: RehearsalCase, folder: Path) -> dict[str, Any]:
+    try:
+        prepared = prepare_job(case.run, seed=case.seed, pose="udp:9870")
+        rng = np.random.default_rng([case.seed, 0x42])
+        moved_m = START_SD_M * rng.standard_normal(2)
+        turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
+        start = place_of(prepared)
+        place = replace(
+            start,
+            start_m=(start.start_m[0] + float(moved_m[0]), start.start_m[1] + float(moved_m[1])),
+            heading_rad=start.heading_rad + float(turned_rad),
+        )
+        deviation = errors_of(prepared.robot, rng) if case.has_errors else NO_DEVIATION
+        serving = Serving(case.tracker, deviation, LATE_S if case.has_errors else 0.0, case.seed)
+        truth = folder / "truth.jsonl"
+        with ServedRobot(prepared.robot, prepared.world, place, serving, truth) as served:
+            finished = execute(prepared, folder / "run", SimulatedPort(served), stoppable=False)
+    except InputError as error:
+        return {"error": error.faults[0]}
+    numbers = finished.summary
+    found = judge(read_truth(truth), finished.record, finished.outcome.tripped, numbers.outcome)
+    return {
+        **found.facts(),
+        "duration_s": round(finished.outcome.duration_s, 2),
+        "missed": finished.outcome.missed,
+        "latency_s": finished.pose.facts().get("pose_latency_s"),
+    }

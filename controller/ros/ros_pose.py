@@ -1,0 +1,127 @@
+"""Poses of a ROS 2 topic as a pose source: PoseStamped, PoseWithCovarianceStamped or Odometry.
+
+A process of its own subscribes to the topic and passes each pose on in the format of
+``controller/pose/datagram.py``, so that the run imports no ROS and checks the poses as usual.
+"""
+
+import os
+import re
+import threading
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Final
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.child_process import pipe, start
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.pose.sample import ArrivedPose
+from snakewalk.controller.pose.udp_feed import MOST_WAITING, decoded
+from snakewalk.controller.ros.ros_options import READY, RosOptions
+from snakewalk.controller.run.external.external_source import ExternalSource
+from snakewalk.drivers.clock import Clock
+
+_START_S: Final = 60.0
+_END_S: Final = 2.0
+
+
+@plugin("pose", "ros")
+class RosPose(ExternalSource):
+    """Poses of a ROS 2 topic: ros:/TOPIC."""
+
+    name = "ros"
+
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return why the source cannot work in a run, one line per fault."""
+        require_extra("pose: ROS needs", "rclpy")
+        faults = super().faults(run, robot, world, on_port=on_port)
+        try:
+            check_topic((run.pose or "").partition(":")[2])
+        except InputError as error:
+            faults += error.faults
+        return faults
+
+    def open_feed(self, argument: str, clock: Clock) -> "RosPoseFeed":
+        """Subscribe to the topic.
+
+        Raises:
+            InputError: rclpy is not installed, or the node cannot start.
+
+        """
+        require_extra("pose: ROS needs", "rclpy")
+        check_topic(argument)
+        return RosPoseFeed(argument, clock)
+
+
+def check_topic(topic: str) -> None:
+    """Check the name of a topic.
+
+    Raises:
+        InputError: it is not the name of a topic.
+
+    """
+    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", topic, re.ASCII):
+        raise InputError(f"--pose ros:{topic}: expected ros:/TOPIC; for example ros:/tracker/pose")
+
+
+class RosPoseFeed:
+    """Receives the poses of a topic from the process that subscribes to it.
+
+    Raises:
+        InputError: the node cannot start.
+
+    """
+
+    def __init__(self, topic: str, clock: Clock) -> None:
+        self._topic, self._clock = topic, clock
+        self._waiting: deque[ArrivedPose] = deque(maxlen=MOST_WAITING)
+        self._end, far = pipe()
+        self._process = start(_serve, far, topic, daemon=True)
+        far.close()
+        said = b"it did not start"
+        with suppress(EOFError, OSError):
+            if self._end.poll(_START_S):
+                said = self._end.recv_bytes()
+        if said != READY:
+            self._process.kill()
+            raise InputError(f"pose ros:{topic}: {said.decode()}")
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+        self._thread.start()
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived since the last call."""
+        found = []
+        while self._waiting:
+            found.append(self._waiting.popleft())
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        with suppress(OSError):
+            self._end.send_bytes(b"end")
+        self._process.join(_END_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._thread.join()
+        self._end.close()
+
+    def _receive(self) -> None:
+        with suppress(EOFError, OSError):
+            while True:
+                data = self._end.recv_bytes()
+                self._waiting.append(decoded(data, self._topic, self._clock.now_s()))
+
+
+def _serve(line: Connection, topic: str) -> None:
+    os.environ.update(RosOptions().environ(os.environ))
+    from snakewalk.controller.ros.ros_pose_node import serve  # noqa: PLC0415  rclpy stays here
+
+    serve(line, topic)

@@ -1,0 +1,86 @@
+"""The process that subscribes to a topic with poses, and passes each one on."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from multiprocessing.connection import Connection
+from typing import Any, Final
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rclpy.qos import qos_profile_sensor_data
+
+from snakewalk.controller.pose.datagram import encode_pose
+from snakewalk.controller.pose.sample import PoseSample, UnusablePoseError, rotation_of
+from snakewalk.controller.ros.ros_options import READY
+
+KINDS: Final[dict[str, tuple[Any, bool]]] = {
+    "geometry_msgs/msg/PoseStamped": (PoseStamped, False),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": (PoseWithCovarianceStamped, True),
+    "nav_msgs/msg/Odometry": (Odometry, True),
+}
+"""Message types, and whether they have a covariance."""
+SPIN_S: Final = 0.05
+
+
+def serve(line: Connection, topic: str) -> None:
+    """Pass the poses of a topic on until the run sends something, or ends."""
+    rclpy.init()
+    node = rclpy.create_node("snakewalk_pose")
+    line.send_bytes(READY)
+    send = _Sender(line)
+    is_subscribed = False
+    with suppress(BrokenPipeError, EOFError, ConnectionError):
+        while not line.poll(0.0):
+            is_subscribed = is_subscribed or _subscribe(node, topic, send)
+            rclpy.spin_once(node, timeout_sec=SPIN_S)
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def pose_of(message: Any, sequence: int, *, has_covariance: bool) -> bytes:
+    """Return a message as a datagram; a message without a pose becomes a text that says why."""
+    pose = message.pose.pose if has_covariance else message.pose
+    at, turn, stamp = pose.position, pose.orientation, message.header.stamp
+    covariance = None
+    if has_covariance:
+        covariance = np.array(message.pose.covariance, dtype=float).reshape(6, 6)
+    try:
+        rotation = rotation_of((turn.w, turn.x, turn.y, turn.z))
+    except UnusablePoseError as fault:
+        return str(fault).encode()
+    is_known = covariance is not None and bool(covariance.any())
+    return encode_pose(
+        PoseSample(
+            sequence,
+            stamp.sec + 1e-9 * stamp.nanosec,
+            np.array([at.x, at.y, at.z]),
+            rotation,
+            message.header.frame_id,
+            covariance if is_known else None,
+        )
+    )
+
+
+class _Sender:
+    """Counts the messages, and passes them on."""
+
+    def __init__(self, line: Connection) -> None:
+        self._line, self._count = line, 0
+
+    def __call__(self, message: Any, *, has_covariance: bool) -> None:
+        self._line.send_bytes(pose_of(message, self._count, has_covariance=has_covariance))
+        self._count += 1
+
+
+def _subscribe(node: Any, topic: str, send: Callable[..., None]) -> bool:
+    """Subscribe if the topic exists with a known type; returns whether it does."""
+    for kind in dict(node.get_topic_names_and_types()).get(topic, []):
+        if kind in KINDS:
+            type_, has_covariance = KINDS[kind]
+            on_message = partial(send, has_covariance=has_covariance)
+            node.create_subscription(type_, topic, on_message, qos_profile_sensor_data)
+            return True
+    return False

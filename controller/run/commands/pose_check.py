@@ -1,0 +1,108 @@
+"""``snakewalk pose check``: the poses of a source, before torque."""
+
+from collections.abc import Callable
+from contextlib import closing
+from typing import Annotated, Final
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.config.pose import PoseConfig
+from snakewalk.controller.console import completion
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Json, Robot, console, show
+from snakewalk.controller.pose.feed_statistics import FeedStatistics
+from snakewalk.controller.pose.first_pose import start_fault
+from snakewalk.controller.pose.sample import PoseFeed, PoseSample
+from snakewalk.controller.run.external.external_source import ExternalSource, ground_height
+from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.pose_provider import pose_plugin
+from snakewalk.drivers.clock import Clock, WallClock
+
+LOOK_S: Final = 0.02
+LINE_S: Final = 1.0
+Judge = Callable[[PoseSample], str | None]
+
+
+@command(
+    "pose check",
+    examples=("pose check udp:9870", "pose check udp:9870 --run jacksboro-traverse --seconds 5"),
+)
+def check(
+    source: Annotated[str, typer.Argument(help="external pose source, as of `run --pose`")],
+    robot: Robot = None,
+    run: Annotated[
+        str | None,
+        typer.Option(
+            help="run whose robot, start and ground the pose must fit",
+            autocompletion=completion.RUNS,
+        ),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="then it ends")] = 10.0,
+    as_json: Json = False,
+) -> None:
+    """Show position, axes, rate, delay and noise of an external pose; 1 if something is wrong."""
+    plugin, argument = pose_plugin(source)
+    if not isinstance(plugin, ExternalSource):
+        raise InputError(f"pose check {source}: its poses do not come from another program")
+    config, judge = _expected(robot, run)
+    clock = WallClock()
+    with closing(plugin.open_feed(argument, clock)) as feed:
+        found = watch(feed, clock, seconds, config, (lambda line: None) if as_json else _print)
+    newest = found.newest
+    fault = None if newest is None else judge(newest)
+    faults = [*found.faults(), *([] if fault is None else [fault])]
+    mount = {"link": config.link, "offset_m": list(config.offset_m)}
+    show({**found.facts(), "mount": mount, "faults": faults}, as_json)
+    if faults:
+        raise SystemExit(1)
+
+
+def watch(
+    feed: PoseFeed,
+    clock: Clock,
+    seconds: float,
+    config: PoseConfig,
+    on_line: Callable[[str], None],
+) -> FeedStatistics:
+    """Receive poses for some seconds; ``on_line`` accepts a line in each second."""
+    found, start_s = FeedStatistics(config), clock.now_s()
+    due_s = start_s + LINE_S
+    while clock.now_s() < start_s + seconds:
+        clock.sleep_until_s(clock.now_s() + LOOK_S)
+        for arrived in feed.arrived(clock.now_s()):
+            found.add(arrived)
+        if clock.now_s() >= due_s:
+            due_s += LINE_S
+            on_line(_line(found))
+    return found
+
+
+def _line(found: FeedStatistics) -> str:
+    facts = found.facts()
+    if "position_m" not in facts:
+        return f"no pose; {found.last_fault or 'nothing arrived'}"
+    x_m, y_m, z_m = facts["position_m"]
+    return (
+        f"x {x_m:+.3f}  y {y_m:+.3f}  z {z_m:+.3f} m   heading {facts['heading_deg']:+.1f} deg   "
+        f"up {facts['up'][2]:+.2f}   {facts['rate_hz']} Hz   frame {facts['frame']}"
+    )
+
+
+def _print(line: str) -> None:
+    console.print(line)
+
+
+def _expected(robot: str | None, run: str | None) -> tuple[PoseConfig, Judge]:
+    """Return the tracked body, and a judge of a pose at the start of a run."""
+    if run is None:
+        body = None if robot is None else load_robot(robot)
+        config = PoseConfig() if body is None or body.pose is None else body.pose
+        return config, lambda sample: None
+    prepared = prepare_job(run, robot=robot)
+    config = prepared.robot.pose or PoseConfig()
+    height_m = ground_height(prepared.ground)
+    return config, lambda sample: start_fault(
+        sample, prepared.robot, config, prepared.run.start_m, height_m
+    )

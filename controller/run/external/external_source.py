@@ -1,0 +1,139 @@
+"""External pose sources of a run: poses that arrive from another program."""
+
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from typing import Protocol
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.pose import PoseConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.pose.external_pose import ExternalPose
+from snakewalk.controller.pose.first_pose import await_first_pose, start_fault
+from snakewalk.controller.pose.sample import PoseFeed
+from snakewalk.controller.pose.udp_feed import UdpFeed, parse_address
+from snakewalk.controller.run.pose_provider import PoseContext, PoseProvider
+from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
+from snakewalk.controller.runtime.pose_hold import PoseHealth
+from snakewalk.drivers.clock import Clock
+
+
+class ClosingFeed(PoseFeed, Protocol):
+    """A feed that is closed at the end of a run."""
+
+    def close(self) -> None:
+        """Stop receiving."""
+        ...
+
+
+class ExternalSource:
+    """Base of pose sources whose poses another program measures; a subclass opens the feed."""
+
+    name: str
+    """As ``--pose`` names it."""
+
+    def open_feed(self, argument: str, clock: Clock) -> ClosingFeed:
+        """Open the feed that the text after the colon means.
+
+        Raises:
+            InputError: it cannot be opened.
+
+        """
+        raise NotImplementedError
+
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return a fault where the servos are simulated in this process: no tracker sees them."""
+        if on_port:
+            return []
+        return [
+            f"pose: {self.name}: measures a robot on a port; add --port, or take pose simulator"
+        ]
+
+    def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
+        """Return that the source measures the pose, with the noise of the robot's [pose]."""
+        config = robot.pose or PoseConfig()
+        noise_rad = float(np.radians(config.noise_deg))
+        return PoseEvidence(Kind.MEASURED, self.name, config.noise_m, noise_rad)
+
+    @contextmanager
+    def open(self, context: PoseContext) -> Iterator[PoseProvider]:
+        """Open the source for the time of a run; the first pose is awaited before torque.
+
+        Raises:
+            InputError: no pose arrives, or the first one cannot be that of the robot.
+
+        """
+        prepared, clock = context.prepared, context.backend.clock
+        robot, run = prepared.robot, prepared.run
+        config = robot.pose or PoseConfig()
+        rehearsed = context.backend.poses
+        opened = rehearsed if rehearsed is not None else self.open_feed(context.argument, clock)
+        with closing(_Feed(opened)) as feed:
+            pose = ExternalPose(
+                robot, config, feed, context.reckoning, lambda text: context.on_event("pose", text)
+            )
+            early = await_first_pose(
+                f"{self.name}:{context.argument}",
+                feed,
+                clock,
+                lambda sample: start_fault(
+                    sample, robot, config, run.start_m, ground_height(context.prepared.ground)
+                ),
+            )
+            pose.keep(early)
+            health = PoseHealth(pose.fault, config.hold_s, pose.row)
+            yield PoseProvider(pose, pose.facts, health)
+
+
+class _Feed:
+    """A feed whose ``close`` may be missing."""
+
+    def __init__(self, feed: PoseFeed) -> None:
+        self.arrived = feed.arrived
+        self.close: Callable[[], None] = getattr(feed, "close", lambda: None)
+
+
+def ground_height(ground: HeightField | None) -> Callable[[float, float], float]:
+    """Return the height of the ground at a place; 0 of a floor and outside of a height field."""
+
+    def height_m(x_m: float, y_m: float) -> float:
+        if ground is None or not bool(ground.contains(x_m, y_m)):
+            return 0.0
+        return float(ground.elevation_m(x_m, y_m))
+
+    return height_m
+
+
+@plugin("pose", "udp")
+class UdpPose(ExternalSource):
+    """Poses in UDP datagrams: udp:PORT, or udp:HOST:PORT."""
+
+    name = "udp"
+
+    def faults(
+        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
+    ) -> list[str]:
+        """Return why the source cannot work in a run, one line per fault."""
+        faults = super().faults(run, robot, world, on_port=on_port)
+        try:
+            parse_address((run.pose or "").partition(":")[2])
+        except InputError as error:
+            faults += error.faults
+        return faults
+
+    def open_feed(self, argument: str, clock: Clock) -> UdpFeed:
+        """Bind the address.
+
+        Raises:
+            InputError: it cannot be bound.
+
+        """
+        host, port = parse_address(argument)
+        return UdpFeed(host, port, clock)

@@ -1,0 +1,183 @@
+"""A simulated robot on its ground, served as if it were real, with a tracker and its truth."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.extras import require_extra
+from snakewalk.config.ground import build_ground
+from snakewalk.config.pose import PoseConfig, TrackerConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.kinematics.links import body_in_world, mean_heading_rad
+from snakewalk.controller.pose.tracked_body import TrackedBody
+from snakewalk.controller.pose.tracker import SimulatedTracker
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.runlog.truth import TruthLog
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.plant import Plant
+from snakewalk.sim.serve.watched_plant import WatchedPlant
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.motor import motors_of
+from snakewalk.sim.servo.protection import SupplyAndAmbient
+
+if TYPE_CHECKING:
+    from snakewalk.sim.imu import Imu
+    from snakewalk.sim.physics.plant import MujocoPlant
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where and how a served robot lies when serving begins."""
+
+    start_m: tuple[float, float] = (0.0, 0.0)
+    """Centre of the head link."""
+    heading_rad: float = 0.0
+    """Mean heading of the body."""
+    joint_rad: tuple[float, ...] | None = None
+    """Angles that the servos report; None: straight. A straight round body rolls down a slope."""
+
+
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """How a robot is served."""
+
+    tracker: TrackerConfig = TrackerConfig()  # noqa: RUF009  frozen
+    deviation: Deviation = NO_DEVIATION
+    goal_delay_s: float = 0.0
+    seed: int = 0
+    physics_step_s: float | None = None
+    baud: int | None = None
+    """None: the robot's."""
+
+
+def place_of(prepared: PreparedRun) -> Place:
+    """Return where a run begins, in its first shape."""
+    joint_rad = tuple(float(angle) for angle in prepared.initial_pose().joint_rad)
+    return Place(prepared.run.start_m, prepared.start_heading_rad, joint_rad)
+
+
+def physics_modules() -> tuple[Any, Any]:
+    """Return the modules with the body in MuJoCo and with a second body.
+
+    Raises:
+        InputError: MuJoCo is not installed.
+
+    """
+    require_extra("simulated servos need", "mujoco")
+    from snakewalk.sim.physics import plant, twin  # noqa: PLC0415  an extra
+
+    return plant, twin
+
+
+def simulated_line(
+    robot: RobotConfig,
+    plant: Plant,
+    deviation: Deviation = NO_DEVIATION,
+    imu: "Imu | None" = None,
+    baud: int | None = None,
+) -> SimLine:
+    """Return the robot's servos on the shafts of a body, behind a simulated line."""
+    rate = baud or robot.servo.baud
+    line = SimLine(
+        ServoBank(robot.servo_ids, robot.servo_records, rate),
+        plant,
+        baud=rate,
+        mounting=deviation.mounting(robot),
+        motors=motors_of(robot),
+        supply_and_ambient=SupplyAndAmbient.of(robot),
+        imu=imu,
+    )
+    if deviation.torque is not None:
+        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque
+    return line
+
+
+class ServedRobot:
+    """A simulated robot on its ground; use it in a ``with``, which closes the truth."""
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        world: WorldConfig,
+        place: Place,
+        serving: Serving,
+        truth: Path | None = None,
+    ) -> None:
+        physics, _ = physics_modules()
+        deviation = serving.deviation
+        self._robot, self._deviation = robot, deviation
+        ground = build_ground(world)
+        self.body: MujocoPlant = physics.MujocoPlant(
+            deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s
+        )
+        straight = (0.0,) * robot.joint_count
+        servo_rad = np.array(straight if place.joint_rad is None else place.joint_rad)
+        shaft_rad = deviation.shaft_rad(servo_rad)
+        heading_rad = place.heading_rad - mean_heading_rad(robot, shaft_rad)
+        self.body.reset(place.start_m, heading_rad, shaft_rad)
+        tracked = TrackedBody(robot, robot.pose or PoseConfig())
+        self.tracker = SimulatedTracker(serving.tracker, tracked, serving.seed)
+        """What measures the body and makes datagrams."""
+        plant = WatchedPlant(
+            self.body, 1.0 / serving.tracker.rate_hz, self._measure, serving.goal_delay_s
+        )
+        imu = partial(physics.plant_imu, robot, self.body, serving.baud or robot.servo.baud)
+        self.line = simulated_line(robot, plant, deviation, imu(serving.seed), serving.baud)
+        """The servos, as a byte port."""
+        self._truth = None
+        if truth is not None:
+            self._truth = TruthLog(truth, _header(robot, world, place, serving))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._truth is not None:
+            self._truth.__exit__(kind, error, trace)
+
+    def _measure(self) -> None:
+        head = self.body.head_pose()
+        shaft_rad: Floats = np.array(self.body.position_rad)
+        sequence, sent_s = self.tracker.measure(head, shaft_rad)
+        if self._truth is not None:
+            centre_m = body_in_world(self._robot, head, shaft_rad).centre_m
+            self._truth.add(
+                sequence, head.time_s, sent_s, head.head_in_world_m, head.rotation, centre_m
+            )
+
+
+def _header(
+    robot: RobotConfig, world: WorldConfig, place: Place, serving: Serving
+) -> dict[str, object]:
+    deviation = serving.deviation
+    return {
+        "robot": robot.name,
+        "world": world.name,
+        "start_m": list(place.start_m),
+        "heading_rad": place.heading_rad,
+        "joint_rad": _listed(None if place.joint_rad is None else np.array(place.joint_rad)),
+        "tracker": serving.tracker.model_dump(),
+        "seed": serving.seed,
+        "goal_delay_s": serving.goal_delay_s,
+        "friction_along": deviation.along,
+        "friction_across": deviation.across,
+        "load_kg": _listed(deviation.load_kg),
+        "torque": _listed(deviation.torque),
+        "slip_rad": _listed(deviation.slip_rad),
+    }
+
+
+def _listed(values: Floats | None) -> list[float] | None:
+    return None if values is None else [float(value) for value in values]

@@ -1,0 +1,56 @@
+"""A run whose pose is lost: the motion slows down and holds, and the run ends as failed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal
+
+SLOW_S: Final = 0.5
+"""Time in which the motion comes to rest, and starts again (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseHealth:
+    """Whether a pose source can be trusted, and what a run does without it."""
+
+    fault: Callable[[], str | None]
+    """Why the pose cannot be trusted in this cycle; None while it can."""
+    hold_s: float
+    """How long a run without a pose holds."""
+    row: Callable[[], dict[str, Any]]
+    """State of the source, as ``PoseSourceTable`` logs it."""
+
+
+@dataclass(slots=True)
+class PoseHold:
+    """Call ``rate`` in each cycle."""
+
+    health: PoseHealth
+    on_event: Callable[[Literal["info", "warning"], str], None]
+    """Accepts level and text of an event."""
+    failure: str | None = None
+    """Why the run must end; None while it may go on."""
+    _rate: float = field(default=1.0, init=False)
+    _since_s: float | None = field(default=None, init=False)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the motion rests."""
+        return self._since_s is not None and self._rate == 0.0
+
+    def rate(self, now_s: float, period_s: float) -> float:
+        """Return the rate of the motion, from 1 to 0 without a pose."""
+        fault = self.health.fault()
+        if fault is not None and self._since_s is None:
+            self._since_s = now_s
+            self.on_event(
+                "warning", f"{fault}; the motion pauses for up to {self.health.hold_s:g} s"
+            )
+        elif fault is None and self._since_s is not None:
+            self.on_event("info", f"the pose is back after {now_s - self._since_s:.1f} s")
+            self._since_s = None
+        since_s = self._since_s
+        if since_s is not None and now_s - since_s >= self.health.hold_s:
+            self.failure = f"pose: {fault}"
+        step = period_s / SLOW_S
+        self._rate = min(max(self._rate + (step if fault is None else -step), 0.0), 1.0)
+        return self._rate

@@ -1,0 +1,193 @@
+"""A rehearsal in simulated time: the same bytes twice, a true judgement, and a lost pose."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.pose import TrackerConfig
+from snakewalk.controller.rehearsal import rehearsal
+from snakewalk.controller.rehearsal.commands import rehearse as rehearse_command
+from snakewalk.controller.rehearsal.judgement import judge, true_arrivals
+from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
+from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
+from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.runlog.truth import Truth, read_truth
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.sim.plant import ServoDrive
+from snakewalk.sim.serve.watched_plant import WatchedPlant
+from tests.helpers.command import snakewalk
+
+NOISY = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
+Rehearse = Callable[..., tuple[Finished, Truth, ServedRobot]]
+
+
+@pytest.fixture(scope="module")
+def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "snake.toml").write_text(
+        'name = "snake"\njoint_axes = "yyyyyyyy"\nlink_length_m = 0.07\nbody_radius_m = 0.03\n'
+        "link_mass_kg = 0.15\n[pose]\nmax_age_s = 0.3\nhold_s = 0.6\n"
+    )
+    file = folder / "short.toml"
+    file.write_text(
+        'name = "short"\nrobot = "snake.toml"\nmotion = "serpenoid"\nwaypoints_m = [[0.3, 0.0]]\n'
+        "waypoint_radius_m = 0.35\ntime_limit_s = 8.0\n"
+    )
+    return file
+
+
+@pytest.fixture
+def rehearsed(run_file: Path, tmp_path: Path) -> Rehearse:
+    def run(tracker: TrackerConfig, name: str = "run") -> tuple[Finished, Truth, ServedRobot]:
+        prepared = prepare_job(str(run_file), pose="udp:9870")
+        truth = tmp_path / f"{name}.jsonl"
+        served = ServedRobot(
+            prepared.robot,
+            prepared.world,
+            Place((0.01, -0.02), 0.05),
+            Serving(tracker),
+            truth,
+        )
+        with served:
+            finished = execute(prepared, tmp_path / name, SimulatedPort(served), stoppable=False)
+        return finished, read_truth(truth), served
+
+    return run
+
+
+def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> None:
+    first, truth, _ = rehearsed(NOISY)
+    second, again, _ = rehearsed(NOISY, name="again")
+    assert first.log.read_bytes() == second.log.read_bytes()
+    assert np.array_equal(truth.head_m, again.head_m)
+    assert first.summary.pose_source == "udp"
+    assert first.record.header.port_is_pseudo_terminal
+    found = judge(truth, first.record, first.outcome.tripped, first.summary.outcome)
+    assert found.has_arrived
+    assert found.is_true
+    assert found.pose_error_rms_m is not None
+    assert found.pose_error_rms_m < 0.03
+    moved_m = truth.centre_m + np.array([0.0, 3.0, 0.0])
+    wrong = judge(replace(truth, centre_m=moved_m), first.record, None, first.summary.outcome)
+    assert (wrong.truly_reached, wrong.claimed) == (0, 1)
+    assert wrong.text.endswith("the run claims 1: that is false")
+
+
+def test_a_run_that_loses_its_pose_holds_and_fails_with_torque_off(rehearsed: Rehearse) -> None:
+    lost = NOISY.model_copy(update={"dropout_every_s": 1.5, "dropout_s": 600.0})
+    finished, truth, served = rehearsed(lost)
+    assert finished.outcome.tripped is not None
+    assert finished.outcome.tripped.startswith("pose: no usable pose for ")
+    assert not served.line.bank["Torque Enable"].any()
+    events = [each.text for each in finished.record.events if each.kind == "pose"]
+    assert any("the motion pauses for up to 0.6 s" in text for text in events)
+    found = judge(truth, finished.record, finished.outcome.tripped, finished.summary.outcome)
+    assert not found.has_arrived
+    rows = finished.record.pose_source
+    assert rows.fault[-1].startswith("no usable pose")
+    assert rows.position_sd_m[-1] > 2.0 * rows.position_sd_m[5]
+
+
+def test_a_silent_tracker_ends_a_run_before_torque(
+    rehearsed: Rehearse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def enabled(self: ServoChain) -> None:
+        pytest.fail("torque is on")
+
+    monkeypatch.setattr(ServoChain, "enable", enabled)
+    with pytest.raises(InputError, match="no usable pose within 5 s: nothing arrived"):
+        rehearsed(TrackerConfig(delay_s=5.0, clock_offset_s=3.0, jitter_s=4.0))
+
+
+class Shaft:
+    """A plant that notes the goals of its only motor."""
+
+    def __init__(self) -> None:
+        self.time_s = 0.0
+        self.position_rad = self.velocity_rad_s = np.zeros(1)
+        self.goals: list[tuple[float, float]] = []
+
+    def advance(self, until_s: float, drive: ServoDrive) -> None:
+        self.time_s = until_s
+        self.goals.append((round(until_s, 6), float(drive.goal_rad[0])))
+
+
+def test_goals_arrive_late_and_samples_in_regular_intervals() -> None:
+    shaft, times = Shaft(), list[float]()
+    plant = WatchedPlant(shaft, 0.02, lambda: times.append(round(shaft.time_s, 6)), 0.04)
+    one = np.ones(1)
+    drive = ServoDrive(one.copy(), *(one.copy() for _ in range(8)))
+    drive.torque_on[:], drive.goal_rad[:] = 0.0, 0.3
+    plant.advance(0.01, drive)
+    drive.torque_on[:] = 1.0
+    for k in range(1, 11):
+        if k == 3:
+            drive.goal_rad[:] = 0.5
+        plant.advance(0.01 + 0.01 * k, drive)
+        assert drive.goal_rad[0] == (0.5 if k >= 3 else 0.3)
+    changed = next(time_s for time_s, goal in shaft.goals if goal == 0.5)
+    assert changed == pytest.approx(0.08), "0.03 s, when it was set, and 0.04 s; stops at 0.07"
+    assert times == pytest.approx([0.0, 0.02, 0.04, 0.06, 0.08, 0.1])
+
+
+def test_arrivals_are_counted_in_order() -> None:
+    way = np.stack([np.linspace(0.0, 4.0, 401), np.zeros(401)], axis=1)
+    waypoints = np.array([[1.0, 0.1], [3.0, 0.5], [2.0, 0.0]])
+    assert true_arrivals(way, waypoints[:1], 0.3)[0] == 1
+    reached, closest = true_arrivals(way, waypoints, 0.3)
+    assert reached == 1, "the second is missed, and what comes after does not count"
+    assert closest[1] == pytest.approx(0.5)
+
+
+def test_results_are_continued(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run_file: Path
+) -> None:
+    done = list[rehearsal.RehearsalCase]()
+
+    def each(
+        work: object, cases: list[rehearsal.RehearsalCase], *, workers: int
+    ) -> list[tuple[rehearsal.RehearsalCase, dict[str, object]]]:
+        done.extend(cases)
+        facts = {"has_arrived": True, "is_true": True, "outcome": "every waypoint reached"}
+        facts |= dict.fromkeys(
+            ("path_error_mean_m", "pose_error_rms_m", "heading_error_rms_deg"), 0.01
+        )
+        return [(case, rehearsal.described(case) | facts) for case in cases]
+
+    monkeypatch.setattr(rehearse_command, "each", each)
+    out = tmp_path / "r.jsonl"
+    for seeds, total in ((1, 1), (3, 3), (3, 3)):
+        rehearse_command.rehearse_runs([str(run_file)], seeds=seeds, out=out)
+        assert len(done) == total
+    assert len(out.read_text().splitlines()) == 3
+    out.write_text(out.read_text() + "{}\n")
+    with pytest.raises(InputError, match="line 4 is no rehearsal"):
+        rehearse_command.rehearse_runs([str(run_file)], seeds=3, out=out)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("bus", "serve", "--pose-out", "udp:1"), "--pose-out: needs --robot or --run"),
+        (("bus", "serve", "--robot", "yaw16", "--pose-out", "tcp:1"), "expected udp:HOST:PORT"),
+        (("bus", "serve", "--robot", "yaw16", "--at", "1"), "expected X,Y or X,Y,DEGREES"),
+        (
+            ("bus", "serve", "--robot", "yaw16", "--pose-out", "udp:9", "--tracker", "noise=1"),
+            "noise",
+        ),
+        (("judge", "nothing.jsonl", "log.mcap"), "log.mcap"),
+        (("run", "flat-slalom", "--pose", "udp:9870"), "measures a robot on a port; add --port"),
+        (("run", "flat-slalom", "--port", "x", "--pose", "udp:"), "expected PORT or HOST:PORT"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(words: tuple[str, ...], said: str) -> None:
+    ended = snakewalk(*words)
+    assert ended.returncode == 2
+    assert said in ended.stderr
+    assert json.dumps(ended.stderr).count("\\n") == 1

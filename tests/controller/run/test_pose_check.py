@@ -1,0 +1,75 @@
+"""``pose check`` on poses in simulated time, and its answer."""
+
+import json
+
+import numpy as np
+import pytest
+
+from snakewalk.config.pose import PoseConfig
+from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError, turned
+from snakewalk.controller.run.commands.pose_check import watch
+from snakewalk.drivers.attitude import rotation_by
+from snakewalk.sim.line.clock import SimClock
+from tests.helpers.command import snakewalk
+
+
+class Tracker:
+    """Sends a noisy pose at 100 Hz, every tenth 30 ms late."""
+
+    def __init__(self) -> None:
+        self.rng, self.count = np.random.default_rng(3), 0
+
+    def arrived(self, now_s: float) -> list[ArrivedPose]:
+        found = []
+        while self.count * 0.01 <= now_s - 0.03:
+            stamp_s = self.count * 0.01
+            rotation = turned((0.0, 0.0, 90.0)) @ rotation_by(0.02 * self.rng.standard_normal(3))
+            position = np.array([1.0, 2.0, 0.1]) + 0.004 * self.rng.standard_normal(3)
+            late_s = 0.03 if self.count % 10 == 9 else 0.0
+            sample = PoseSample(self.count, stamp_s - 77.0, position, rotation, "lab")
+            found.append(ArrivedPose(stamp_s + late_s, "10.0.0.1:1", sample))
+            self.count += 1
+        return found
+
+
+def test_the_statistics_are_those_of_the_tracker() -> None:
+    lines: list[str] = []
+    config = PoseConfig(world_m=(0.0, -2.0, 0.0), offset_m=(0.0, 0.0, 0.05))
+    found = watch(Tracker(), SimClock(), 5.0, config, lines.append)
+    facts = found.facts()
+    assert facts["rate_hz"] == pytest.approx(100.0, rel=0.02)
+    assert facts["noise_m"] == pytest.approx(0.004, rel=0.15)
+    assert facts["noise_deg"] == pytest.approx(np.degrees(0.02), rel=0.15)
+    assert facts["jitter_max_s"] == pytest.approx(0.03, abs=0.002)
+    assert facts["position_m"] == pytest.approx([1.0, 0.0, 0.05], abs=0.03)
+    assert facts["heading_deg"] == pytest.approx(90.0, abs=6.0)
+    assert found.faults() == []
+    assert len(lines) >= 4
+    assert "frame lab" in lines[-1]
+
+
+class Wrong:
+    def arrived(self, now_s: float) -> list[ArrivedPose]:
+        one = PoseSample(0, now_s, np.zeros(3), np.eye(3), "lab")
+        two = PoseSample(1, now_s, np.zeros(3), np.eye(3), "room")
+        fault = UnusablePoseError("not finite")
+        return [
+            ArrivedPose(now_s, "a:1", one),
+            ArrivedPose(now_s, "b:1", two),
+            ArrivedPose(now_s, "a:1", fault),
+        ]
+
+
+def test_two_senders_and_frames_are_faults() -> None:
+    found = watch(Wrong(), SimClock(), 0.1, PoseConfig(), lambda line: None)
+    assert [text.partition(":")[0] for text in found.faults()] == ["two senders", "wrong frame"]
+    assert found.invalid > 0
+
+
+def test_without_a_sender_the_command_ends_with_1() -> None:
+    ended = snakewalk("pose", "check", "udp:59870", "--seconds", "0.1", "--json")
+    assert ended.returncode == 1
+    assert json.loads(ended.stdout)["faults"] == ["nothing arrived; start the sender"]
+    ended = snakewalk("pose", "check", "joints")
+    assert ended.returncode == 2
+    assert "do not come from another program" in ended.stderr
