@@ -43,7 +43,7 @@ _KEPT_REQUESTS = 64
 SPIN_S = 40e-6
 """About how late Linux wakes a program; polling for longer costs more CPU than it saves time."""
 SPIN_FROM_BAUD = 3_000_000
-"""Below it a program sleeps until the bytes arrive: polling takes half of a read's CPU time, and
+"""Below it a program sleeps until the bytes arrive: polling is half of a read's CPU time, and
 saves 10 us of a cycle that has 4 ms on the wire at 1 Mbaud."""
 
 

@@ -427,6 +427,7 @@ class SafeLink:
         """Read while it holds; torque off at its end, or at any reason to stop."""
         try:
             state = self._link.read()
+            self._check_servos()  # no goals follow, after which it is made otherwise
         except DriverError as fault:
             self._end_hold(str(fault))
             raise SafetyTrippedError(str(self.tripped)) from fault

@@ -182,11 +182,11 @@ def test_the_estimate_is_the_current_of_the_simulated_supply_and_a_fuse_ends_a_r
             link.read()
             if link.tripped is not None:
                 break
-            link.write(JointCommand(line.clock.now_s(), np.full(J, min(0.22, 0.004 * k))))
             output, speed = line.firmware._motor_output, line.firmware.plant.velocity_rad_s
             assert link.load is not None
             estimates.append(link.load.current_a - J * 0.04)
             truths.append(float(np.abs(output.pwm(speed) * output.current_a()).sum()))
+            link.write(JointCommand(line.clock.now_s(), np.full(J, min(0.22, 0.004 * k))))
         assert "more than its fuse of 3 A" in str(link.tripped)
     assert max(truths) > 3.0
     assert np.array(estimates[20:-1]) == pytest.approx(np.array(truths[20:-1]), rel=0.05, abs=0.1)
