@@ -19,6 +19,7 @@ MODULES = tuple(
     name
     for name in (
         "hil_loop",
+        "bus_faults",
         "bellies",
         "step_length",
         "cycle_codec",
@@ -32,6 +33,9 @@ MODULES = tuple(
         "repertoire",
         "support",
         "gym_steps",
+        "startup",
+        "busy_calibrations",
+        "light_install",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

@@ -1,4 +1,4 @@
-"""Array types by name, for all rooms."""
+"""Array types by name, for all packages."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
 
-PoseName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*(:.*)?$", max_length=500)]
+PoseName = Annotated[str, Field(min_length=1, max_length=500)]
 """A pose source, with an argument after a colon where the source accepts one."""
 Place = tuple[float, float]
 

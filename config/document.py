@@ -120,8 +120,8 @@ def reference() -> str:
 def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a kind of file: keys, types, ranges, words on each.
 
-    What holds between keys (waypoints of a walk, IDs that differ) only the loader knows. ``model``
-    is that of a file which only a room above reads.
+    The loader alone checks rules that involve several keys (waypoints of a walk, distinct IDs).
+    ``model`` is the schema of a file that only a package above reads.
     """
     model = model or SCHEMAS[kind]
     schema = model.model_json_schema()

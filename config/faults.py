@@ -43,9 +43,13 @@ class NoiseFault(_Lasting):
 
 
 class ServoFault(_Lasting):
-    """Servos that do not reply, jam, lose their supply, or whose output stage is dead."""
+    """Servos that fail for a while.
 
-    kind: Literal["mute", "stuck", "brown_out", "no_output"]
+    They do not reply, jam, lose their supply, have a dead output stage, ignore sync writes, or set
+    the alert bit without an error.
+    """
+
+    kind: Literal["mute", "stuck", "brown_out", "no_output", "deaf", "alert"]
     ids: tuple[ServoId, ...] = Field(min_length=1)
 
 
@@ -57,13 +61,31 @@ class ClashFault(_Lasting):
     takes: ServoId
 
 
-class WriteFault(_Fault):
+class WriteFault(_Lasting):
     """Another program writes to a register of servos, by its name in the control table."""
 
     kind: Literal["write"]
     ids: tuple[ServoId, ...] = Field(min_length=1)
     register_name: str = Field(min_length=1, alias="register")
     value: int
+    every_s: float | None = Field(
+        None, ge=1e-3, description="it writes again and again; not given: once"
+    )
+
+    @model_validator(mode="after")
+    def _lasts_if_repeated(self) -> Self:
+        if self.every_s is None and self.for_s is not None:
+            raise ValueError("write: 'for_s' needs 'every_s'; a single write does not end")
+        return self
+
+
+class ReadingFault(_Lasting):
+    """A dead sensor: servos report a constant value in a register (``Present Temperature``)."""
+
+    kind: Literal["reading"]
+    ids: tuple[ServoId, ...] = Field(min_length=1)
+    register_name: str = Field(min_length=1, alias="register")
+    value: int | None = Field(None, description="not given: the value at the beginning")
 
 
 class TripFault(_Fault):
@@ -113,6 +135,7 @@ ScheduledFault = (
     ServoFault
     | ClashFault
     | WriteFault
+    | ReadingFault
     | TripFault
     | HeatFault
     | SupplyFault

@@ -1,7 +1,9 @@
 """Configurations by shipped name or by path: robots, worlds, runs, gaits."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_origin
 
@@ -16,6 +18,7 @@ from snakewalk.config.strict_toml import read_toml
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
     from snakewalk.config.run import RunConfig
+    from snakewalk.config.servo_model import ServoModel
     from snakewalk.config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
@@ -71,6 +74,12 @@ def checked(model: type[M], data: dict[str, Any], source: str, text: str = "") -
     return strict_toml.checked(model, data, source, text, _files)
 
 
+def place_of(path: Path, key: str) -> str:
+    """Return file, line and name of a key, as messages about a file begin."""
+    number = strict_toml.line_number(path.read_text(encoding="utf-8"), key.split("."))
+    return f"{path}: {key}" if number is None else f"{path}:{number}: {key}"
+
+
 def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
     """Return ``config`` with the values of dotted ``keys`` replaced, as strict as a file.
 
@@ -96,11 +105,9 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
 
 def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
     """Load a robot by shipped name or path."""
-    from snakewalk.config.robot import RobotConfig  # noqa: PLC0415  slow to build; a list of gaits needs none
-
     path = locate("robots", name_or_path, beside)
     data, text = read_toml(path)
-    return checked(RobotConfig, with_models(data, path.parent), str(path), text)
+    return checked(_schemas().robot, with_models(data, path.parent), str(path), text)
 
 
 def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
@@ -114,13 +121,11 @@ def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         ConfigError: the faults of such a file.
 
     """
-    from snakewalk.config.servo_catalogue import described_model  # noqa: PLC0415  as above
-
     found: dict[str, BaseModel] = {}
 
     def named(table: object) -> object:
         model = table.get("model") if isinstance(table, dict) else None
-        record = described_model(model, folder) if isinstance(model, str) else None
+        record = _schemas().described_model(model, folder) if isinstance(model, str) else None
         if record is None or not isinstance(table, dict):
             return table
         found[record.model] = record
@@ -160,9 +165,7 @@ def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
 
 def load_run(name_or_path: str) -> "RunConfig":
     """Load a run by shipped name or path."""
-    from snakewalk.config.run import RunConfig  # noqa: PLC0415  slow to build
-
-    return load(locate("runs", name_or_path), RunConfig)
+    return load(locate("runs", name_or_path), _schemas().run)
 
 
 def load_gait(name_or_path: str) -> GaitSetConfig:
@@ -186,11 +189,30 @@ def _folder(kind: Kind) -> Path:
     return Path(__file__).parent / kind
 
 
+@dataclass(frozen=True)
+class _Schemas:
+    """Schemas of the three files of a run, and the reader of a servo model's file."""
+
+    run: "type[RunConfig]"
+    robot: "type[RobotConfig]"
+    world: "type[WorldConfig]"
+    described_model: "Callable[[str, Path | None], ServoModel | None]"
+
+
+@cache
+def _schemas() -> _Schemas:
+    """Import the schemas; a list of gaits needs none."""
+    from snakewalk.config import robot, run, servo_catalogue, world  # noqa: PLC0415  slow to build
+
+    return _Schemas(
+        run.RunConfig, robot.RobotConfig, world.WorldConfig, servo_catalogue.described_model
+    )
+
+
 def _files() -> dict[str, type[BaseModel]]:
     """Schemas of the three files of a run, by their names."""
-    from snakewalk.config import robot, run, world  # noqa: PLC0415  slow to build
-
-    return {"run": run.RunConfig, "robot": robot.RobotConfig, "world": world.WorldConfig}
+    found = _schemas()
+    return {"run": found.run, "robot": found.robot, "world": found.world}
 
 
 def _dotted(path: str, kind: Any) -> Iterator[str]:

@@ -143,6 +143,12 @@ class SafetyConfig(Strict):
     )
     current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
     temperature_limit_c: float = Field(70.0, gt=0.0)
+    winding_limit_c: float = Field(
+        125.0,
+        gt=0.0,
+        description="estimated temperature of a motor's winding: that of the housing, and the heat "
+        "of its current",
+    )
     voltage_min_v: float | None = Field(
         None, gt=0.0, description="default: the robot's servo.supply_min_v"
     )
@@ -157,6 +163,23 @@ class SafetyConfig(Strict):
     )
     slow_stale_limit_s: float = Field(
         3.0, gt=1.0, description="the same for temperature and voltage; overdue after 1 s"
+    )
+    on_trip: Literal["off", "hold"] = Field(
+        "off",
+        description="of a lifted or climbing body, after a joint that does not follow or the "
+        "operator's Ctrl-C: torque off, or hold_s with a low current first; all other trips switch "
+        "torque off at once",
+    )
+    hold_s: float = Field(5.0, gt=0.0, le=60.0, description="how long on_trip = hold holds")
+    hold_current_a: float | None = Field(
+        None, gt=0.0, description="of each joint while it holds; default: 0.2 of its stall current"
+    )
+    stop_output: str | None = Field(
+        None,
+        pattern=r"^(-?(rts|dtr):.+|command:/.+)$",
+        description="activated if torque off is not confirmed: rts:PORT or dtr:PORT sets this line "
+        "of a serial port, -rts:PORT or -dtr:PORT clears it, command:/PROGRAM ARGUMENT starts a "
+        "program; a simulated run opens the simulated supply",
     )
     advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")

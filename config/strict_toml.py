@@ -104,7 +104,7 @@ _TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
 _KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
 
 
-def _line_number(text: str, loc: Sequence[str | int]) -> int | None:
+def line_number(text: str, loc: Sequence[str | int]) -> int | None:
     """Line on which a TOML text sets the innermost key of ``loc`` that it has; None if none."""
     wanted = [str(part) for part in loc if isinstance(part, str)]
     places = [part for part in loc if isinstance(part, int)]
@@ -165,7 +165,7 @@ def _line(
 ) -> str:
     loc = fault["loc"]
     where = ".".join(str(p) for p in loc)
-    number = _line_number(text, loc)
+    number = line_number(text, loc)
     if number is not None:
         path = f"{path}:{number}"
     given = fault.get("input")

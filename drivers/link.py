@@ -16,6 +16,65 @@ class ExplainingLink(Protocol):
         ...
 
 
+class LoadEstimate(Protocol):
+    """Estimates of a chain's current, and of the temperature of its motors."""
+
+    current_a: float
+    """Drawn by the chain now."""
+    charge_ah: float
+    """Drawn since the start."""
+
+    def winding_c(self, state: JointState) -> Floats:
+        """(J,) temperatures of the windings."""
+        ...
+
+
+@runtime_checkable
+class CheckingLink(Protocol):
+    """A link that compares the servos with the values written to them, once a cycle."""
+
+    checks_in_read: bool
+    """Whether ``read`` makes the check; False for a caller of ``check_servos``."""
+
+    def check_servos(self) -> None:
+        """Make the check of this cycle, once its goals are sent.
+
+        Raises:
+            DriverError: a servo is not as it was set.
+
+        """
+        ...
+
+
+@runtime_checkable
+class SoftLink(Protocol):
+    """A link whose joints can hold with low currents."""
+
+    def hold_softly(self, current_a: Floats) -> None:
+        """Hold where the joints are, with currents of at most ``current_a`` (J,)."""
+        ...
+
+
+@runtime_checkable
+class LoadedLink(Protocol):
+    """A link that estimates the load of its servos."""
+
+    @property
+    def load(self) -> LoadEstimate | None:
+        """The estimates; None without records of the motors."""
+        ...
+
+
+@runtime_checkable
+class HoldingLink(Protocol):
+    """A link that may hold for a while after a trip; reads go on until it has ended."""
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether it holds."""
+        ...
+
+
 class JointLink(Protocol):
     """Enable, read, write, disable; every backend passes the same contract tests."""
 

@@ -2,7 +2,7 @@
 
 Besides snakewalk[gym] it needs torch and stable-baselines3; the policy that it writes does not.
 
-python examples/learn_policy.py --steps 100000 --out mine.toml
+python examples/learn_policy.py --total-steps 100000 --out mine.toml
 snakewalk policy run mine.toml
 """
 
@@ -77,7 +77,9 @@ def layers(agent: PPO) -> tuple[Layer, ...]:
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--steps", type=int, default=100_000)
+    options.add_argument(
+        "--total-steps", type=int, default=100_000, help="of 20 ms, in all episodes together"
+    )
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--robot", default="yaw16")
     options.add_argument("--world", default="flat")
@@ -103,7 +105,7 @@ def main() -> None:
         seed=given.seed,
         device="cpu",
     )
-    agent.learn(given.steps, callback=Saving(given))
+    agent.learn(given.total_steps, callback=Saving(given))
     save_policy(learnt(agent, given), given.out)
     print(f"snakewalk policy run {given.out}")
 

@@ -28,7 +28,7 @@ def total_reward(env: gymnasium.Env, wave: np.ndarray, steps: int, seed: int) ->
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--trials", type=int, default=8)
-    options.add_argument("--steps", type=int, default=100, help="of 20 ms, in each trial")
+    options.add_argument("--steps", type=int, default=100, help="steps of 20 ms in one episode")
     given = options.parse_args()
     rng = np.random.default_rng(0)
     env = gymnasium.make("snakewalk.gym:snakewalk/Snake-v0")

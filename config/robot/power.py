@@ -1,4 +1,4 @@
-"""Cables and leads of the supply."""
+"""Cables, leads and fuse of the supply."""
 
 from typing import Self
 
@@ -8,7 +8,7 @@ from snakewalk.config.base import Strict
 
 
 class PowerConfig(Strict):
-    """Cables from servo to servo, and where leads of the supply end (docs/bus.md)."""
+    """Cables from servo to servo, where leads of the supply end, and its fuse (docs/bus.md)."""
 
     inject_ids: tuple[int, ...] = Field(
         (), description="servos at which a lead of the supply ends; default: the first of the chain"
@@ -25,6 +25,14 @@ class PowerConfig(Strict):
     )
     lead_ohm: float = Field(
         0.02, gt=0.0, le=100.0, description="of a lead from the supply, there and back"
+    )
+
+    fuse_a: float | None = Field(
+        None,
+        gt=0.0,
+        le=1000.0,
+        description="rating of the supply's fuse: a run slows down before the estimated current of "
+        "the whole chain reaches it, and ends if it is exceeded; not given: no limit",
     )
 
     @model_validator(mode="after")

@@ -1,21 +1,30 @@
 """Reads a bus and puts the checks in order; writes nothing to a servo unless the joints wiggle."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
-from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot import ImuConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.bench import adapter, line_checks
 from snakewalk.controller.bench import servo_checks as servos
 from snakewalk.controller.bench.imu_check import imu_finding
-from snakewalk.controller.bench.register_checks import read_registers, register_findings
+from snakewalk.controller.bench.register_checks import (
+    ServoRegisters,
+    read_registers,
+    register_findings,
+)
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.supply_check import supply_under_load
-from snakewalk.controller.console.finding import Finding, worst
+from snakewalk.controller.bench.unlisted_devices import (
+    factory_servos,
+    protocol_1,
+    transmit_echo,
+    unlisted,
+)
+from snakewalk.controller.console.finding import Finding, shown_subject, worst
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.bus.probe import Probe, overhear
+from snakewalk.drivers.bus.probe import Overheard, Probe, overhear, probe
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import ServoReport, inspect
@@ -23,12 +32,20 @@ from snakewalk.drivers.errors import BusError, FaultCause, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.port.network_port import NetworkPort
 from snakewalk.drivers.port.serial_port import SerialPort
-from snakewalk.drivers.protocol.registers import BAUDS, ServoUnits
+from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, ServoUnits
 
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
 _PINGED = 6
 """So many missing servos are pinged at each baud rate; for more a broadcast is quicker (ours)."""
+_STILL_POSITIONS = 20
+"""Positions, 1.8 degrees, by which a joint at rest may differ between two reads (ours)."""
+_STILL_S = 0.1
+"""Least time between the two (ours)."""
+_TIMED = 2
+"""Servos, and pings of each, that show how late replies are (ours)."""
+_ASKED = 4
+"""Rounds of pings that show whose replies get lost (ours)."""
 _NOISE_TRIES = 10
 """How often a request is made on a noisy line (ours)."""
 
@@ -55,40 +72,37 @@ def examine(
         PortError: the port vanished.
 
     """
-    bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
-    on_progress("who else talks")
-    port.drain_until_quiet(latency_s)  # what an earlier program has asked for
-    overheard = overhear(port, line_checks.OVERHEAR_S)
-    findings.append(line_checks.second_master(overheard))
     expected, baud = robot.servo_ids, port.getBaudRate()
     imu = robot.imu
     if on_it is not None:
         expected = tuple(each for each in expected if each in on_it)
         imu = imu if imu is not None and imu.id in on_it else None
-    on_progress("who answers")
-    pinged = bus.find(expected)
+    on_progress("other programs")
+    port.drain_until_quiet(latency_s)  # what an earlier program has asked for
+    overheard = overhear(port, line_checks.OVERHEAR_S)
+    findings.append(line_checks.second_master(overheard))
+    echo = transmit_echo(port, expected)
+    if echo is not None:  # each request would be read as a reply
+        return [*findings, echo]
+    on_progress("the robot's servos")
+    bus, pinged = _find(port, robot, expected, latency_s)
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
     reads = [bus.probe(i, _MEASURED) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
     if noise is not None:
-        bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s, tries=_NOISE_TRIES)
-    missing = [i for i in expected if i not in found]
-    elsewhere = _at_other_bauds(port, robot.models_by_id, missing, latency_s, on_progress)
-    here = servos.presence(expected, found, elsewhere, baud, port.name)
-    findings += here if noise is None else [*here, noise]
-    on_progress("who else is there")
-    known = (*expected, *(() if imu is None else (imu.id,)))
-    findings += [f for f in [servos.unexpected_ids(known, list(bus.scan()))] if f is not None]
+        patience_s = bus.latency_s
+        bus = DynamixelBus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
+    findings += _presence(bus, expected, found, imu, noise, overheard, on_progress)
     if imu is not None:
         findings.append(imu_finding(bus, imu))
     if not found:
         return findings
     if findings[1].grade != "fail":  # else their replies are taken for a second servo's
         findings.append(servos.duplicates(pings, reads, noisy=noise is not None))
-    findings += line_checks.response([late for p in pings for late in p.late_s], latency_s)
+    findings += line_checks.response(pings, reads, latency_s, noisy=noise is not None)
     on_progress("registers")
     readable = _readable(bus, pings, reads, noise, findings)
     reports = _reports(bus, robot, readable, findings, noise) if readable else ()
@@ -99,12 +113,64 @@ def examine(
         port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to what was asked so far
         patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
-        findings.append(line_checks.line_quality(port, cycle, latency_s))
+        ids = [s.servo_id for s in reports for _ in range(_ASKED)]
+        findings.append(
+            line_checks.line_quality(port, cycle, latency_s, lambda: [bus.probe(i) for i in ids])
+        )
     fast = all(s.fast_reads for s in reports)
     findings.append(adapter.wire(robot_budget(robot, baud, fast=fast), rate_hz))
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         findings += supply_under_load(bus, robot, safety)
+    return findings
+
+
+def _find(
+    port: BytePort, robot: RobotConfig, expected: Sequence[int], latency_s: float
+) -> tuple[DynamixelBus, Collection[int]]:
+    """The bus, and the servos that reply; the bus waits longer if all replies are later."""
+    bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
+    pinged = bus.find(expected)
+    patience_s = line_checks.PATIENCE_S
+    for servo_id in [*pinged, *expected][:_TIMED]:
+        timed = probe(port, servo_id, _TIMED, patience_s)
+        late_s = timed.late_s
+        if late_s and min(late_s) > latency_s and not timed.damaged:
+            patient = DynamixelBus(port, robot.models_by_id, latency_s=patience_s)
+            return patient, patient.find(expected)
+        if late_s:
+            break
+    return bus, pinged
+
+
+def _presence(
+    bus: DynamixelBus,
+    expected: Sequence[int],
+    found: Sequence[int],
+    imu: ImuConfig | None,
+    noise: Finding | None,
+    overheard: Overheard,
+    on_progress: Callable[[str], None],
+) -> list[Finding]:
+    """Findings about the devices on the line: the robot's, others, and those that are missing."""
+    port, noisy = bus.port, noise is not None or overheard.noise_bytes > 0
+    missing = [i for i in expected if i not in found]
+    elsewhere = _at_other_bauds(bus, missing, on_progress)
+    on_progress("other devices")
+    known = (*expected, *(() if imu is None else (imu.id,)))
+    replies = bus.scan()
+    others = {i: reply for i, reply in replies.items() if i not in known}
+    baud = port.getBaudRate()
+    findings: list[Finding] = []
+    silent = [i for i in missing if i not in elsewhere]
+    old = protocol_1(port, silent, bus.latency_s) if silent else None
+    findings += [] if old is None else [old]
+    findings += servos.presence(expected, found, elsewhere, list(others), baud, port.name)
+    findings += [] if noise is None else [noise]
+    findings += unlisted(port, others, bus.latency_s, noisy=noisy)
+    new = factory_servos(*(port, {*found, *others}, silent), noisy=noisy, on_progress=on_progress)
+    already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
+    findings += [] if new is None or already else [new]
     return findings
 
 
@@ -197,7 +263,8 @@ def _readable(
     alone = [p for p in reads if p.servo_id not in shared]
     silent = [p.servo_id for p in alone if not p.answered and not p.damaged]
     unread = [servo_id for servo_id in silent if not _replies_to_reads(bus, servo_id)]
-    findings += [f for f in [servos.silent_to_reads(unread)] if f is not None]
+    if noise is None:  # else the noise is why they are silent
+        findings += [f for f in [servos.silent_to_reads(unread)] if f is not None]
     return [p.servo_id for p in alone if p.servo_id not in unread]
 
 
@@ -233,12 +300,31 @@ def _reports(
 def _settings(
     bus: DynamixelBus, robot: RobotConfig, reports: Sequence[ServoReport], noise: Finding | None
 ) -> list[Finding]:
+    bus.port.clock.sleep_until_s(bus.port.clock.now_s() + _STILL_S)
     try:
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
     except BusError as error:
         return [_unreadable(error, noise)]
+    moving = [*_moving(robot, reports, registers), *servos.unsteady_supply(bus, reports)]
     scales = [ServoUnits.of(bus.table_of(servo_id).facts) for servo_id in robot.servo_ids]
-    return register_findings(registers, robot, JointUnits.of(robot, scales))
+    return [*moving, *register_findings(registers, robot, JointUnits.of(robot, scales))]
+
+
+def _moving(
+    robot: RobotConfig, reports: Sequence[ServoReport], registers: Sequence[ServoRegisters]
+) -> list[Finding]:
+    """Finding about joints that turned between two reads of their positions."""
+    before = {report.servo_id: report.registers["Present Position"] for report in reports}
+    turned = [
+        each.servo_id
+        for each in registers
+        if abs(each.values["Present Position"] - before[each.servo_id]) > _STILL_POSITIONS
+    ]
+    if not turned:
+        return []
+    found = f"{shown_subject(turned, 'move', robot.label_of_servo)} while the doctor looks"
+    remedy = "does it fall, or does another program move it? run doctor again when it lies still"
+    return [Finding("motion", "warn", found, remedy)]
 
 
 def _unreadable(error: BusError, noise: Finding | None) -> Finding:
@@ -247,22 +333,18 @@ def _unreadable(error: BusError, noise: Finding | None) -> Finding:
 
 
 def _at_other_bauds(
-    port: BytePort,
-    models: Mapping[int, ServoModel],
-    missing: Sequence[int],
-    latency_s: float,
-    on_progress: Callable[[str], None],
+    bus: DynamixelBus, missing: Sequence[int], on_progress: Callable[[str], None]
 ) -> dict[int, int]:
-    """Which of the missing servos answer at another baud rate, and at which."""
+    """Baud rate of each missing servo that answers at another one."""
     if not missing:
         return {}
+    port = bus.port
     before = port.getBaudRate()
     others = [baud for baud in BAUDS if baud != before]
     if len(missing) > _PINGED:
         answering = scan(port, others, on_progress=on_progress)
         return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
     found: dict[int, int] = {}
-    bus = DynamixelBus(port, models, latency_s=latency_s)
     try:
         for baud in others:
             on_progress(f"{baud} baud")

@@ -1,10 +1,11 @@
 """What comes over the line: who else talks, how late replies are, how many get lost."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from snakewalk.controller.console.finding import Finding, shown_ids
+from snakewalk.controller.console.finding import Finding, Grade, shown_ids
 from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.probe import Overheard, Probe
 from snakewalk.drivers.port.byte_port import BytePort
@@ -12,13 +13,19 @@ from snakewalk.drivers.port.byte_port import BytePort
 OVERHEAR_S = 0.6
 """How long the doctor listens before it says a word (ours): any other master talks by then."""
 PATIENCE_S = 0.1
-"""How late a group read may be (ours): a computer that is busy is no bad line."""
+"""How late a group read may be (ours): a busy computer does not make a bad line."""
 _TEST_READS = 200
 _BAD_SHARE = 0.05
 """Share of the requests that a line may fail before it is a fault (ours)."""
 _CABLES = "cables, plugs, termination, a common ground; a lower baud rate"
 _LATE_S = 3e-3
 """A reply that is later than the wire and the servo make it is held up by adapter or driver."""
+_SLOW_S = 2e-3
+"""Difference between servos beyond any return delay, which is 0.508 ms at most (ours)."""
+_COMPARED = 3
+"""Servos that a comparison needs (ours)."""
+_LOST = 2
+"""Lost replies of one servo beyond chance (ours)."""
 _STRAY_REPLIES = 3
 """So many replies to somebody else show another master: one may be a late one to ourselves."""
 
@@ -78,31 +85,77 @@ def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) 
     )
 
 
-def response(late_s: list[float], latency_s: float) -> list[Finding]:
-    """How much later than the wire allows replies come; None without replies.
+def response(
+    pings: Sequence[Probe], reads: Sequence[Probe], latency_s: float, *, noisy: bool
+) -> list[Finding]:
+    """How much later than the wire allows replies come, and who is slower; none without replies.
 
     The lower quartile is judged: an adapter holds every reply up, a busy computer some.
     """
+    late_s = [late for ping in pings for late in ping.late_s]
     if not late_s:
         return []
+    slow = None if noisy else _slow_servos((*pings, *reads))
+    return [_usual_response(late_s, latency_s), *([] if slow is None else [slow])]
+
+
+def _usual_response(late_s: Sequence[float], latency_s: float) -> Finding:
     usual_ms = float(np.quantile(late_s, 0.25)) * 1e3
     found = f"replies come {usual_ms:.1f} ms later than the wire needs"
+    if usual_ms * 1e-3 > latency_s:
+        found += f", the driver waits {latency_s * 1e3:.0f} ms: a run takes all of them for lost"
+        remedy = "lower the adapter's latency timer to 1 ms, or connect it without a hub or server"
+        return Finding("response time", "fail", found, remedy)
     if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
-        return [Finding("response time", "ok", found)]
+        return Finding("response time", "ok", found)
     found += ": each cycle of a run takes that much longer"
     remedy = (
         "the adapter's latency timer, a USB hub, a serial server in between; or a busy computer"
     )
-    return [Finding("response time", "warn", found, remedy)]
+    return Finding("response time", "warn", found, remedy)
 
 
-def line_quality(port: BytePort, cycle: ControlCycle, latency_s: float) -> Finding:
+def _slow_servos(probes: Sequence[Probe]) -> Finding | None:
+    """Servos each of whose replies is later than those of the others."""
+    least_s: dict[int, float] = {}
+    for each in probes:
+        if each.late_s:
+            late_s = min(each.late_s)
+            least_s[each.servo_id] = min(late_s, least_s.get(each.servo_id, late_s))
+    if len(least_s) < _COMPARED:
+        return None
+    usual_s = float(np.median(list(least_s.values())))
+    slow = {i: late_s - usual_s for i, late_s in least_s.items() if late_s - usual_s > _SLOW_S}
+    if not slow:
+        return None
+    found = ", ".join(f"servo {i} by {late_s * 1e3:.1f} ms" for i, late_s in slow.items())
+    remedy = "update its firmware, exchange it: each cycle of a run takes that much longer"
+    return Finding("response time", "warn", f"slower than the others: {found}", remedy)
+
+
+def _losing_servos(probes: Sequence[Probe]) -> str:
+    """Text that names the few servos whose replies get lost; empty if none or many lose some."""
+    lost: Counter[int] = Counter()
+    for each in probes:
+        lost[each.servo_id] += each.requests - each.answered
+    lossy = [servo_id for servo_id, count in lost.items() if count >= _LOST]
+    few = 0 < len(lossy) <= max(1, len(lost) // 4)
+    return f"; replies of {shown_ids(lossy)} get lost: its plug, or the servo" if few else ""
+
+
+def line_quality(
+    port: BytePort,
+    cycle: ControlCycle,
+    latency_s: float,
+    ask_each: Callable[[], Sequence[Probe]],
+) -> Finding:
     """Damaged or missing answers in many group reads, as a run does them.
 
     Args:
         port: the line.
         cycle: waits ``PATIENCE_S``.
         latency_s: beyond it a run takes a reply for lost.
+        ask_each: asks each servo by itself, to see whose replies get lost.
 
     """
     reads, lost, longest_s = 0, 0, 0.0
@@ -114,10 +167,10 @@ def line_quality(port: BytePort, cycle: ControlCycle, latency_s: float) -> Findi
         if complete:
             longest_s = max(longest_s, port.clock.now_s() - began_s)
     found = f"{lost} of {reads} group reads incomplete"
-    if lost > _BAD_SHARE * _TEST_READS:
-        return Finding("line", "fail", found, _CABLES)
     if lost:
-        return Finding("line", "warn", found, _CABLES)
+        found += _losing_servos(ask_each())
+        grade: Grade = "fail" if lost > _BAD_SHARE * _TEST_READS else "warn"
+        return Finding("line", grade, found, _CABLES)
     if longest_s > 2.0 * latency_s:
         found += f"; the longest took {longest_s * 1e3:.0f} ms"
     return Finding("line", "ok", found)

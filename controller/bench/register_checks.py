@@ -45,7 +45,14 @@ _READ = (
     *("Status Return Level", "Secondary(Shadow) ID", "Homing Offset", "Drive Mode"),
     *("Operating Mode", "Startup Configuration", "Shutdown", "PWM Limit", "Current Limit"),
     *("Goal PWM", *_GAINS, *_PROFILE, IDENTITY, "Bus Watchdog", "Present Position"),
+    *("Min Position Limit", "Max Position Limit", "Velocity Limit", "Temperature Limit"),
+    *("Min Voltage Limit", "Max Voltage Limit", "Registered Instruction", "Goal Current"),
+    *("Torque Enable", "Present Current"),
 )
+_SECONDARY_SERVO = 0x02
+"""Bit of Drive Mode(10): the servo follows another one by a sync cable."""
+_IDLE_A = 0.1
+"""Current without torque that only a broken sensor shows (ours)."""
 _BY_A_RUN = "a run sets it; other programs are affected"
 
 
@@ -118,6 +125,13 @@ class _Checks:
             ),
             self._bits("drive mode", "Drive Mode", TIME_PROFILE, "have time-based profiles"),
             self._bits(
+                "drive mode",
+                "Drive Mode",
+                _SECONDARY_SERVO,
+                "follow another servo's sync cable",
+                "set Drive Mode(10) bit 1 to 0, unless it is a dual joint",
+            ),
+            self._bits(
                 "startup configuration",
                 "Startup Configuration",
                 0xFF,
@@ -159,11 +173,76 @@ class _Checks:
                 ),
                 "a Goal PWM(100) below its limit: weak or without power",
             ),
+            *self._limits(),
             self._unusual("operating mode", ("Operating Mode",)),
             self._unusual("gains", _GAINS),
             self._unusual("profile", _PROFILE),
             *self._watchdog(),
         ]
+
+    def _limits(self) -> list[Finding | None]:
+        """Limits, goals and sensors that other programs and faults leave behind."""
+        units, robot = self._units, self._robot
+        return [
+            self._bad(
+                "position limits",
+                "warn",
+                lambda servo: (
+                    servo.values.get("Min Position Limit", 0) > units.limits_raw[servo.joint][0]
+                    or servo.values.get("Max Position Limit", math.inf)
+                    < units.limits_raw[servo.joint][1]
+                ),
+                "position limits (48, 52) within the joint's range",
+            ),
+            self._not_factory("velocity limit", "Velocity Limit", "another program slowed it?"),
+            self._not_factory(
+                "temperature limit", "Temperature Limit", "higher: unprotected; lower: early alarms"
+            ),
+            self._not_factory(
+                "voltage limits", "Min Voltage Limit", "do they fit the supply? alarms come beyond"
+            ),
+            self._not_factory(
+                "voltage limits", "Max Voltage Limit", "do they fit the supply? alarms come beyond"
+            ),
+            self._bad(
+                "goal current",
+                "warn",
+                lambda servo: (
+                    robot.all_axes[servo.joint] == "p"
+                    and servo.values.get("Goal Current", math.inf)
+                    < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
+                ),
+                "a Goal Current(102) below the robot's current limit: weak",
+            ),
+            self._bad(
+                "registered instruction",
+                "warn",
+                lambda servo: servo.values.get("Registered Instruction") == 1,
+                "a registered write waiting: the next Action moves or changes it",
+                remedy="switch its power off, on",
+            ),
+            self._bad(
+                "current sensor",
+                "warn",
+                lambda servo: (
+                    servo.values.get("Torque Enable") == 0
+                    and abs(servo.values.get("Present Current", 0))
+                    > units.current_raw(servo.joint, _IDLE_A)
+                ),
+                "a current without torque: its sensor is off",
+                remedy="limits by current do not hold for it: exchange the servo",
+            ),
+        ]
+
+    def _not_factory(self, check: str, register: str, remedy: str) -> Finding | None:
+        """Registers of the EEPROM that neither a factory nor a run sets to this value."""
+        found = [
+            f"{self._robot.joint_label(servo.joint)}: {register} {value}, factory {usual}"
+            for servo in self._servos
+            if (value := servo.values.get(register)) is not None
+            and (usual := self._factory[servo.joint].get(register, value)) != value
+        ]
+        return Finding(check, "warn", "; ".join(found), remedy) if found else None
 
     def _watchdog(self) -> list[Finding | None]:
         return [

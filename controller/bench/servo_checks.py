@@ -1,14 +1,20 @@
 """The other side: each servo against the robot that was described."""
 
 from collections.abc import Mapping, Sequence
+from statistics import median
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.probe import Probe
 from snakewalk.drivers.chain.start_up import ServoReport
-from snakewalk.drivers.protocol.registers import alarm_names
+from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, alarm_names
 
 _HOT_C = 60.0
+_UNSTEADY_V = 0.3
+"""Change of a voltage at rest that no sensor shows by itself (ours)."""
+_WARMER_C = 20.0
+"""A servo at rest that is warmer than the others by more has a reason (ours)."""
 _CABLE_DROP_V = 0.5
 _DUPLICATE_REMEDY = (
     "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
@@ -23,15 +29,17 @@ def presence(
     expected: Sequence[int],
     found: Sequence[int],
     elsewhere: Mapping[int, int],
+    others: Sequence[int],
     baud: int,
     port: str,
 ) -> list[Finding]:
-    """Who answers, who does at another baud rate, who does not at all.
+    """Findings about the robot's servos: at this baud rate, at another, or silent.
 
     Args:
         expected: IDs of the robot.
         found: those that answered at ``baud``.
         elsewhere: ID to the other baud rate at which it answered.
+        others: IDs that answered at ``baud`` and are not the robot's.
         baud: the robot's.
         port: for the remedy.
 
@@ -52,11 +60,7 @@ def presence(
         findings.append(Finding("baud rate", "ok" if found else "warn", f"{baud} baud"))
     missing = [i for i in expected if i not in found and i not in elsewhere]
     if missing:
-        remedy = (
-            "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
-            if len(missing) == len(expected)
-            else f"look at the cable in front of servo {missing[0]}; snakewalk scan --port {port}"
-        )
+        remedy = _missing_remedy(missing, expected, others, port)
         findings.append(
             Finding("servo IDs", "fail", f"no answer from {shown_ids(missing)}", remedy)
         )
@@ -65,16 +69,33 @@ def presence(
     return findings
 
 
-def unexpected_ids(expected: Sequence[int], answering: Sequence[int]) -> Finding | None:
-    """Servos on the bus that the robot does not have; None if there are none."""
-    extra = [i for i in answering if i not in expected]
-    if not extra:
+def _missing_remedy(
+    missing: Sequence[int], expected: Sequence[int], others: Sequence[int], port: str
+) -> str:
+    if len(others) == len(missing) == 1:
+        return (
+            f"if servo {others[0]} is meant: snakewalk bus set --port {port} --id {others[0]} "
+            f"--new-id {missing[0]}"
+        )
+    if len(others) >= len(missing):
+        return (
+            f"{shown_subject(others, 'reply')} instead: this chain is not calibrated; snakewalk "
+            f"calibrate --port {port} -o my-robot.toml finds the joint of each servo"
+        )
+    if len(missing) == len(expected):
+        return "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
+    return f"look at the cable in front of servo {missing[0]}; snakewalk scan --port {port}"
+
+
+def unnamed_robot(findings: Sequence[Finding], robot: RobotConfig) -> Finding | None:
+    """Finding for a command without ``--robot`` whose servos are not the default robot's."""
+    if all(each.check != "servo IDs" or each.grade == "ok" for each in findings):
         return None
     return Finding(
-        "servo IDs",
+        "robot",
         "warn",
-        f"{shown_subject(extra, 'are')} on the bus and not in the robot",
-        "describe them in the robot's TOML, or take them off",
+        f"--robot is not given, so {shown_ids(robot.servo_ids)} are expected",
+        "name your robot by --robot; snakewalk list has the shipped ones",
     )
 
 
@@ -133,7 +154,9 @@ def silent_to_reads(servo_ids: Sequence[int]) -> Finding | None:
 def models(servos: Sequence[ServoReport], wrong: Sequence[str], model: str) -> Finding:
     """Whether all are of the robot's model; ``wrong`` says which are not."""
     if wrong:
-        remedy = f"the robot's TOML says {model}: correct it, or exchange the servo"
+        remedy = (
+            f"expected: {model}; name a robot with this model by --robot, or exchange the servo"
+        )
         return Finding("model", "fail", "; ".join(wrong), remedy)
     return Finding("model", "ok", f"{len(servos)} times {model}")
 
@@ -209,8 +232,26 @@ def supply(servos: Sequence[ServoReport], low_v: float, high_v: float) -> Findin
     return Finding("supply", "ok", shown)
 
 
+def unsteady_supply(bus: DynamixelBus, servos: Sequence[ServoReport]) -> list[Finding]:
+    """Finding about a supply whose voltage changes while nothing moves.
+
+    Raises:
+        BusError: a servo does not reply.
+
+    """
+    changed_v = {
+        s.servo_id: bus.read(s.servo_id, "Present Input Voltage") * VOLTAGE_UNIT_V - s.voltage_v
+        for s in servos
+    }
+    servo_id = max(changed_v, key=lambda each: abs(changed_v[each]))
+    if abs(changed_v[servo_id]) <= _UNSTEADY_V:
+        return []
+    found = f"changes by {abs(changed_v[servo_id]):.1f} V at rest, measured by servo {servo_id}"
+    return [Finding("supply", "warn", found, "a loose supply plug, or a supply that is too weak")]
+
+
 def heat(servos: Sequence[ServoReport], robot: RobotConfig, limit_c: float) -> Finding:
-    """Temperatures at rest."""
+    """Temperatures at rest, and sensors that cannot be right."""
     hottest = max(servos, key=lambda s: s.temperature_c)
     label = robot.label_of_servo(hottest.servo_id)
     found = f"{label} is the warmest: {hottest.temperature_c:.0f} C"
@@ -218,4 +259,14 @@ def heat(servos: Sequence[ServoReport], robot: RobotConfig, limit_c: float) -> F
         return Finding("temperature", "fail", found, "let it cool down")
     if hottest.temperature_c > _HOT_C:
         return Finding("temperature", "warn", found, "it will not walk for long: let it cool down")
+    dead = [s.servo_id for s in servos if s.temperature_c <= 0.0]
+    if dead:
+        found = f"{shown_subject(dead, 'report', robot.label_of_servo)} 0 C or less"
+        remedy = "its sensor is broken: it does not protect itself from heat; exchange the servo"
+        return Finding("temperature", "warn", found, remedy)
+    usual_c = median(s.temperature_c for s in servos)
+    if hottest.temperature_c - usual_c > _WARMER_C:
+        found += f", the others have about {usual_c:.0f} C"
+        remedy = "did it push against something? is its joint tight, or its sensor off?"
+        return Finding("temperature", "warn", found, remedy)
     return Finding("temperature", "ok", found)

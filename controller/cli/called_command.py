@@ -1,14 +1,16 @@
-"""A command as it is called: it checks its words and files first, and reports at a chosen level."""
+"""A command as it is called: checks its words and files first, then imports what it uses."""
 
 import inspect
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Any
+from typing import Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import command_info
 from snakewalk.controller.console.messages import LOGGER, messages
 from snakewalk.controller.console.options import (
     LogFile,
@@ -19,6 +21,7 @@ from snakewalk.controller.console.options import (
     check_idle,
 )
 from snakewalk.controller.console.plugins import take_problems
+from snakewalk.controller.console.result_files import refuse_to_overwrite
 
 
 class CalledCommand(TyperCommand):
@@ -42,15 +45,31 @@ def _takes_one_value(option: Any) -> bool:
     return not (option.multiple or (option.is_flag and not option.secondary_opts))
 
 
-def with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of what it says, and check the files that it names first.
+def called(
+    declared: Callable[..., Any], load: Callable[[], Callable[..., Any]]
+) -> Callable[..., Any]:
+    """Return the function of a command with the options that all commands have.
 
-    Faults in these files are told before anything heavy is imported.
+    It checks the files that the command names, of its input and of its results, before ``load``
+    imports what the command uses. A parameter whose type is a dataclass stands for the options that
+    are the fields of the dataclass.
+
+    Args:
+        declared: the command's signature, docstring and declaration.
+        load: returns the function to call.
+
     """
-    signature = inspect.signature(function, eval_str=True)
-    defaults = {name: one.default for name, one in signature.parameters.items()}
+    signature = inspect.signature(declared, eval_str=True)
+    groups: dict[str, Any] = {
+        name: one.annotation
+        for name, one in signature.parameters.items()
+        if is_dataclass(one.annotation)
+    }
+    given = [each for one in signature.parameters.values() for each in _options(one)]
+    defaults = {one.name: one.default for one in given}
+    info = command_info(declared)
 
-    @wraps(function)
+    @wraps(declared)
     def command(
         *, verbose: Verbose, quiet: Quiet, log_level: LogLevel, log_file: LogFile, **options: Any
     ) -> Any:
@@ -63,7 +82,14 @@ def with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
                 LOGGER.warning("%s", problem)
             named = {key: value for key, value in options.items() if isinstance(value, str)}
             check_files(named.get("run"), named.get("robot"), named.get("world"))
-            return function(**options)
+            force = bool(options.get("force"))
+            refuse_to_overwrite([options[name] for name in info.results], force)
+            refuse_to_overwrite([options[name] for name in info.tables], force=True)
+            for name, group in groups.items():
+                options[name] = group(
+                    **{each.name: options.pop(each.name) for each in fields(group)}
+                )
+            return load()(**options)
 
     own = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
@@ -74,10 +100,20 @@ def with_messages(function: Callable[..., Any]) -> Callable[..., Any]:
             ("log_file", LogFile, None),
         )
     ]
-    paragraphs = (inspect.getdoc(function) or "").split("\n\n")
+    paragraphs = (inspect.getdoc(declared) or "").split("\n\n")
     command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
-    command.__annotations__ = function.__annotations__ | {one.name: one.annotation for one in own}
-    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[*signature.parameters.values(), *own]
-    )
+    command.__annotations__ = {one.name: one.annotation for one in (*given, *own)}
+    command.__signature__ = signature.replace(parameters=[*given, *own])  # type: ignore[attr-defined]
     return command
+
+
+def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
+    """Return the options for which a parameter of a command stands."""
+    group = parameter.annotation
+    if not is_dataclass(group):
+        return [parameter]
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        parameter.replace(name=each.name, default=each.default, annotation=hints[each.name])
+        for each in fields(group)
+    ]

@@ -10,9 +10,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from snakewalk.config.errors import InputError
-from snakewalk.config.extras import missing_extra
-from snakewalk.controller.cli.called_command import CalledCommand, with_messages
+from snakewalk.controller.cli.called_command import CalledCommand, called
 from snakewalk.controller.console.command import (
     BUS,
     JOB,
@@ -21,19 +19,20 @@ from snakewalk.controller.console.command import (
     CommandInfo,
     command_info,
 )
+from snakewalk.controller.console.declaration import declaration
 from snakewalk.controller.console.plugins import Plugin, plugins
 
 _FAMILIES: Final = {
-    "bus": ("Servos and their settings.", BUS),
-    "camera": ("The camera above the robot: lens, markers, check.", JOB),
-    "fish": ("Fish from video: match, synthesise, film.", RECORDINGS),
-    "gait": ("Gaits: list, show, run, fit.", MOTION),
-    "policy": ("Learnt policies: list, run, compare by trials, learn.", MOTION),
-    "repertoire": ("Actions recorded from the physics.", MOTION),
-    "robot": ("A robot: show it, its power, export it, import one.", JOB),
-    "terrain": ("Worlds from real ground: maps of files, and of stereo.", JOB),
+    "bus": ("Servos and their settings", BUS),
+    "camera": ("The camera above the robot", JOB),
+    "fish": ("Fish from video", RECORDINGS),
+    "gait": ("Gaits", MOTION),
+    "policy": ("Learnt policies", MOTION),
+    "repertoire": ("Actions recorded from the physics", MOTION),
+    "robot": ("A robot", JOB),
+    "terrain": ("Worlds from real ground", JOB),
 }
-"""Help and group of commands of two words; those of other packages have a general help."""
+"""Subject and group of commands of two words; those of other packages have a general subject."""
 _GROUPS: Final = (JOB, MOTION, RECORDINGS, BUS)
 """Order of the groups in ``--help``; other groups follow."""
 _FIRST: Final = ("list", "init", "plan", "run", "stop", "report")
@@ -42,7 +41,7 @@ _CONTEXT: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"]}
 
 
 class CommandGroup(TyperGroup):
-    """Commands by name, each imported when it is called; ``--help`` needs their manifests only."""
+    """Commands by name, each imported when it is called; the list needs their manifests only."""
 
     prefix = ""
     """First word of a family's commands."""
@@ -155,7 +154,8 @@ def _next_word(each: Plugin, prefix: str) -> str:
 
 def _family(path: str, commands: list[Plugin]) -> Any:
     """Return the group of the commands that begin with the same word."""
-    about, group = _FAMILIES.get(path, (f"Commands of {commands[0].package}.", commands[0].group))
+    about, group = _FAMILIES.get(path, (f"Commands of {commands[0].package}", commands[0].group))
+    about += f": {', '.join(dict.fromkeys(_next_word(each, path) for each in commands))}."
     group_class = type("Family", (CommandGroup,), {"prefix": path})
     family = typer.Typer(
         cls=group_class, help=about, rich_markup_mode="rich", context_settings=_CONTEXT
@@ -178,36 +178,15 @@ def _stub(name: str, listed: Plugin) -> Any:
 
 
 def _whole(name: str, listed: Plugin) -> Any:
-    """Import a command and build its options."""
-    try:
-        function: Callable[..., Any] = listed.load()
-    except ModuleNotFoundError as error:
-        needed = missing_extra(error)
-        if needed is None:
-            raise
-        return _unavailable(name, listed, needed)
+    """Build the options of a command; its module is imported when it is called."""
+    declared = declaration(listed.target) if listed.is_own else None
+    function: Callable[..., Any] = declared or listed.load()
     info = command_info(function)
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)
     alone.command(
         name, cls=CalledCommand, epilog=_examples(info), rich_help_panel=listed.group or None
-    )(with_messages(function))
+    )(called(function, listed.load))
     return typer.main.get_command(alone)
-
-
-def _unavailable(name: str, listed: Plugin, needed: str) -> Any:
-    """Return a command that only says which package of an extra is missing."""
-
-    def reject() -> None:
-        raise InputError(needed)
-
-    return TyperCommand(
-        name,
-        callback=reject,
-        help=f"{listed.help}\n\nNot available: {needed}",
-        rich_help_panel=listed.group or None,
-        rich_markup_mode="rich",
-        context_settings=_CONTEXT | {"ignore_unknown_options": True, "allow_extra_args": True},
-    )
 
 
 def _examples(info: CommandInfo) -> str:

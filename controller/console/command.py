@@ -25,13 +25,28 @@ class CommandInfo:
     """Group in ``--help``; the family's own where it is empty."""
     examples: tuple[str, ...]
     """Command lines without the leading ``snakewalk``."""
+    results: tuple[str, ...] = ()
+    """Options that name files of results; ``--force`` overwrites them."""
+    tables: tuple[str, ...] = ()
+    """Options that name tables to which the command appends rows."""
 
 
-def command(words: str, *, group: str = "", examples: tuple[str, ...] = ()) -> Callable[[F], F]:
-    """Declare a function as a command; ``python -m tests.architecture.manifests`` lists it."""
+def command(
+    words: str,
+    *,
+    group: str = "",
+    examples: tuple[str, ...] = (),
+    results: tuple[str, ...] = (),
+    tables: tuple[str, ...] = (),
+) -> Callable[[F], F]:
+    """Declare a function as a command; ``python -m tests.architecture.manifests`` lists it.
+
+    The files of ``results`` and ``tables`` are checked before the module of the command is
+    imported.
+    """
 
     def declare(function: F) -> F:
-        setattr(function, _ATTRIBUTE, CommandInfo(words, group, examples))
+        setattr(function, _ATTRIBUTE, CommandInfo(words, group, examples, results, tables))
         return function
 
     return declare

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 LOGGER: Final = logging.getLogger("snakewalk")
 LOGGER.addHandler(logging.NullHandler())
+_KEPT_LINES: Final = 10_000
+"""Messages that are kept to restore a deleted file (ours)."""
 FAULT: Final = "fault"
 """Attribute of a record whose text is printed by whoever ends the command."""
 
@@ -37,6 +39,74 @@ class _Screen(logging.Handler):
         if not getattr(record, FAULT, False):
             start = "snakewalk: " if record.levelno >= logging.WARNING else ""
             print(f"{start}{plain(record.getMessage())}", file=sys.stderr, flush=True)
+
+
+class _KeptFile(logging.FileHandler):
+    """The file of ``--log-file``; a fault of disk or folder is reported once, when it happens.
+
+    If the file or its folder is deleted, it is made again with all messages so far.
+    """
+
+    def __init__(self, file: Path) -> None:
+        super().__init__(file, encoding="utf-8")
+        self._option = f"--log-file {file}"
+        self._lines: list[str] = []
+        self._has_failed = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record."""
+        if self._has_failed:
+            return
+        if len(self._lines) < _KEPT_LINES:
+            self._lines.append(self.format(record))
+        try:
+            if not Path(self.baseFilename).exists():
+                self._restore()
+            else:
+                super().emit(record)
+        except OSError as error:
+            self._report(error)
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  the name that logging calls
+        """Report that the disk has rejected a record."""
+        error = sys.exc_info()[1]
+        if isinstance(error, OSError):
+            self._report(error)
+        else:
+            super().handleError(record)
+
+    def close(self) -> None:
+        """Close the file; a fault of the disk is reported."""
+        try:
+            super().close()
+        except OSError as error:
+            self._report(error)
+
+    def _restore(self) -> None:
+        """Make folder and file again, with the messages so far."""
+        if self.stream is not None:
+            self.stream.close()
+        Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
+        self.stream = self._open()
+        self.stream.write("".join(f"{line}\n" for line in self._lines))
+        self.flush()
+        _print_warning(
+            f"{self._option}: was deleted meanwhile; it is written again, with "
+            f"{len(self._lines)} messages so far"
+        )
+
+    def _report(self, error: OSError) -> None:
+        if self._has_failed:
+            return
+        self._has_failed = True
+        _print_warning(
+            f"{self._option}: {error.strerror or error}; it ends here, further messages are on "
+            "standard error only"
+        )
+
+
+def _print_warning(text: str) -> None:
+    print(f"snakewalk: {plain(text)}", file=sys.stderr, flush=True)
 
 
 class _OneLine(logging.Formatter):
@@ -66,7 +136,7 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
     handlers: list[logging.Handler] = [_Screen(level.upper())]
     if file is not None:
         try:
-            kept = logging.FileHandler(file, encoding="utf-8")
+            kept = _KeptFile(file)
         except OSError as error:
             raise InputError(f"--log-file {file}: {error.strerror or error}") from None
         kept.setFormatter(_OneLine("%(asctime)s %(levelname)-7s %(message)s"))

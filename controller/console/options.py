@@ -12,7 +12,9 @@ from rich.table import Table
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
+from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.plain_console import PlainConsole
+from snakewalk.controller.console.plugins import require
 
 _WIDE: Final = 200
 """Columns of a pipe or a file, which break no line."""
@@ -45,23 +47,26 @@ Motion = Annotated[
 Port = Annotated[
     str | None,
     typer.Option(
+        callback=check_port_name,
         help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter "
-        "there is"
+        "there is",
     ),
 ]
 ChainPort = Annotated[
     str | None,
     typer.Option(
+        callback=check_port_name,
         help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
-        "of the chain have ports of their own; default: the only USB adapter there is"
+        "of the chain have ports of their own; default: the only USB adapter there is",
     ),
 ]
 RunPort = Annotated[
     str | None,
     typer.Option(
+        callback=check_port_name,
         help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
         "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
-        "whose file says which; without it, the simulator"
+        "whose file says which; without it, the simulator",
     ),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
@@ -178,14 +183,17 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
 
     Raises:
         ConfigError: every fault of the first file that has one.
+        InputError: a run names a pose source that is not installed.
 
     """
-    from snakewalk.config.loader import load_robot, load_run, load_world  # noqa: PLC0415  --help stays quick
+    from snakewalk.config.loader import load_robot, load_run, load_world, place_of  # noqa: PLC0415  --help stays quick
 
     beside = None
     if run is not None and run.endswith(".toml"):
         beside, given = Path(run).parent, load_run(run)
         robot, world = robot or given.robot, world or given.world
+        if given.pose is not None:
+            require("pose", given.pose.partition(":")[0], place_of(Path(run), "pose"))
     if robot is not None and robot.endswith(".toml"):
         load_robot(robot, beside)
     if world is not None and world.endswith(".toml"):

@@ -46,6 +46,11 @@ class Plugin:
     package: str
     """Distribution, or package of snakewalk, that provides it."""
 
+    @property
+    def is_own(self) -> bool:
+        """Whether it is one of snakewalk's own."""
+        return self.package.startswith(f"{OWN}.")
+
     def load(self) -> Any:
         """Import the plug-in.
 
@@ -59,7 +64,7 @@ class Plugin:
         except InputError:
             raise
         except Exception as error:
-            if self.package.startswith(f"{OWN}."):
+            if self.is_own:
                 raise
             raise PluginError(
                 f"{self.kind} {self.name} of {self.package}: cannot be imported "

@@ -1,51 +1,56 @@
-"""The gaits by name."""
+"""The gaits by name: every concrete ``Gait`` that a module of this package defines."""
 
-from typing import Any
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, Final
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.gaits.compound_serpenoid import CompoundSerpenoid
-from snakewalk.controller.gaits.concertina import Concertina
-from snakewalk.controller.gaits.erect import ErectTrot, ErectWalk
+from snakewalk.controller import gaits
 from snakewalk.controller.gaits.gait import Gait
-from snakewalk.controller.gaits.helix import HelixPipe, HelixPole
-from snakewalk.controller.gaits.lateral_undulation import LateralUndulation
-from snakewalk.controller.gaits.rectilinear import Rectilinear
-from snakewalk.controller.gaits.rolling import Rolling
-from snakewalk.controller.gaits.sidewinding import Sidewinding
-from snakewalk.controller.gaits.spine import (
-    Anguilliform,
-    Carangiform,
-    Dolphin,
-    SpineGait,
-    Subcarangiform,
-    Thunniform,
-)
-from snakewalk.controller.gaits.trot import LateralWalk, Trot
-from snakewalk.controller.gaits.turn_in_place import TurnInPlace
+from snakewalk.controller.gaits.spine import SpineGait, heading_loop
 
-GAITS: dict[str, type[Gait]] = {
-    gait.name: gait
-    for gait in (
-        LateralUndulation,
-        Sidewinding,
-        Rolling,
-        TurnInPlace,
-        Rectilinear,
-        Concertina,
-        CompoundSerpenoid,
-        HelixPole,
-        HelixPipe,
-        Anguilliform,
-        Subcarangiform,
-        Carangiform,
-        Thunniform,
-        Dolphin,
-        Trot,
-        LateralWalk,
-        ErectWalk,
-        ErectTrot,
-    )
-}
+_FIRST: Final = (
+    "lateral_undulation",
+    "sidewinding",
+    "rolling",
+    "turn_in_place",
+    "rectilinear",
+    "concertina",
+    "compound_serpenoid",
+    "helix",
+    "spine",
+    "trot",
+    "erect",
+)
+"""Modules whose gaits come first in lists; the other modules follow by name."""
+_WITHOUT_GAITS: Final = ("registry", "backbone", "spine_heading")
+"""Modules that define no gait; two of them are slow to import."""
+
+
+def gaits_by_name() -> dict[str, type[Gait]]:
+    """Return the gaits of the package; ``docs/how-to/add-a-gait.md`` adds one."""
+    return {gait.name: gait for gait in _gaits()}
+
+
+def _gaits() -> Iterator[type[Gait]]:
+    """Yield the gaits of each module in the order of their definition."""
+    found = {each.name for each in iter_modules(gaits.__path__) if not each.ispkg}
+    for name in [*_FIRST, *sorted(found - {*_FIRST, *_WITHOUT_GAITS})]:
+        module = import_module(f"{gaits.__name__}.{name}")
+        for each in vars(module).values():
+            if (
+                isinstance(each, type)
+                and issubclass(each, Gait)
+                and each.__module__ == module.__name__
+                and not inspect.isabstract(each)
+                and hasattr(each, "name")
+            ):
+                yield each
+
+
+GAITS: Final = gaits_by_name()
 
 SPINE_GAITS: tuple[str, ...] = tuple(
     name for name, gait in GAITS.items() if issubclass(gait, SpineGait)
@@ -60,8 +65,7 @@ def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "")
         InputError: no such gait, unknown parameters, values out of range; one line each.
 
     """
-    from snakewalk.controller.gaits import spine_heading  # noqa: F401, PLC0415  compiled here, never within a run
-
+    heading_loop()  # compiled here, never within a run
     if name not in GAITS:
         raise InputError(f"{name}: no such gait; there are {', '.join(GAITS)}")
     return GAITS[name].of(values, source)

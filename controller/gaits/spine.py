@@ -6,6 +6,8 @@ modes drives Lighthill's travelling form here, and the printed form stays as the
 Amplitudes are printed without a unit: taken in that of ``u``, of which a body is 2 pi long.
 """
 
+from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -45,6 +47,14 @@ class SpineParameters(GaitParameters):
     fold_rad: float = Field(1.1, ge=0.0, le=1.57, description="of legs, if any: back at the hip")
 
 
+@cache
+def heading_loop() -> Callable[..., None]:
+    """Return the compiled loop of ``spine_heading``."""
+    from snakewalk.controller.gaits.spine_heading import write_headings  # noqa: PLC0415  compiled: slow to import
+
+    return write_headings
+
+
 def spine_bends_rad(
     phase_rad: Floats, joints: int, p: SpineParameters, edges: Floats | None = None
 ) -> Floats:
@@ -54,8 +64,7 @@ def spine_bends_rad(
     at the shares ``edges`` of it) before its headings are read: they are those of rigid links, not
     of slices in u.
     """
-    from snakewalk.controller.gaits.spine_heading import write_headings  # noqa: PLC0415  compiled: slow to import
-
+    write_headings = heading_loop()
     shares = np.linspace(0.0, 1.0, joints + 2) if edges is None else edges
     u = np.linspace(0.0, TURN, SAMPLES)
     headings = np.empty((len(phase_rad), len(shares) - 1))

@@ -45,6 +45,14 @@ class BodyView(NamedTuple):
         """How far the links have gone along themselves since ``before``, mean over the body."""
         return _mean_advance_m(before.link_m, self.link_m, self.rotation)
 
+    def unbiased_advance_since_m(self, before: "BodyView") -> float:
+        """Return the same along the mean of the axes before and now.
+
+        Noise of the head's rotation moves the links and turns their axes at once: along the axes of
+        one of both times, 3 degrees in every pose make a body of 1.2 m 0.13 m/s slower at 50 Hz.
+        """
+        return 0.5 * (self.advance_since_m(before) - before.advance_since_m(self))
+
 
 class SpineLinks(NamedTuple):
     """The links of a robot's spine, for those who ask where they are in every cycle."""

@@ -5,14 +5,15 @@ chain turns them into packets, simulated servos answer on a simulated line. A po
 here has met clamps, wire time, quantised readings and servo lag.
 """
 
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import checked, load_robot, load_world
@@ -21,17 +22,24 @@ from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.run.backend import Backend, simulated
 from snakewalk.controller.run.prepared_run import PathlessRun, pose_with
+from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand, JointState
 
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.chase_view import ChaseView, ChaseWindow
+
 _FLOATS: Final = readonly_array()
 _SPEED_RAD_S: Final = 20.0
 _SPEED_M_S: Final = 3.0
 _CURRENT_A: Final = 10.0
 """Ends of the observation space (ours): far beyond what a body of such servos does."""
+
+
+METADATA: Final[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
 
 class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -64,13 +72,15 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         trip_penalty_m: metres that a trip costs.
         start_joint_rad: joints start within this, drawn evenly.
         start_heading_rad: so does the heading, around x.
+        render_mode: ``rgb_array``: ``render`` returns a picture (480, 640, 3); ``human``: a window
+            follows the body in real time; None: nothing is drawn.
 
     Raises:
-        InputError: a file is wrong, or MuJoCo is not installed.
+        InputError: a file is wrong, MuJoCo is not installed, or the mode is unknown.
 
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  as Gymnasium has it
+    metadata: dict[str, Any] = METADATA
 
     def __init__(
         self,
@@ -83,8 +93,13 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         trip_penalty_m: float = 1.0,
         start_joint_rad: float = 0.1,
         start_heading_rad: float = 0.2,
+        render_mode: str | None = None,
     ) -> None:
         require_extra("the environment needs", "mujoco")
+        modes = METADATA["render_modes"]
+        if render_mode is not None and render_mode not in modes:
+            raise InputError(f"render_mode '{render_mode}': expected {', '.join(modes)}, or None")
+        self.render_mode = render_mode
         body = load_robot(robot)
         fields = {
             "name": "snake-environment",
@@ -119,6 +134,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._due_s, self._taken_j = 0.0, 0.0
         self._view: BodyView | None = None
         self._sent_rad: Floats = np.zeros(body.joint_count)
+        self._screen: ChaseView | ChaseWindow | None = None
+        self._clock, self._shown_s = WallClock(), 0.0
 
     @property
     def robot(self) -> RobotConfig:
@@ -166,6 +183,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._sent_rad = state.position_rad
         self._view = None
         observation, _ = self._observe(backend, state)
+        self._show()
         return observation, self._info(link)
 
     def step(
@@ -175,12 +193,13 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Raises:
             gymnasium.error.ResetNeeded: there is no episode, or safety has tripped in it.
+            gymnasium.error.InvalidAction: its shape is not that of ``action_space``.
 
         """
         backend, link = self._backend, self._link
         if backend is None or link is None or link.tripped:
             raise gymnasium.error.ResetNeeded("call reset before step")
-        goal_rad = np.asarray(action, dtype=float) * self.limit_rad
+        goal_rad = checked_action(action, self.robot.joint_names) * self.limit_rad
         self._due_s += self.period_s
         try:
             link.write(JointCommand(backend.clock.now_s(), goal_rad))
@@ -198,7 +217,42 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         tripped = info["tripped"] is not None
         if tripped:
             reward -= self._trip_penalty_m
+        self._show()
         return observation, reward, tripped, False, info
+
+    def render(self) -> Image | None:
+        """Return a picture of the body, (480, 640, 3), if the mode is ``rgb_array``; else None.
+
+        Raises:
+            gymnasium.error.ResetNeeded: no episode has begun.
+            InputError: nothing here can draw.
+
+        """
+        if self._backend is None or self._backend.qpos is None:
+            raise gymnasium.error.ResetNeeded("call reset before render")
+        if self.render_mode is None:
+            return None
+        prepared = self._prepared
+        if self._screen is None:
+            from snakewalk.sim.rendering import chase_view  # noqa: PLC0415  an extra
+
+            kind = chase_view.ChaseWindow if self.render_mode == "human" else chase_view.ChaseView
+            self._screen = kind(prepared.robot, prepared.world, prepared.ground)
+        return self._screen.draw(self._backend.qpos())
+
+    def close(self) -> None:
+        """Close window and frame buffer; safe to call twice."""
+        if self._screen is not None:
+            self._screen.close()
+        self._screen = None
+
+    def _show(self) -> None:
+        """Follow the body in the window, in real time."""
+        if self.render_mode != "human":
+            return
+        self._clock.sleep_until_s(self._shown_s + self.period_s)
+        self._shown_s = self._clock.now_s()
+        self.render()
 
     def _observe(self, backend: Backend, state: JointState) -> tuple[NDArray[np.float32], float]:
         """Observation, and how far the centre of mass came along x since the one before."""
@@ -224,6 +278,26 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             "clamped": [] if verdict is None else verdict.clamped.nonzero()[0].tolist(),
             "tripped": link.tripped,
         }
+
+
+def checked_action(action: NDArray[np.floating[Any]], names: Sequence[str]) -> Floats:
+    """Return an action as floats.
+
+    Args:
+        action: of a policy.
+        names: of its numbers.
+
+    Raises:
+        gymnasium.error.InvalidAction: it has another shape.
+
+    """
+    values = np.asarray(action, dtype=float)
+    if values.shape != (len(names),):
+        raise gymnasium.error.InvalidAction(
+            f"action: has shape {values.shape}, expected ({len(names)},): one number for each of "
+            f"{', '.join(names)}"
+        )
+    return values
 
 
 @compiled(

@@ -11,10 +11,23 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from snakewalk.controller.learning.environment import SnakeEnvironment
-from snakewalk.controller.motion.policy import WAVE_SPAN, Origin, Policy, observation_names
+from snakewalk.config.arrays import Image
+from snakewalk.controller.learning.environment import METADATA, SnakeEnvironment, checked_action
+from snakewalk.controller.motion.policy import (
+    WAVE_SPAN,
+    Origin,
+    Policy,
+    PolicyWave,
+    observation_names,
+)
 from snakewalk.controller.motion.policy_motion import PolicyMotion
 
+WAVE_NAMES = tuple(
+    f"{key}_{number}" if isinstance(value, tuple) else key
+    for key, value in PolicyWave().model_dump().items()
+    for number in range(1, np.size(value) + 1)
+)
+"""Names of an action's P numbers."""
 _UNTRAINED = Policy(
     name="untrained",
     robot="any",
@@ -39,10 +52,11 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
 
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  as Gymnasium has it
+    metadata: dict[str, Any] = METADATA
 
     def __init__(self, policy: Policy = _UNTRAINED, **options: Any) -> None:
         self._snake = SnakeEnvironment(**options)
+        self.render_mode = self._snake.render_mode
         self._policy = policy.model_copy(update={"network": (), "observation": ()})
         self._motion: PolicyMotion | None = None
         self.observation_names = observation_names(self._snake.robot)
@@ -68,13 +82,22 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
 
         Raises:
             gymnasium.error.ResetNeeded: there is no episode, or safety has tripped in it.
+            gymnasium.error.InvalidAction: its shape is not that of ``action_space``.
 
         """
         if self._motion is None:
             raise gymnasium.error.ResetNeeded("call reset before step")
-        goal_rad = self._motion.act(np.asarray(action, dtype=float), self._snake.period_s)
+        goal_rad = self._motion.act(checked_action(action, WAVE_NAMES), self._snake.period_s)
         _, reward, tripped, cut, info = self._snake.step(goal_rad / self._snake.limit_rad)
         return self._observe(self._motion), reward, tripped, cut, info
+
+    def render(self) -> Image | None:
+        """As ``SnakeEnvironment.render``."""
+        return self._snake.render()
+
+    def close(self) -> None:
+        """Close window and frame buffer; safe to call twice."""
+        self._snake.close()
 
     def _observe(self, motion: PolicyMotion) -> NDArray[np.float32]:
         return motion.observe(self._snake.view).astype("f4")

@@ -13,6 +13,7 @@ import cma
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.base import Strict
 from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.learning.environment import SnakeEnvironment
 from snakewalk.controller.motion.policy import WAVE_SPAN, Origin, Policy, PolicyWave
@@ -22,33 +23,60 @@ _SIGMA = 0.3
 """First spread of the candidates, in ``WAVE_SPAN`` (ours)."""
 
 
+class SearchProgress(Strict):
+    """Rewards of the generations so far; with its arguments they determine the rest of a search."""
+
+    robot: str
+    world: str
+    population: int
+    steps: int
+    seed: int
+    software: str
+    """Names and versions; others may draw other candidates."""
+    rewards_m: tuple[tuple[float, ...], ...] = ()
+    """Rewards of each generation, one for each candidate."""
+
+
+def search_progress(
+    *, robot: str, world: str, population: int, steps: int, seed: int
+) -> SearchProgress:
+    """Progress of a search at its beginning."""
+    software = f"snakewalk {version('snakewalk')}, cma {version('cma')}"
+    return SearchProgress(
+        robot=robot, world=world, population=population, steps=steps, seed=seed, software=software
+    )
+
+
 def search_wave(
     name: str,
+    progress: SearchProgress,
     *,
-    robot: str,
-    world: str,
     generations: int,
-    population: int,
-    steps: int,
-    seed: int,
     workers: int,
-    on_progress: Callable[[int, float], None] = lambda generation, reward_m: None,
+    on_progress: Callable[[SearchProgress], None] = lambda progress: None,
 ) -> Policy:
     """Search the wave whose episodes earn most; the same one for the same arguments.
 
     Each candidate has one episode; all of a generation have the same start, each generation
     another one. The result is the mean of the last generation's distribution, which has seen more
-    starts than any of its members. ``on_progress`` takes the generations done and the mean reward
-    of the last.
+    starts than any of its members.
+
+    Args:
+        name: of the policy.
+        progress: where the search begins; the generations in it are not simulated again.
+        generations: in all.
+        workers: processes.
+        on_progress: gets the progress after each generation.
 
     Raises:
         InputError: there is no such robot or world.
 
     """
     start = PolicyWave().vector()
+    robot, world, seed, steps = progress.robot, progress.world, progress.seed, progress.steps
+    population, software = progress.population, progress.software
     options = {"popsize": population, "seed": seed + 1, "verbose": -9}  # 0 is the time of day
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(start)), _SIGMA, options)
-    software = f"snakewalk {version('snakewalk')}, cma {version('cma')}"
 
     def policy(genes: Floats, asked: int) -> Policy:
         origin = Origin(
@@ -61,10 +89,16 @@ def search_wave(
         rate = map if pool is None else pool.map
         for generation in range(generations):
             genes = strategy.ask()
+            if generation < len(progress.rewards_m):
+                rewards = progress.rewards_m[generation]
+                strategy.tell(genes, [-reward_m for reward_m in rewards])
+                continue
             work = partial(_earned, world=world, start=seed + generation, steps=steps)
-            rewards = list(rate(work, [policy(each, 0) for each in genes]))
+            rewards = tuple(rate(work, [policy(each, 0) for each in genes]))
             strategy.tell(genes, [-reward_m for reward_m in rewards])
-            on_progress(generation + 1, float(np.mean(rewards)))
+            known = (*progress.rewards_m, rewards)
+            progress = progress.model_copy(update={"rewards_m": known})
+            on_progress(progress)
     return policy(strategy.result.xfavorite, generations * population)
 
 

@@ -77,7 +77,6 @@ def read_geo_raster(
     """
     require_extra("GeoTIFF and ASCII grid need", "rasterio")
     import rasterio  # noqa: PLC0415  an extra
-    from rasterio.errors import RasterioError  # noqa: PLC0415  an extra
 
     driver = "AAIGrid" if file.suffix.lower() == ".asc" else "GTiff"
     with file.open("rb"):  # a fault of the system is reported as such
@@ -88,7 +87,7 @@ def read_geo_raster(
             rasterio.open(file.absolute(), driver=driver) as opened,
         ):
             return _read(file, opened, units, crop, spacing_of)
-    except (RasterioError, ValueError) as error:
+    except (rasterio.errors.RasterioError, ValueError) as error:
         raise InputError(f"{file}: cannot be read as {driver}: {error}") from None
 
 
@@ -192,9 +191,7 @@ class _Strips:
         return out, absent
 
     def _strip(self, first: int, last: int) -> Floats:
-        from rasterio.windows import Window  # noqa: PLC0415  an extra
-
-        part = Window.from_slices((first, last), (self._columns.start, self._columns.stop))
+        part = ((first, last), (self._columns.start, self._columns.stop))
         values = self._opened.read(1, window=part, out_dtype="float64")
         missing: Bools = self._opened.read_masks(1, window=part) == 0
         missing |= ~np.isfinite(values)

@@ -87,14 +87,13 @@ def true_scale(
         Nan twice where the system has no place on the earth.
 
     """
-    from rasterio.errors import RasterioError  # noqa: PLC0415  an extra
-    from rasterio.warp import transform  # noqa: PLC0415  an extra
+    from rasterio import errors, warp  # noqa: PLC0415  an extra
 
     (x, y), (dx, dy) = place, step
     at_x, at_y = [x - dx, x + dx, x, x], [y, y, y - dy, y + dy]
     try:
-        longitude, latitude = transform(crs, "EPSG:4326", at_x, at_y)
-    except (RasterioError, ValueError):
+        longitude, latitude = warp.transform(crs, "EPSG:4326", at_x, at_y)
+    except (errors.RasterioError, ValueError):
         return math.nan, math.nan
     if not all(map(math.isfinite, [*longitude, *latitude])):
         return math.nan, math.nan

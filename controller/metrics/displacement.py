@@ -28,9 +28,18 @@ class GaitDisplacement:
     turn_rad: float
     """A cycle, positive to the left."""
     speed_m_s: float
-    """Over the ground."""
+    """Along the axis of the gait: over the ground, or upwards if the gait climbs."""
     up_bl: float = float("nan")
-    """Body lengths a cycle: what a climber is for."""
+    """Body lengths a cycle."""
+    start_s: float = float("nan")
+    """Begin of the first of the cycles."""
+    end_s: float = float("nan")
+    """End of the last of them."""
+
+    @property
+    def distance_m(self) -> float:
+        """Along the axis of the gait, in all cycles."""
+        return self.speed_m_s * (self.end_s - self.start_s)
 
 
 def full_rate_span_s(start_s: float, end_s: float, duration_s: float) -> tuple[float, float]:
@@ -52,7 +61,8 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     config, robot, pose = record.header.run.gait, record.header.robot, record.pose
     if config is None:
         raise InputError("the log is of no gait")
-    hz = GaitCycle(make_gait(config.name, config.parameters), robot).frequency_hz
+    gait = make_gait(config.name, config.parameters)
+    hz = GaitCycle(gait, robot).frequency_hz
     unknown = GaitDisplacement(0, hz, *(float("nan"),) * 4)
     known = np.isfinite(pose.links_m).all(axis=(1, 2))
     if not known.any() or hz <= 0.0:
@@ -65,11 +75,13 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
         return unknown
     frames: list[Frame] = []
     marks: list[Frame] = []
+    marked_s: list[float] = []
     due = last_s - np.arange(count, -1, -1) / hz
     for k in range(int(np.searchsorted(time_s, due[0])), len(time_s)):
         frames = [virtual_chassis(links[k], up[k], frames[0] if frames else None)]
         if len(marks) <= count and time_s[k] >= due[len(marks)] - 1e-9:
             marks.append(frames[0])
+            marked_s.append(float(time_s[k]))
     count = len(marks) - 1
     centre = np.array([mark.origin_m[:2] for mark in marks])
     heading = np.unwrap([mark.heading_rad for mark in marks])
@@ -77,12 +89,16 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     dx, dy = np.diff(centre, axis=0).T
     forward = np.cos(middle) * dx + np.sin(middle) * dy
     left = -np.sin(middle) * dx + np.cos(middle) * dy
+    rise_m = float(marks[-1].origin_m[2] - marks[0].origin_m[2]) / count
+    advance_m = rise_m if gait.aim == "climb" else float(np.hypot(forward.mean(), left.mean()))
     return GaitDisplacement(
         count,
         hz,
         float(forward.mean()) / robot.length_m,
         float(left.mean()) / robot.length_m,
         float((heading[-1] - heading[0]) / count),
-        float(np.hypot(forward.mean(), left.mean())) * hz,
-        float(marks[-1].origin_m[2] - marks[0].origin_m[2]) / count / robot.length_m,
+        advance_m * count / (marked_s[-1] - marked_s[0]),
+        rise_m / robot.length_m,
+        marked_s[0],
+        marked_s[-1],
     )

@@ -18,6 +18,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.displacement import full_rate_span_s
 from snakewalk.controller.metrics.ground_contact import CLEAR_M
+from snakewalk.controller.metrics.travel import travel
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
@@ -109,21 +110,29 @@ def effort(record: RunRecord) -> Effort:
     if steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
         return unknown
     start_s, stop_s = float(pose.time_s[steady][0]), float(pose.time_s[steady][-1])
-    electrical_j, mechanical_j = energy_track(record).between(start_s, stop_s)
+    electrical_j, _ = energy_track(record).between(start_s, stop_s)
     span_s = stop_s - start_s
     moved_m = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
-    carried_j = weight_n(record.header.robot) * float(np.linalg.norm(moved_m))
     return Effort(
         electrical_j / span_s,
-        cost_of_transport(electrical_j, carried_j),
-        cost_of_transport(mechanical_j, carried_j),
+        *costs_of_transport(record),
         float(moved_m[2]) / span_s,
         _slip(record, steady),
     )
 
 
+def costs_of_transport(record: RunRecord) -> tuple[float, float]:
+    """Return the electrical and mechanical cost of transport of a run, over its ``travel``."""
+    moved = travel(record)
+    carried_j = weight_n(record.header.robot) * moved.distance_m
+    electrical_j, mechanical_j = energy_track(record).between(moved.start_s, moved.end_s)
+    return cost_of_transport(electrical_j, carried_j), cost_of_transport(mechanical_j, carried_j)
+
+
 def cost_of_transport(energy_j: float, carried_j: float) -> float:
-    """Energy over weight times distance; infinite for what goes nowhere."""
+    """Energy over weight times distance; infinite without a distance, NaN if it is unknown."""
+    if np.isnan(carried_j):
+        return float("nan")
     return energy_j / carried_j if carried_j > _LEAST_CARRIED_J else float("inf")
 
 

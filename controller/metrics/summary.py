@@ -4,15 +4,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.effort import (
-    EnergyTrack,
-    cost_of_transport,
-    effort,
+    costs_of_transport,
     energy_track,
-    weight_n,
 )
 from snakewalk.controller.metrics.ground_contact import lifted_by_current
 from snakewalk.controller.metrics.path_error import (
@@ -23,11 +19,24 @@ from snakewalk.controller.metrics.path_error import (
 )
 from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
+from snakewalk.controller.metrics.travel import travel
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Header, RunRecord
 
 _KEYS = {"paths_replanned": "paths_laid_again"}
 """Names that ``summary.json`` spells otherwise: programs read its keys."""
+
+
+@dataclass(frozen=True, slots=True)
+class SummarizedBattery:
+    """Supply and load of a run; all but the voltages are estimated."""
+
+    first_v: float | None
+    last_v: float | None
+    least_v: float | None
+    current_max_a: float | None
+    charge_ah: float | None
+    winding_max_c: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +88,14 @@ class RunSummary:
     path_error_mean_m: float | None
     path_error_max_m: float | None
     speed_m_s: float | None
-    """Mean forward speed of the links while the pulse moves."""
+    """Speed of the centre of mass, along the path or along the axis of the gait
+    (``controller.metrics.travel``)."""
     predicted_speed_m_s: float | None
     planned_speed_m_s: float | None
     pulse_m_s: float | None
     """Mean speed at which the shape travels along the body."""
     eta: float | None
-    """Gain: speed over pulse speed."""
+    """Gain: mean forward speed of the links along themselves over pulse speed, while it moves."""
     eta_predicted: float | None
     peak_current_a: float | None
     peak_torque_n_m: float | None
@@ -97,11 +107,7 @@ class RunSummary:
     energy_source: str
     """``integrated`` in every physics step; ``sampled`` from one current a cycle: too low."""
     electrical_cost_of_transport: float | None
-    """Energy over weight times distance.
-
-    On a way to waypoints while the pulse moves, over the track of the centre of mass. Else over the
-    straight line between its ends: of a gait at full rate, of other motions in the whole log.
-    """
+    """Energy over weight times the distance of ``speed_m_s``, in the same time."""
     mechanical_cost_of_transport: float | None
     peak_joint_speed_rad_s: float | None
     peak_temperature_c: float | None
@@ -135,6 +141,8 @@ class RunSummary:
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
     """What the run found at last; None where it did not look for it."""
+    battery: SummarizedBattery | None
+    """Supply and load over the run; None in older logs."""
     pose_evidence: str
     """How the poses are known: ``measured``, ``estimated`` or ``dead-reckoned``."""
     pose_source: str
@@ -202,14 +210,14 @@ def _summary(record: RunRecord) -> RunSummary:
     off_path = path_error_m(record)
     moving = pose.pulse_m_s > 0.0
     chosen = moving if moving.any() else np.ones(len(moving), dtype=bool)
-    speed, predicted = _mean(pose.speed_m_s[chosen]), _mean(pose.predicted_speed_m_s[chosen])
+    predicted = _mean(pose.predicted_speed_m_s[chosen])
     pulse = _mean(pose.pulse_m_s[moving])
     tracking = tracking_error_rad(cycle)
     current = _peak(np.abs(cycle.current_a))
     use = wire_use(record)
     energy = energy_track(record)
     whole = energy.between(-np.inf, np.inf)
-    costs = _costs(record, energy, chosen)
+    costs, along_links = costs_of_transport(record), _mean(pose.speed_m_s[chosen])
     return RunSummary(
         run=header.run.name,
         motion=header.run.motion if header.run.gait is None else f"gait {header.run.gait.name}",
@@ -232,11 +240,11 @@ def _summary(record: RunRecord) -> RunSummary:
         travelled_m=_digits(travelled_m(pose)),
         path_error_mean_m=_digits(_mean(off_path)),
         path_error_max_m=_digits(_peak(off_path)),
-        speed_m_s=_digits(speed),
+        speed_m_s=_digits(travel(record).speed_m_s),
         predicted_speed_m_s=_digits(predicted),
         planned_speed_m_s=_digits(header.plan.predicted_speed_m_s),
         pulse_m_s=_digits(pulse),
-        eta=_digits(speed / pulse),
+        eta=_digits(along_links / pulse),
         eta_predicted=_digits(predicted / pulse),
         peak_current_a=_digits(current),
         peak_torque_n_m=_digits(current * header.torque_constant_n_m_a),
@@ -268,6 +276,7 @@ def _summary(record: RunRecord) -> RunSummary:
         decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
+        battery=_battery(record),
         pose_evidence=str(header.pose_evidence.kind),
         pose_source=header.pose_evidence.source,
         pose_is_simulated=header.initial_pose is not None,
@@ -289,6 +298,24 @@ def _assumptions(header: Header) -> dict[str, dict[str, object]]:
         key: {"value": value, "kind": str(Kind.ASSUMED), "source": source}
         for key, (value, source) in values.items()
     }
+
+
+def _battery(record: RunRecord) -> SummarizedBattery | None:
+    found = record.battery
+    if not len(found.time_s):
+        return None
+    known_v = found.voltage_v[np.isfinite(found.voltage_v)]
+    first_v, last_v, least_v = (
+        (known_v[0], known_v[-1], known_v.min()) if len(known_v) else (np.nan,) * 3
+    )
+    return SummarizedBattery(
+        _digits(float(first_v)),
+        _digits(float(last_v)),
+        _digits(float(least_v)),
+        _digits(_peak(found.current_a)),
+        _digits(float(found.charge_ah[-1])),
+        _digits(_peak(found.winding_c)),
+    )
 
 
 def _friction(record: RunRecord) -> SummarizedFriction | None:
@@ -323,27 +350,6 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
     if waypoints:
         return so_far
     return "ran to its end" if record.complete else "the log breaks off"
-
-
-def _costs(
-    record: RunRecord, energy: EnergyTrack, chosen: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """Electrical and mechanical cost of transport between the first and last of ``chosen`` rows."""
-    if record.header.run.gait is not None and not len(record.header.plan.waypoints_m):
-        gait = effort(record)
-        return gait.cost_of_transport, gait.mechanical_cost
-    rows = np.flatnonzero(chosen)
-    if len(rows) < 2:
-        return float("nan"), float("nan")
-    pose = record.pose
-    first, last = int(rows[0]), int(rows[-1])
-    if len(record.header.plan.waypoints_m):
-        distance_m = travelled_m(pose, first, last)
-    else:
-        distance_m = float(np.linalg.norm(pose.centre_m[last] - pose.centre_m[first]))
-    carried_j = weight_n(record.header.robot) * distance_m
-    electrical_j, mechanical_j = energy.between(pose.time_s[first], pose.time_s[last])
-    return cost_of_transport(electrical_j, carried_j), cost_of_transport(mechanical_j, carried_j)
 
 
 def _mean(values: Floats) -> float:

@@ -62,6 +62,7 @@ class PhysicsBody:
         self._open.enter_context(self._link)
         self._link.enable()
         self._due_s = self._backend.clock.now_s()
+        self._keep_view()
         return self
 
     def __exit__(
@@ -83,17 +84,22 @@ class PhysicsBody:
         self._due_s += FRAME_S
         self._backend.clock.sleep_until_s(self._due_s)
         self._link.read()
+        self._keep_view()
         self._link.write(JointCommand(self._due_s, goal_rad))
 
     @property
     def joint_rad(self) -> Floats:
-        """(J,) shaft angles."""
-        qpos = self._backend.qpos
-        assert qpos is not None, "a simulated robot has coordinates"
-        return qpos()[7:]
+        """(J,) shaft angles when the joints were read."""
+        return self._joint_rad
 
     def view(self) -> BodyView:
-        """Where the links are."""
-        pose = self._backend.pose
+        """Where the links were when the joints were read."""
+        return self._view
+
+    def _keep_view(self) -> None:
+        # after the read: packets bring the simulated body up to the time, the clock alone does not
+        qpos, pose = self._backend.qpos, self._backend.pose
+        assert qpos is not None, "a simulated robot has coordinates"
         assert pose is not None, "a simulated robot has a pose"
-        return body_in_world(self.robot, pose(), self.joint_rad)
+        self._joint_rad = qpos()[7:]
+        self._view = body_in_world(self.robot, pose(), self._joint_rad)

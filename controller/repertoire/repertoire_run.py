@@ -19,11 +19,10 @@ from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
-from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.observer_watch import Watcher
+from snakewalk.controller.run.execute import Finished
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
-from snakewalk.controller.runtime.drive import OnEvent, OnProgress
+from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.drivers.types import BodyPose
 
 
@@ -160,7 +159,13 @@ class RouteRun:
 
     job: RepertoireRun
     finished: Finished
-    follower: RouteFollower
+
+    @property
+    def follower(self) -> RouteFollower:
+        """Follower of the route, with what it predicted and measured."""
+        source = self.finished.source
+        assert isinstance(source, RouteMotion), "a repertoire run has no other motion"
+        return source.follower
 
     @property
     def complete(self) -> bool:
@@ -199,23 +204,3 @@ def run_name(job: RepertoireRun) -> str:
     """Return the name of the run's folder."""
     how = "repertoire" if job.replan else "repertoire-open"
     return f"{job.run.name}-{job.robot.name}-{how}"
-
-
-def run_route(
-    job: RepertoireRun,
-    folder: Path,
-    port: str | None,
-    on_progress: OnProgress = lambda progress: None,
-    *,
-    force: bool = False,
-    view: Watcher | None = None,
-) -> RouteRun:
-    """Execute a plan on ``port``, or on the simulator where it is None; ``view`` looks on.
-
-    Raises:
-        InputError: as ``execute``.
-
-    """
-    finished = execute(job, folder, port, force=force, view=view, on_progress=on_progress)
-    assert isinstance(finished.source, RouteMotion), "a repertoire run has no other motion"
-    return RouteRun(job, finished, finished.source.follower)

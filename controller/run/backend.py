@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
+import numpy as np
+
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
@@ -68,6 +70,8 @@ class Backend:
     """Makes a second body, on which motion is tried; None where time does not wait for it."""
     lay_down: Callable[[InitialPose], None] | None = None
     """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
+    open_supply: Callable[[], None] | None = None
+    """Opens the supply of all servos; None if some of them are real."""
     poses: PoseFeed | None = None
     """Poses that arrive at a rehearsal in simulated time, in place of real datagrams."""
 
@@ -138,6 +142,7 @@ def simulated(
         robot.model_copy(update={"ports": ()}),  # here they are on one wire
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
+        can_hold=run.safety.on_trip == "hold",
     )
 
     def lay_down(pose: InitialPose) -> None:
@@ -157,6 +162,7 @@ def simulated(
         lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
         made.twin,
         lay_down,
+        partial(line.firmware.cut_power, np.arange(robot.joint_count)),
     )
 
 
@@ -203,6 +209,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
         fingerprint_file=_fingerprint_file(run),
+        can_hold=run.safety.on_trip == "hold",
     )
     name = port_map_text((each.port, each.ids) for each in robot.ports) or port
     return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
@@ -256,7 +263,13 @@ def split(
     if deviation.torque is not None:
         line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[rows]
     bus = _bus_on_ports(robot, clock, line)
-    chain = ServoChain(bus, robot, watchdog_s=run.safety.watchdog_s, rate_hz=run.cycle_hz)
+    chain = ServoChain(
+        bus,
+        robot,
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+        can_hold=run.safety.on_trip == "hold",
+    )
 
     def follow(state: JointState) -> None:
         body.follow(state.time_s - state.age_s, state.position_rad, state.velocity_rad_s)

@@ -1,7 +1,7 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any, Protocol, cast
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import DeviationConfig, RunConfig
+from snakewalk.config.run import DeviationConfig, RunConfig, SafetyConfig
 from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
@@ -69,6 +69,8 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.drivers.safety.stop_output import StopCall, StopOutput, parse_stop_output
+from snakewalk.drivers.safety.trip_hold import TripHold
 from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
 
@@ -244,6 +246,7 @@ class _Execution:
         with (
             pose_provider(prepared, backend, log_event, **shown) as pose,
             map_provider(prepared, backend, pose.measure, self.folder, log_event) as mapped,
+            _stop_output(safety, backend) as output,
         ):
             source = prepared.make_source(log_event)
             friction = _second_body(prepared, source, backend)
@@ -256,6 +259,8 @@ class _Execution:
                 self._recovery(backend, warn),
                 observers.with_stop(self.stop_requested, button),
                 lambda text: warn("safety", text),
+                TripHold.from_config(robot, safety),
+                output,
             )
             start = initial_pose if self.port is None else None
             beside = _shadow(prepared, start, log, self.on_event) if self.shadow else None
@@ -293,6 +298,17 @@ class _Execution:
             confirm=self.confirm,
             on_event=lambda text: warn("recovery", text),
         )
+
+
+def _stop_output(
+    safety: SafetyConfig, backend: Backend
+) -> AbstractContextManager[StopOutput | None]:
+    """The run's stop output; that of a simulated bench opens its supply."""
+    if safety.stop_output is None:
+        return nullcontext()
+    if backend.open_supply is not None:
+        return StopCall("simulated supply", backend.open_supply)
+    return parse_stop_output(safety.stop_output)
 
 
 def _live(

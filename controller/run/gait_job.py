@@ -9,16 +9,16 @@ from typing import Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.options import key_values
-from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.console.progress import TimeBar
+from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.commands.gait_options import parameters
-from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.execute import Finished
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
 from snakewalk.controller.run.finish import by_evidence, show_run, summarized
 from snakewalk.controller.run.hands import Hands, open_hands
 from snakewalk.controller.run.kinds.gait_run import GaitRun
-from snakewalk.controller.run.watchers import watched
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -37,17 +37,12 @@ class GaitJob:
     look_at: str | None
     live: bool
     gamepad: Path | None
-    port: str | None
     compliance: bool | None
     shadow: bool
-    view: bool
-    view_at: str
-    ros: bool
-    out: Path | None
-    force: bool
     seed: int
+    options: RunOptions
 
-    def carry_out(self, *, film: bool, as_json: bool) -> None:
+    def carry_out(self) -> None:
         """Run the gait and show its result.
 
         Raises:
@@ -55,32 +50,29 @@ class GaitJob:
             SystemExit: safety tripped.
 
         """
+        options = self.options
         if self.by not in {"blend", "cpg"}:
             raise InputError(f"--by {self.by}: expected blend or cpg")
         with ExitStack() as stack:
-            watchers = stack.enter_context(watched(self.view, self.view_at, self.ros))
+            watchers = stack.enter_context(watched_by(options))
             page = None if watchers is None else watchers.page
             hands = open_hands(stack, self.live, self.gamepad, page)
             prepared = self._prepared(hands)
             run = prepared.run
             if hands is not None:
                 hands.policy = run.safety.lost_observer
-            name = f"gait-{run.name}-{prepared.robot.name}"
-            folder = stack.enter_context(run_folder(name, self.out))
-            bar = stack.enter_context(TimeBar(run.name, self.seconds, _names(prepared, hands)))
-            paced = (watchers is not None or hands is not None) and self.port is None
-            finished = execute(
+            finished, folder = carry_out(
                 prepared,
-                folder,
-                self.port,
-                force=self.force,
-                view=watchers,
+                f"gait-{run.name}-{prepared.robot.name}",
+                TimeBar(run.name, self.seconds, _names(prepared, hands)),
+                options,
+                watchers,
                 shadow=self.shadow,
+                is_operated=hands is not None,
                 stop_requested=lambda: None if hands is None else hands.torque_off(),
-                on_progress=in_real_time(bar.on_progress) if paced else bar.on_progress,
-                on_event=bar.on_event,
             )
-        show_run(finished, folder, _facts(prepared, finished), as_json, film=film)
+        facts = _facts(prepared, finished)
+        show_run(finished, folder, facts, options.as_json, film=options.film)
 
     def _prepared(self, hands: Hands | None) -> GaitRun:
         prepared = prepare_gait(

@@ -8,15 +8,13 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.options import key_values, show
-from snakewalk.controller.console.progress import in_real_time
-from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.console.progress import PathBar, TimeBar
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.run.carry_out import Carried, carry_out, watched_by
 from snakewalk.controller.run.factory import changed, prepare_job, with_compliance, with_map
 from snakewalk.controller.run.film_look import check_look
 from snakewalk.controller.run.finish import by_evidence, exit_code, write_artifacts
-from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.progress_bar import progress_bar
-from snakewalk.controller.run.watchers import watched
+from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,20 +32,12 @@ class Job:
     keys: list[str] | None
     """``KEY=VALUE`` each."""
     compliance: bool | None
-    port: str | None
-    out: Path | None
-    force: bool
     live: bool
-    view: bool
-    view_at: str
-    """HOST:PORT of the page."""
-    ros: bool
     observe: list[str] | None
     shadow: bool
+    options: RunOptions
 
-    def carry_out(
-        self, *, film: bool, look: str, accept_dead_reckoning: bool, as_json: bool
-    ) -> int:
+    def carry_out(self, *, look: str, accept_dead_reckoning: bool) -> int:
         """Run the job and show its result; returns the exit code.
 
         Raises:
@@ -55,14 +45,15 @@ class Job:
 
         """
         check_look(look)
-        if self.live and not self.view:
+        if self.live and not self.options.view:
             raise InputError("--live: waypoints are set in the page: add --view")
         prepared = self._prepared()
         name = self._name(prepared)
-        with run_folder(name, self.out) as folder:
-            finished = self._execute(prepared, folder)
+        finished, folder = self._execute(prepared, name)
         outcome = finished.outcome
-        artifacts = write_artifacts(finished.record, folder, finished.summary, film=film, look=look)
+        artifacts = write_artifacts(
+            finished.record, folder, finished.summary, film=self.options.film, look=look
+        )
         show(
             {
                 "run": name,
@@ -77,7 +68,7 @@ class Job:
                 "summary": str(folder / "summary.json"),
                 **artifacts.to_dict(),
             },
-            as_json,
+            self.options.as_json,
         )
         return exit_code(finished, accept_dead_reckoning)
 
@@ -102,29 +93,30 @@ class Job:
             parts.append(f"map-{run.mapping.source}")
         return "-".join(parts)
 
-    def _execute(self, prepared: PreparedRun, folder: Path) -> Finished:
-        with (
-            watched(self.view, self.view_at, self.ros, self.observe) as watchers,
-            progress_bar(prepared) as bar,
-        ):
+    def _execute(self, prepared: PreparedRun, name: str) -> Carried:
+        with watched_by(self.options, *(self.observe or ())) as watchers:
             page = watchers.page if watchers is not None and self.live else None
             if page is not None:
                 page.on_course()
-            paced = watchers is not None and not self.port
-            return execute(
+            return carry_out(
                 prepared,
-                folder,
-                self.port,
-                force=self.force,
-                view=watchers,
+                name,
+                progress_bar(prepared),
+                self.options,
+                watchers,
                 shadow=self.shadow,
                 confirm=_confirm if sys.stdin.isatty() else None,
                 waypoint_commands=None if page is None else page.pressed,
-                on_progress=in_real_time(bar.on_progress) if paced else bar.on_progress,
-                on_event=bar.on_event,
             )
 
 
 def _confirm(found: str) -> bool:
     """Ask whether an interrupted chain may go on; the servos hold meanwhile."""
     return typer.confirm(f"{found}; go on?", err=True)
+
+
+def progress_bar(prepared: PreparedRun) -> PathBar | TimeBar:
+    """Return the bar that fits a run: along its path, or over its time."""
+    if isinstance(prepared, PathRun):
+        return PathBar(prepared.path.length_m)
+    return TimeBar(prepared.run.name, prepared.run.time_limit_s)

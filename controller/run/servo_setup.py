@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.drivers.bus.budget import robot_budget
+from snakewalk.drivers.bus.budget import check_ages, robot_budget
+from snakewalk.drivers.protocol.registers import CURRENT_POSITION_MODE
 
 GAIT_PITCH_SHARE = 0.75
 """Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
@@ -32,11 +33,11 @@ def check_supply(robot: RobotConfig) -> None:
 
 
 def check_servos(run: RunConfig, robot: RobotConfig) -> None:
-    """Refuse a wrong supply, a cycle longer than its period, and a current that no servo reaches.
+    """Reject a wrong supply, a cycle that the bus cannot carry, and a current out of reach.
 
     Raises:
-        InputError: with the model's voltages; with the highest rate that fits; with the current at
-            which the model stalls.
+        InputError: with the model's voltages; with the highest rate that fits, or the age of the
+            values; with the current at which the model stalls.
 
     """
     check_supply(robot)
@@ -45,7 +46,42 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
             robot.check_over_current("safety.current_limit_a", run.safety.current_limit_a)
         except ValueError as fault:
             raise InputError(f"run {run.name}: {fault}") from None
-    robot_budget(robot, robot.servo.baud, fast=True).check(run.cycle_hz)
+    _check_hold(run, robot)
+    _check_fuse(robot)
+    budget, safety = robot_budget(robot, robot.servo.baud, fast=True), run.safety
+    budget.check(run.cycle_hz)
+    check_ages(
+        budget,
+        run.cycle_hz,
+        stale_limit_s=safety.stale_limit_s,
+        watchdog_s=safety.watchdog_s,
+    )
+
+
+def _check_hold(run: RunConfig, robot: RobotConfig) -> None:
+    """Reject a hold of servos whose current cannot be limited."""
+    if run.safety.on_trip == "off":
+        return
+    for facts in robot.models_by_id.values():
+        if not (facts.measures_current and CURRENT_POSITION_MODE in facts.modes):
+            raise InputError(
+                f"run {run.name}: safety.on_trip = hold: {facts.model} has no current-based "
+                "position control, so its joints cannot hold with a low current; set "
+                "safety.on_trip to off"
+            )
+
+
+def _check_fuse(robot: RobotConfig) -> None:
+    """Reject a fuse if the current of the chain cannot be estimated."""
+    if robot.power is None or robot.power.fuse_a is None:
+        return
+    for facts in robot.models_by_id.values():
+        if facts.motor is None:
+            raise InputError(
+                f"robot {robot.name}: power.fuse_a = {robot.power.fuse_a:g}: the file of "
+                f"{facts.model} has no [motor], so its current cannot be estimated; add it: "
+                "docs/how-to/add-a-servo-model.md"
+            )
 
 
 def with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) -> RobotConfig:

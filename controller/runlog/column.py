@@ -26,7 +26,7 @@ Kind = Literal["exact", "rounded", "integer", "flag", "text", "joints", "points"
 """``exact`` floats keep every digit, ``rounded`` ones six decimals; ``joints`` are indices of some
 joints, ``points`` lists of coordinates, ``object`` is any JSON."""
 Watched = Literal["all", "newest", ""]
-UNITS: Final = ("rad_s", "m_s", "rad", "a", "s", "m", "c", "v", "j")
+UNITS: Final = ("rad_s", "m_s", "rad", "ah", "a", "s", "m", "c", "v", "j")
 """Suffixes of names that are units; the longest comes first."""
 JOINT, LINK, ANY = "joint", "link", "any"
 """Sizes that differ from robot to robot, and from row to row."""
@@ -48,6 +48,7 @@ class Panel(StrEnum):
     CYCLE = "in a cycle, ms"
     HEAT = "hottest servo, °C"
     SUPPLY = "lowest supply, V"
+    CHAIN = "whole chain, A"
     FRICTION = "estimated friction"
     JOINT_ANGLE = "joint's angle, rad"
     """Of the joint that the reader of the page selects."""

@@ -16,6 +16,7 @@ from snakewalk.controller.runlog.encode import array, exact, floats, number, thi
 from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
 from snakewalk.controller.runlog.topics import (
     FORMAT,
+    BatteryTable,
     CycleTable,
     EventTable,
     FrictionTable,
@@ -198,6 +199,7 @@ class RunRecord:
     pose: PoseTable
     walk: WalkTable
     friction: FrictionTable
+    battery: BatteryTable
     qpos: QposTable
     shadow: ShadowTable
     imu: ImuTable

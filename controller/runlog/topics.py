@@ -305,6 +305,23 @@ class FrictionTable(Table):
     across_95: Annotated[Floats, Column("(2,)", shape=(2,))]
 
 
+@topic("/battery")
+class BatteryTable(Table):
+    """Supply over time: a row for each second."""
+
+    time_s: Annotated[Floats, _TIME]
+    voltage_v: Annotated[Floats, _optional("highest that a servo measures")]
+    current_a: Annotated[
+        Floats,
+        _optional(
+            "drawn by the whole chain, estimated",
+            curves=(Curve(Panel.CHAIN, "drawn, estimated", "purple"),),
+        ),
+    ]
+    charge_ah: Annotated[Floats, _optional("drawn since the start, estimated")]
+    winding_c: Annotated[Floats, _per_joint("(J,) temperature of the winding, estimated")]
+
+
 @topic("/event", watched="all")
 class EventTable(Table):
     """Events."""

@@ -1,5 +1,8 @@
 """Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
 
+import logging
+import os
+import shutil
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -32,6 +35,7 @@ from snakewalk.controller.runlog.topics import (
 from snakewalk.drivers.types import JointState
 
 Level = Literal["info", "warning", "error"]
+_LOGGER: Final = logging.getLogger("snakewalk")
 _FLUSH_S: Final = 0.5
 _CHUNK_BYTES: Final = 1 << 20
 
@@ -48,7 +52,8 @@ class RunLog:
         self._on_row = on_row
         path.parent.mkdir(parents=True, exist_ok=True)
         self._part = part_path(path)
-        self._file = self._part.open("wb")
+        self._file = self._part.open("w+b")
+        self._is_deleted = False
         self._writer: Any = Writer(  # half untyped
             self._file, chunk_size=_CHUNK_BYTES, enable_data_crcs=True
         )
@@ -87,6 +92,7 @@ class RunLog:
         try:
             try:
                 self._writer.finish()
+                self._restore()
             finally:
                 self._file.close()
         except OSError as fault:
@@ -206,6 +212,32 @@ class RunLog:
         if time_s - self._flushed_s >= _FLUSH_S:
             self._flushed_s = time_s
             self._writer.flush()
+            self._report_deletion()
+
+    def _report_deletion(self) -> None:
+        """Warn once if the file has no name any more: somebody deleted it or its folder."""
+        if self._is_deleted or os.fstat(self._file.fileno()).st_nlink > 0:
+            return
+        self._is_deleted = True
+        _LOGGER.warning(
+            "%s: was deleted during the run; it is kept open, and written again at the end",
+            self._part,
+        )
+
+    def _restore(self) -> None:
+        """Write a file that was deleted meanwhile again, from its descriptor.
+
+        Raises:
+            OSError: the disk is full.
+
+        """
+        if self._part.exists():
+            return
+        self._part.parent.mkdir(parents=True, exist_ok=True)
+        self._file.flush()
+        self._file.seek(0)
+        with self._part.open("wb") as copy:
+            shutil.copyfileobj(self._file, copy)
 
 
 def part_path(path: Path) -> Path:

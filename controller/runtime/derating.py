@@ -5,6 +5,7 @@ motion goes on slower, cooler and with less current instead of stopping. It fall
 back slowly. Safety below stays as it is: what gets worse all the same still trips.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.drivers.link import LoadEstimate
 from snakewalk.drivers.types import JointState
 
 LEAST = 0.25
@@ -32,6 +34,8 @@ LAG_START, LAG_END = 0.6, 0.95
 current is limited is left out: the ground may hold it off its goal, at any rate."""
 AVERAGE_S = 0.2
 """Over which current and lag are averaged: a peak is no load."""
+WINDING_BAND_C, WINDING_EDGE_C = 25.0, 5.0
+"""From so far below the limit of a winding on, down to so far below it."""
 REPORT_BELOW, REPORT_ABOVE = 0.95, 0.99
 
 
@@ -162,11 +166,14 @@ class Derating:
         safety: SafetyConfig,
         robot: RobotConfig,
         on_event: Callable[[str, str], None] = lambda kind, text: None,
+        load: LoadEstimate | None = None,
     ) -> None:
         self.rate = 1.0
         self.least = 1.0
         """Lowest rate so far."""
-        self._safety, self._robot = safety, robot
+        self._safety, self._robot, self._load = safety, robot, load
+        power = robot.power
+        self._fuse_a = math.inf if power is None or power.fuse_a is None else power.fuse_a
         servo = robot.servo
         self._current_start_a = CURRENT_START * safety.current_limit_of_a(robot)
         self._voltage_low_v = safety.voltage_limits_v(servo)[0] + VOLTAGE_BAND * servo.supply_v
@@ -200,6 +207,8 @@ class Derating:
         )
         means = self._current_a, self._lag_rad
         now = UNLIMITED if unlimited else allowed(state, *means, safety, self._robot)
+        if self._load is not None:
+            now = min(now, self._allowed_by_load(self._load, state), key=lambda each: each.rate)
         if now.rate == self.rate:
             return self.rate
         time_s = FALL_S if now.rate < self.rate else RISE_S
@@ -214,3 +223,24 @@ class Derating:
             self._is_reported = False
             self._on_event("derating", "at full rate again")
         return self.rate
+
+    def _allowed_by_load(self, load: LoadEstimate, state: JointState) -> Allowed:
+        """Return the rate that the supply's fuse and the windings allow."""
+        fuse_a, limit_c = self._fuse_a, self._safety.winding_limit_c
+        windings_c = load.winding_c(state)
+        if (
+            load.current_a <= CURRENT_START * fuse_a
+            and not (windings_c > limit_c - WINDING_BAND_C).any()
+        ):
+            return UNLIMITED
+        rates = _falling(windings_c, limit_c - WINDING_BAND_C, limit_c - WINDING_EDGE_C)
+        joint = int(np.argmin(rates))
+        by_fuse = 1.0
+        if math.isfinite(fuse_a):
+            amps = np.array([load.current_a])
+            by_fuse = float(_falling(amps, CURRENT_START * fuse_a, CURRENT_END * fuse_a)[0])
+        rate = LEAST + (1.0 - LEAST) * min(by_fuse, float(rates[joint]))
+        if by_fuse <= rates[joint]:
+            return Allowed(rate, f"the chain at {load.current_a:.1f} A, fuse {fuse_a:g} A")
+        name = self._robot.joint_label(joint)
+        return Allowed(rate, f"winding of {name} at {windings_c[joint]:.0f} C, limit {limit_c:g} C")

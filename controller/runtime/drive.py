@@ -1,6 +1,7 @@
 """One run: link, motion, log and alarms joined in the loop; the same on metal and in simulation."""
 
 import gc
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progre
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.topics import (
+    BatteryTable,
     FrictionTable,
     PathTable,
     PoseSourceTable,
@@ -34,7 +36,7 @@ from snakewalk.controller.runtime.roll_monitor import RollMonitor
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
-from snakewalk.drivers.link import VettedLink
+from snakewalk.drivers.link import HoldingLink, LoadedLink, VettedLink
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
@@ -75,6 +77,8 @@ def _no_long_collections() -> Iterator[None]:
 
 PoseSource = Callable[[JointState], BodyPose]
 _SETTLE_S = 0.3
+BATTERY_S = 1.0
+"""Time between two rows of the supply (ours)."""
 _LATCHED = suppress(SafetyTrippedError)
 
 
@@ -179,7 +183,9 @@ class Drive:
         self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
         self._roll_monitor = RollMonitor()
         self._friction_monitor = friction
-        self._derating = Derating(run.safety, robot, self._on_derating)
+        self._load = link.load if isinstance(link, LoadedLink) else None
+        self._battery_s = -math.inf
+        self._derating = Derating(run.safety, robot, self._on_derating, self._load)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
         self._on_progress, self._on_event = on_progress, on_event
         self._wire_busy_s = sensors.wire_busy_s
@@ -226,7 +232,7 @@ class Drive:
                 pose = self._pose(state)
                 view = spine.in_world(pose, state.position_rad)
                 self._displacement_m = (
-                    view.advance_since_m(self._last) if self._last is not None else 0.0
+                    view.unbiased_advance_since_m(self._last) if self._last is not None else 0.0
                 )
                 self._find_friction(view)
                 if self._run.waypoints_m:  # gaits may roll as they please
@@ -246,13 +252,10 @@ class Drive:
             tripped = self._link.tripped or self._pose_failure
             if tripped:
                 log.event(clock.now_s(), "trip", tripped, "error")
-        if not self._run.waypoints_m:
-            end = "the motion came to its end" if motion.done else "the motion was cut off"
-        elif path.reached == self._waypoints:
-            end = "every waypoint reached"
-        else:
-            end = f"{path.reached} waypoints reached"
-        log.event(clock.now_s(), "stop", f"torque off; {end}")
+            if self._link.tripped:
+                self._hold_out(period_s)
+                tripped = self._link.tripped
+        log.event(clock.now_s(), "stop", f"torque off; {self._end_text()}")
         duration_s = clock.now_s() - start_s
         return Outcome(
             path.reached,
@@ -262,6 +265,51 @@ class Drive:
             tripped,
             self._waypoints,
             self._derating.least,
+        )
+
+    def _end_text(self) -> str:
+        reached = self._path.reached
+        if not self._run.waypoints_m:
+            is_done = self._motion.done
+            return "the motion came to its end" if is_done else "the motion was cut off"
+        if reached == self._waypoints:
+            return "every waypoint reached"
+        return f"{reached} waypoints reached"
+
+    def _hold_out(self, period_s: float) -> None:
+        """Go on reading while a trip holds the body, until its torque is off."""
+        link, log = self._link, self._log
+        if not isinstance(link, HoldingLink):
+            return
+        for tick in ticks(self._clock, period_s, lambda: math.inf if link.is_holding else -1.0):
+            with _LATCHED:
+                state = link.read()
+                log.cycle(
+                    *(tick.deadline_s, state.position_rad, state.position_rad, state),
+                    deadline_s=tick.deadline_s,
+                    lateness_s=tick.lateness_s,
+                    wire_busy_s=math.nan,
+                    **self._energy()._asdict(),
+                    yield_rad=None,
+                    verdict="veto",
+                    reason=link.tripped or "",
+                    joints=[],
+                )
+
+    def _log_battery(self, time_s: float, state: JointState) -> None:
+        """Log supply and load once a second."""
+        load = self._load
+        if load is None or time_s < self._battery_s + BATTERY_S:
+            return
+        self._battery_s = time_s
+        known_v = state.voltage_v[np.isfinite(state.voltage_v)]
+        self._log.add(
+            BatteryTable,
+            time_s,
+            voltage_v=float(known_v.max()) if len(known_v) else math.nan,
+            current_a=load.current_a,
+            charge_ah=load.charge_ah,
+            winding_c=load.winding_c(state),
         )
 
     def _find_friction(self, view: BodyView) -> None:
@@ -372,6 +420,7 @@ class Drive:
             reason=self._link.tripped or "",
             joints=clamped,
         )
+        self._log_battery(tick.deadline_s, state)
         if self._observer is not None and not self._link.tripped:
             self._observer.step(tick.deadline_s, sent_rad, state)
         self._measure_speed()

@@ -4,6 +4,7 @@ A cycle is one sync write and one sync read, or *fast* sync read, of N servos. E
 bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from snakewalk.config.robot import RobotConfig
@@ -59,6 +60,12 @@ class WireBudget:
         return self.reply_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
 
     @property
+    def age_s(self) -> float:
+        """Age of the first read values at the end of the longest cycle."""
+        before_bytes = self.write_bytes + GROUP_BYTES + self.servos
+        return self.cycle_s - before_bytes * BITS_PER_BYTE / self.baud
+
+    @property
     def limit_hz(self) -> float:
         """Highest rate that the wire allows."""
         return 1.0 / self.cycle_s
@@ -81,6 +88,33 @@ class WireBudget:
                 f"{self.cycle_s * 1e3:.2f} ms of wire a cycle; at most {self.limit_hz:.0f} Hz: "
                 f"lower the rate, raise the baud rate{fast}"
             )
+
+
+def check_ages(
+    budget: WireBudget, rate_hz: float, *, stale_limit_s: float, watchdog_s: float
+) -> None:
+    """Reject a cycle in which safety or the servos' watchdogs would stop each run.
+
+    Raises:
+        BudgetError: values are too old when the cycle is complete, or the servos hear nothing for
+            too long between two cycles.
+
+    """
+    faults = []
+    if budget.age_s > stale_limit_s:
+        faults.append(
+            f"{budget.servos} servos at {budget.baud} baud: positions are {budget.age_s:.2f} s old "
+            f"at the end of a cycle, over safety.stale_limit_s {stale_limit_s:g}: raise the baud "
+            "rate, or divide the chain into several ports"
+        )
+    pause_s = 1.0 / rate_hz - budget.cycle_s
+    if pause_s > watchdog_s:
+        faults.append(
+            f"{rate_hz:g} Hz: the servos hear nothing for {pause_s:.2f} s between two cycles, over "
+            f"safety.watchdog_s {watchdog_s:g}, and stop: raise run.cycle_hz or safety.watchdog_s"
+        )
+    if faults:
+        raise BudgetError(faults)
 
 
 def wire_budget(
@@ -152,3 +186,26 @@ def _reply_bytes(servos: int, length: int, *, fast: bool) -> int:
     if fast:
         return FAST_HEAD_BYTES + servos * (FAST_PART_BYTES + length)
     return servos * (STATUS_BYTES + length)
+
+
+def plain_reads_text(
+    budget: WireBudget, rate_hz: float | None, failures: int, ports: Sequence[str]
+) -> str:
+    """Return the report that fast reads were given up.
+
+    Args:
+        budget: of plain reads.
+        rate_hz: rate of the control cycles; None: unknown.
+        failures: fast reads that failed in a row.
+        ports: those that gave up; empty for a bus with one port.
+
+    """
+    line = f"fast sync reads given up after {failures} failures in a row, plain from now on"
+    if ports:
+        line = f"{', '.join(ports)}: {line}"
+    if rate_hz is None or budget.share(rate_hz) <= 1.0:
+        return line
+    return (
+        f"{line}: the wire carries at most {budget.limit_hz:.0f} Hz of plain reads, not "
+        f"{rate_hz:g} Hz: cycles will be late"
+    )

@@ -23,6 +23,8 @@ from snakewalk.drivers.protocol.parser import PacketParser
 _PING_BYTES = 3
 _SETTLE_S = 2e-3
 """Longer than the longest return delay (0.508 ms)."""
+_REST_S = 0.05
+"""How late the rest of a reply may be (ours): a busy computer hands over a part of it first."""
 _OVERHEARD_BYTES = 1 << 16
 """Bytes that are enough to know who talks."""
 _TURN_S = 3e-3
@@ -78,6 +80,7 @@ def probe(
     byte_s = BITS_PER_BYTE / port.getBaudRate()
     answered = total = damaged = 0
     late_s: list[float] = []
+    is_patient = True
     for _ in range(requests):
         port.clearPort()
         sent_s = port.clock.now_s()
@@ -85,7 +88,16 @@ def probe(
         deadline_s = sent_s + (len(packet) + 2 * reply_bytes) * byte_s + _SETTLE_S + latency_s
         reader = PacketParser()
         replies = 0
-        while data := port.read_until(reply_bytes, deadline_s):
+        waited = False
+        while True:
+            data = port.read_until(reply_bytes, deadline_s)
+            if not data and reader.pending and is_patient and not waited:
+                waited = True  # only a part of the reply has come yet
+                rest = max(1, reply_bytes - reader.pending)
+                data = port.read_until(rest, port.clock.now_s() + _REST_S)
+                is_patient = bool(data)  # else replies are cut off, not late
+            if not data:
+                break
             for reply in reader.feed(data):
                 replies += isinstance(reply, StatusPacket) and reply.servo_id == servo_id
             if replies == 1 and len(late_s) == answered:

@@ -1,18 +1,20 @@
 """Goal check: whether each servo holds the goal that was sent to it.
 
-Servos do not reply to a sync write. So Goal Position(116) is read back and compared with the goal
-that was sent last before the read. A difference counts once more only after another goal was sent.
+Servos do not reply to a sync write. So Goal Position(116; 30 on Protocol 1.0) is read back and
+compared with the goal that was sent last before the read. A difference counts once more only after
+another goal was sent.
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Int32s
-from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
+from snakewalk.drivers.bus.chain_bus import GroupCycle
 from snakewalk.drivers.errors import BusError
 
 FOREIGN_READS, OWN_READS = 2, 4
@@ -42,27 +44,25 @@ class _Difference:
 class GoalCheck:
     """Reads the goals of all joints back."""
 
-    def __init__(self, bus: ChainBus, robot: RobotConfig, *, fast: bool) -> None:
+    def __init__(self, labels: Sequence[str], cycle: GroupCycle, kind: str = "<i4") -> None:
         """Prepare the read.
 
         Args:
-            bus: the servos' bus.
-            robot: their robot.
-            fast: begin with fast sync reads.
+            labels: J names for the messages.
+            cycle: group read of Goal Position.
+            kind: type of the register's numbers, ``<u2`` on Protocol 1.0.
 
         """
-        self._robot = robot
-        self.cycle: GroupCycle = bus.block(
-            robot.servo_ids, "Goal Position", "Goal Position", fast=fast
-        )
-        self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
+        self._labels, self._kind = labels, kind
+        self.cycle = cycle
+        self._sent: deque[NDArray[np.integer[Any]]] = deque(maxlen=_REMEMBERED)
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
         self._is_incomplete = False
 
     def note_write(self, goals: Int32s) -> None:
         """Note raw goals (J,) that have just been sent."""
-        self._sent.append(goals)
+        self._sent.append(goals.astype(self._kind, copy=False))
         self._writes += 1
 
     @property
@@ -90,7 +90,7 @@ class GoalCheck:
         if reply.flawless and not self._differences and reply.data.tobytes() == sent.tobytes():
             self._is_incomplete = False
             return
-        values = np.ascontiguousarray(reply.data).view("<i4")[:, 0]
+        values = np.ascontiguousarray(reply.data).view(self._kind)[:, 0]
         self._is_incomplete = not reply.valid.all()
         for joint in np.flatnonzero(reply.valid).tolist():
             if values[joint] == sent[joint]:
@@ -111,7 +111,7 @@ class GoalCheck:
         if not self._sent:
             return None
         reply, sent = self.cycle.read(), self._sent[-1]
-        value = int(np.ascontiguousarray(reply.data).view("<i4")[joint, 0])
+        value = int(np.ascontiguousarray(reply.data).view(self._kind)[joint, 0])
         if not reply.valid[joint] or value == sent[joint]:
             return None
         is_foreign = not any(goals[joint] == value for goals in self._sent)
@@ -129,18 +129,23 @@ class GoalCheck:
             known.is_foreign |= is_foreign
             known.value = value
 
-    def _fault(self, joints: list[int], sent: Int32s, explain: Callable[[int], str | None]) -> str:
+    def _fault(
+        self,
+        joints: list[int],
+        sent: NDArray[np.integer[Any]],
+        explain: Callable[[int], str | None],
+    ) -> str:
         first = self._differences[joints[0]]
         reason = explain(joints[0])
         if reason is not None:
-            return f"{self._robot.joint_label(joints[0])}: {reason}"
+            return f"{self._labels[joints[0]]}: {reason}"
         if first.is_foreign:
             cause = _SECOND_MASTER
         elif first.is_constant:
             cause = "it ignores sync writes, or another program writes goals"
         else:
             cause = "writes to it get lost"
-        names = ", ".join(map(self._robot.joint_label, joints))
+        names = ", ".join(self._labels[joint] for joint in joints)
         return f"{names}: Goal Position is {first.value}, not {sent[joints[0]]}: {cause}"
 
 

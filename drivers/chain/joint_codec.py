@@ -50,10 +50,20 @@ class JointUnits:
     """(J,)"""
     full_pwm: Int32s
     """(J,) Goal PWM of full output."""
+    current_mode: Bools
+    """(J,) whether the joint runs in current-based position mode."""
 
     @staticmethod
-    def of(robot: RobotConfig, servos: Sequence[ServoUnits]) -> "JointUnits":
+    def of(
+        robot: RobotConfig, servos: Sequence[ServoUnits], *, can_hold: bool = False
+    ) -> "JointUnits":
         """Units of a robot's joints, with the scales of their servos (J).
+
+        Args:
+            robot: whose joints.
+            servos: their servos' scales.
+            can_hold: a soft hold may follow, so every joint has a limit of its current; otherwise
+                only pitch joints have.
 
         Raises:
             ControlTableError: the output of a pitch joint cannot be limited.
@@ -83,6 +93,12 @@ class JointUnits:
             np.array([servo.limits_current for servo in servos]),
             np.array([servo.stall_current_a for servo in servos]),
             np.array([servo.full_pwm for servo in servos], np.int32),
+            np.array(
+                [
+                    servo.limits_current and (can_hold or axis == "p")
+                    for axis, servo in zip(robot.all_axes, servos, strict=True)
+                ]
+            ),
         )
 
     def position_rad(self, joint: int, raw: int) -> float:

@@ -31,6 +31,9 @@ _GOALS_AT, _TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT = 2, 5, 8, 10, 1
 _SHAPING_AT, _FINGERPRINT_AT = (3, 11), (6, 9, 14)
 """Cycles of a round in which registers are read, one each: a cycle never has two more reads than
 its own, so that the wire budget of every cycle is the same."""
+_CHECKED_AT = frozenset(
+    {_TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT, *_SHAPING_AT, *_FINGERPRINT_AT}
+)
 
 
 class LivenessCheck:
@@ -88,13 +91,30 @@ class LivenessCheck:
         self._missed: list[RegisterCheck] = []
         """Not all servos replied to these; the oldest first."""
 
+    def check_goals(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
+        """Read the goals back, once in a round and if they differed; the group read, if made.
+
+        It comes before the goals of its cycle: after them it would find those of this program only.
+
+        Raises:
+            BusError: a servo holds another goal.
+            PortError: the port is gone.
+
+        """
+        its_turn = cycle % SLOW_EVERY == _GOALS_AT
+        if not its_turn and not (
+            has_time and self._goals.is_due and cycle % SLOW_EVERY not in _CHECKED_AT
+        ):
+            return None
+        self._goals.check(self._explain)
+        return self._goals.cycle
+
     def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
 
-        In a round of ``SLOW_EVERY`` cycles: goals, torque, watchdog, identity, one of the settings,
-        two of those that shape the motion, and three of the fingerprint. In between, if the cycle
-        ``has_time``: the goals again if they differed, else a check to which not all servos have
-        replied.
+        In a round of ``SLOW_EVERY`` cycles: torque, watchdog, identity, one of the settings, two of
+        those that shape the motion, and three of the fingerprint. In between, if the cycle
+        ``has_time``, a check to which not all servos have replied.
 
         Raises:
             BusError: a servo is not as it was set.
@@ -115,10 +135,7 @@ class LivenessCheck:
             check = _in_turn(self._shaping, rounds, _SHAPING_AT, place)
         elif place in _FINGERPRINT_AT:
             check = _in_turn(self._fingerprint, rounds, _FINGERPRINT_AT, place)
-        elif place == _GOALS_AT or (has_time and self._goals.is_due):
-            self._goals.check(self._explain)
-            return self._goals.cycle
-        if check is None and has_time and self._missed:
+        elif has_time and self._missed:
             check = self._missed[0]
         if check is None:
             return None

@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.budget import WireBudget, robot_budget
+from snakewalk.drivers.bus.budget import WireBudget, plain_reads_text, robot_budget
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
@@ -21,6 +21,7 @@ from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Reading
 from snakewalk.drivers.chain.liveness import SLOW_EVERY, LivenessCheck, RegisterCheck
 from snakewalk.drivers.chain.lost_replies import LostReplies
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
+from snakewalk.drivers.chain.soft_hold import limit_currents
 from snakewalk.drivers.chain.start_up import (
     Inspection,
     ServoSettings,
@@ -65,6 +66,7 @@ class ServoChain:
         watchdog_s: float = 0.2,
         rate_hz: float | None = None,
         fingerprint_file: FingerprintFile | None = None,
+        can_hold: bool = False,
     ) -> None:
         """Prepare; nothing is sent before ``enable``.
 
@@ -74,6 +76,7 @@ class ServoChain:
             watchdog_s: after so long without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
             fingerprint_file: compared with the servos at each ``enable``; None: not compared.
+            can_hold: ``hold_softly`` may be called, so every joint has a limit of its current.
 
         Raises:
             ControlTableError: a model lacks a register or a unit that the cycle needs, or has it
@@ -88,11 +91,14 @@ class ServoChain:
         given up, and when replies get lost again and again."""
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
+        self.checks_in_read = True
+        """Whether ``read`` calls ``check_servos``; a ``SafeLink`` calls it after the goals."""
         self._bus = bus
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
         tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
-        self._units = JointUnits.of(robot, [ServoUnits.of(table.facts) for table in tables])
+        scales = [ServoUnits.of(table.facts) for table in tables]
+        self._units = JointUnits.of(robot, scales, can_hold=can_hold)
         # rounded up: at least the time that was asked for
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
@@ -106,6 +112,7 @@ class ServoChain:
         self._prepare_reads(fast=True)
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
+        self._has_time: bool | None = None
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
@@ -213,7 +220,7 @@ class ServoChain:
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
-        self._reads = 0
+        self._reads, self._has_time = 0, None
         self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
@@ -277,15 +284,36 @@ class ServoChain:
         self._expect("Bus Watchdog", [ticks] * len(ids))
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
-        self._liveness = LivenessCheck(
-            *(bus, self.robot, self._configured, self._fingerprints, ticks, self._goal_check),
-            fast=self._fast_reads,
-            rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
-        )
+        self._liveness = self._new_liveness()
         self._armed = True
         state = self.read()
         check_stillness(self.robot, state.position_rad, here_rad, STILL_RAD)
         return state
+
+    def _new_liveness(self) -> LivenessCheck:
+        return LivenessCheck(
+            *(self._bus, self.robot, self._configured, self._fingerprints),
+            *(self._watchdog_ticks, self._goal_check),
+            fast=self._fast_reads,
+            rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
+        )
+
+    def hold_softly(self, current_a: Floats) -> None:
+        """Hold where the joints are, with currents of at most ``current_a`` (J,).
+
+        Reads keep the watchdogs fed, and still compare the servos with their settings.
+
+        Raises:
+            BusError: a servo cannot limit its current, or does not confirm it.
+            PortError: the port is gone.
+
+        """
+        self.hold()
+        self._configured = limit_currents(
+            self._bus, self.robot, self._units, self._configured, current_a
+        )
+        self._liveness = self._new_liveness()
+        self._sent_at_s = self._clock.now_s()
 
     def disable(self) -> None:
         """Torque off, then the watchdog, on every servo, also where others fail.
@@ -304,8 +332,8 @@ class ServoChain:
         Where no joint could be read nothing else is asked: that is put off to the next call.
 
         Raises:
-            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
-                has written to it), or its watchdog has stopped it or is not armed.
+            BusError: a servo holds another goal than the one sent to it; raised by
+                ``check_servos``, if ``checks_in_read``.
             PortError: the port is gone.
 
         """
@@ -322,7 +350,11 @@ class ServoChain:
         if read > 0:  # else what is asked beside it waits, too, and the state grows stale
             self._reads += 1
             is_alone = not self._read_slow(measured_at_s)
-            self._check_liveness(has_time=is_alone and reply.complete)
+            self._has_time = is_alone and reply.complete
+            if self._liveness is not None:
+                self._check(self._liveness.check_goals, self._has_time)
+            if self.checks_in_read:
+                self.check_servos()
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -351,20 +383,32 @@ class ServoChain:
             self.on_event(line)
         return measured_at_s
 
-    def _check_liveness(self, *, has_time: bool) -> None:
-        """Check torque, watchdogs, settings; where a servo tells an alarm, that is the reason.
+    def check_servos(self) -> None:
+        """Check torque, watchdogs and settings of the servos, one register in a cycle.
 
-        An alarm that switches a servo off may come between the group read and the check.
+        After a read without a reply there is no check.
 
-        Args:
-            has_time: the state is all that was read in this cycle, and all servos replied.
+        Raises:
+            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
+                has written to it), or its watchdog has stopped it or is not armed.
+            PortError: the port is gone.
 
         """
-        if not self._armed or self._liveness is None or self._readings.alert:
+        has_time, self._has_time = self._has_time, None
+        if has_time is not None and self._liveness is not None:
+            self._check(self._liveness.check, has_time)
+
+    def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> None:
+        """Make a check; an alarm of a servo is the reason for what the check finds.
+
+        An alarm that switches a servo off may come between the group read and the check.
+        """
+        if not self._armed or self._readings.alert:
             return
         try:
-            asked = self._liveness.check(self._reads - 1, has_time=has_time)
+            asked = check(self._reads - 1, has_time=has_time)
             if asked is not None:
+                self._has_time = None  # for another check in this cycle
                 self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
             self._take(self._cycle.read(), again=True)
@@ -400,7 +444,10 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
-        self._goal_check = GoalCheck(bus, self.robot, fast=fast)
+        labels = [self.robot.joint_label(joint) for joint in range(self.robot.joint_count)]
+        self._goal_check = GoalCheck(
+            labels, bus.block(ids, "Goal Position", "Goal Position", fast=fast)
+        )
         self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 
@@ -408,20 +455,10 @@ class ServoChain:
         return robot_budget(self.robot, self._port.getBaudRate(), fast=fast)
 
     def _report_plain_reads(self) -> None:
-        """Tell that fast reads were given up, and whether the wire still carries the rate."""
         self._fast_reads = False
-        line = (
-            f"fast sync reads given up after {FAST_FAILURES} failures in a row, plain from now on"
-        )
-        if len(self._bus.parts) > 1:
-            line = f"{', '.join(self._cycle.given_up_on)}: {line}"
+        ports = self._cycle.given_up_on if len(self._bus.parts) > 1 else ()
         budget = self._budget(fast=False)
-        if self._rate_hz is not None and budget.share(self._rate_hz) > 1.0:
-            line += (
-                f": the wire carries at most {budget.limit_hz:.0f} Hz of plain reads, not "
-                f"{self._rate_hz:g} Hz: cycles will be late"
-            )
-        self.on_event(line)
+        self.on_event(plain_reads_text(budget, self._rate_hz, FAST_FAILURES, ports))
 
     def _send_goals(self, goal_rad: Floats) -> Int32s:
         goals = self._goals.encode(goal_rad)

@@ -4,6 +4,7 @@ The order avoids what users of such buses report: goals not synced before torque
 of 500 us a servo, alarms from before, turn counts lost at a reboot.
 """
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -201,13 +202,13 @@ def chain_settings(
     """
     low, high = units.limits_raw[joint]
     pitch = robot.all_axes[joint] == "p"
-    limits_current = pitch and bool(units.limits_current[joint])
-    if pitch and not limits_current:  # such a model is as soft as its output is small
+    mode = CURRENT_POSITION_MODE if units.current_mode[joint] else POSITION_MODE
+    if pitch and not units.limits_current[joint]:  # such a model is as soft as its output is small
         goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
     return (
         ChainSetting("Return Delay Time", 0),
         # before the rest: a new mode resets the gains
-        ChainSetting("Operating Mode", CURRENT_POSITION_MODE if limits_current else POSITION_MODE),
+        ChainSetting("Operating Mode", mode),
         # Torque that a goal or a power-up switches on is torque without a watchdog
         ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
         ChainSetting(_STARTUP, 0, usual=False),
@@ -294,7 +295,7 @@ def _configure_joint(
     if pwm_limit == 0:
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {full}")
     settings = list(chain_settings(robot, units, joint, pwm_limit))
-    if robot.all_axes[joint] == "p" and units.limits_current[joint]:
+    if units.current_mode[joint]:
         settings.append(_current_setting(robot, units, joint, found["Current Limit"]))
     settings.append(ChainSetting(IDENTITY, identity(joint)))
     values = _apply(bus, robot, joint, settings, found, on_event)
@@ -383,13 +384,15 @@ def _apply(
 def _current_setting(
     robot: RobotConfig, units: JointUnits, joint: int, limit_raw: int
 ) -> ChainSetting:
-    """Goal Current of a pitch joint.
+    """Goal Current of a joint; the servo's Current Limit if the robot has no limit for it.
 
     Raises:
         ChainError: it is above the servo's Current Limit.
 
     """
     current_a = robot.current_limits_a[joint]
+    if not math.isfinite(current_a):
+        return ChainSetting("Goal Current", limit_raw)
     goal = max(1, units.current_raw(joint, current_a))
     if goal > limit_raw:
         own = bool(robot.joints) and robot.joints[joint].current_limit_a is not None

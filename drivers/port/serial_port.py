@@ -173,7 +173,7 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
     if isinstance(error, ValueError):
         return f"{name}: {baud} bit/s is not possible here: {error}"
     if _is_no_terminal(name):
-        return f"{name}: is no serial device, which is such as /dev/ttyUSB0"
+        return f"{name}: is not a serial device; name one such as /dev/ttyUSB0"
     return f"{name}: cannot be opened: {error}"
 
 

@@ -48,6 +48,8 @@ class FollowingError:
         self._since_s, self._idle_s = self._memory
         self.joint = -1
         """Joint of the newest reason to stop."""
+        self.is_idle = False
+        """Whether that reason is a motor that does not push."""
         self.reset()
 
     def reset(self) -> None:
@@ -66,6 +68,7 @@ class FollowingError:
         if joint < 0:
             return None
         self.joint = joint
+        self.is_idle = bool(self._idle_s[joint] >= IDLE_TIME_S)
         if self._idle_s[joint] >= IDLE_TIME_S:
             return self._idle_fault(state, goal_rad, joint)
         for_s = state.time_s - self._since_s[joint]

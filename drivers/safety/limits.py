@@ -8,6 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.safety.chain_load import motor_columns
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 STEP_SLACK_RAD, STEP_RATE = 0.2, 2.0
@@ -54,6 +55,11 @@ class SafetyLimits:
     """(3, J) output of each joint's motor: share of full output for each radian of error; current
     at full output and at rest, A; limit of the current, A. None: no joint is judged by it."""
     step_slack_rad: float = STEP_SLACK_RAD
+    motor: Floats | None = None
+    """(5, J) as ``chain_load.motor_columns``; None: load and windings are not estimated."""
+    fuse_a: float = math.inf
+    """Greatest lasting current of the whole chain."""
+    winding_limit_c: float = math.inf
     step_rate_rad_s: float = math.inf
     """How far a joint may be measured from its last angle: slack, and so much for each second."""
 
@@ -79,8 +85,17 @@ class SafetyLimits:
             following_effort_a=EFFORT_SHARE * np.array(robot.current_limits_a),
             following_time_s=safety.following_time_s,
             output=_output(robot),
+            motor=motor_columns(robot),
+            fuse_a=_fuse_a(robot),
+            winding_limit_c=safety.winding_limit_c,
             step_rate_rad_s=STEP_RATE * safety.goal_rate_rad_s,
         )
+
+
+def _fuse_a(robot: RobotConfig) -> float:
+    """Rating of the supply's fuse; infinite without one."""
+    power = robot.power
+    return math.inf if power is None or power.fuse_a is None else power.fuse_a
 
 
 def _output(robot: RobotConfig) -> Floats:

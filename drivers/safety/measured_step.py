@@ -54,7 +54,7 @@ class MeasuredSteps:
         step_rad = np.abs(position_rad - believed.position_rad)
         measured_s = believed.time_s - believed.age_s
         between_s = np.maximum(state.time_s - state.age_s - measured_s, 0.0)
-        # a value that is no number is left to the vetting
+        # the vetting judges values that are not numbers
         doubted = step_rad > slack_rad + limits.step_rate_rad_s * between_s
         if doubted_rad is not None:
             doubted |= (np.abs(position_rad - doubted_rad) <= slack_rad) & (step_rad > slack_rad)

@@ -11,11 +11,15 @@ from typing import Any
 
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
-from snakewalk.drivers.link import ExplainingLink, JointLink
+from snakewalk.drivers.link import CheckingLink, ExplainingLink, JointLink, SoftLink
+from snakewalk.drivers.safety.chain_load import ChainLoad
 from snakewalk.drivers.safety.following_error import FollowingError
 from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.load_limits import LoadLimits
 from snakewalk.drivers.safety.measured_step import MeasuredSteps
 from snakewalk.drivers.safety.recovery import Recovery
+from snakewalk.drivers.safety.stop_output import StopOutput
+from snakewalk.drivers.safety.trip_hold import INTERRUPTED, TripHold
 from snakewalk.drivers.safety.vet import (
     SafetyMemory,
     Verdict,
@@ -51,6 +55,12 @@ class SafeLink:
     With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
     holds, and goes on from where it stands if the policy of the recovery allows it; the same with a
     servo that an overload has shut down, slowly, if the recovery may reboot it.
+
+    With a ``hold`` a trip with a valid state holds with low currents for a while before torque goes
+    off: after a joint that does not follow, and after ``request_stop(..., may_hold=True)``, which
+    the first Ctrl-C is then. ``is_holding`` is true meanwhile, and ``read`` ends it in time.
+
+    A ``stop_output`` is activated if torque off is not confirmed.
     """
 
     def __init__(
@@ -61,6 +71,8 @@ class SafeLink:
         recovery: Recovery[Any] | None = None,
         stop_requested: Callable[[], str | None] = lambda: None,
         on_event: Callable[[str], None] = lambda line: None,
+        hold: TripHold | None = None,
+        stop_output: StopOutput | None = None,
     ) -> None:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""
@@ -70,6 +82,10 @@ class SafeLink:
         """Interruptions and overloads that were recovered from."""
         self._tripped_by: str | None = None
         self._link = link
+        self._check_servos: Callable[[], None] = lambda: None
+        if isinstance(link, CheckingLink):
+            # after the goals, so that the time from a state to its goals is the same in all cycles
+            link.checks_in_read, self._check_servos = False, link.check_servos
         self._recovery = recovery
         self._limits = limits
         self._limits_at_start = replace(limits, voltage_time_s=0.0)
@@ -77,10 +93,15 @@ class SafeLink:
         self._state: JointState | None = None
         self._following = FollowingError(limits)
         self._steps = MeasuredSteps(limits)
+        self._loads = LoadLimits(limits)
         self._doubt: str | None = None
+        self._is_held_off = False
         self._on_event = on_event
         self._memory: SafetyMemory | None = None
         self._stop_requested: str | None = None
+        self._stop_may_hold = False
+        self._hold, self._hold_until_s = hold, -math.inf
+        self._stop_output, self._output_is_active = stop_output, False
         self._asked_to_stop = stop_requested
         self._touched = False
         self._off_tries = 0
@@ -93,7 +114,9 @@ class SafeLink:
                 # what a shell starts beside itself ignores SIGINT: it has to stop all the same
                 ignored = number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
                 if not ignored:
-                    self._handlers[number] = signal.signal(number, _unwind)
+                    softly = number == signal.SIGINT and self._hold is not None
+                    handler = self._interrupt if softly else _unwind
+                    self._handlers[number] = signal.signal(number, handler)
         return self
 
     def __exit__(
@@ -128,6 +151,16 @@ class SafeLink:
         """Whether ``enable`` has been called, so that torque may have been on."""
         return self._touched
 
+    @property
+    def load(self) -> ChainLoad | None:
+        """Estimates of current, charge and windings; None without records of the motors."""
+        return self._loads.load
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether a trip holds with low currents; torque goes off when it ends."""
+        return self._hold_until_s > -math.inf
+
     def enable(self) -> JointState:
         """Check and set up the servos, torque on.
 
@@ -147,9 +180,20 @@ class SafeLink:
         return state
 
     def disable(self) -> None:
-        """Torque off; safe to call at any time, more than once."""
-        self._memory = None
-        self._link.disable()
+        """Torque off; safe to call at any time, more than once.
+
+        The stop output is activated if torque off is not confirmed.
+
+        Raises:
+            DriverError: torque off is not confirmed.
+
+        """
+        self._memory, self._hold_until_s = None, -math.inf
+        try:
+            self._link.disable()
+        except DriverError as fault:
+            self._activate_output(fault)
+            raise
         self._off_tries = 0
 
     def read(self) -> JointState:
@@ -161,6 +205,8 @@ class SafeLink:
         """
         if self._off_tries > 0:
             self._switch_off_again()
+        if self.is_holding:
+            return self._read_held()
         try:
             state = self._link.read()
         except DriverError as fault:
@@ -204,7 +250,7 @@ class SafeLink:
             raise SafetyTrippedError("torque is off: enable first")
         stop = self._stop()
         if stop is not None:
-            self._trip(stop)
+            self._trip(stop, may_hold=self._stops_softly())
             self._refuse_if_tripped()
         if self._recovery is not None:
             # the program, or the machine, stood still between the read and here
@@ -220,15 +266,22 @@ class SafeLink:
             self._refuse_if_tripped()
         try:
             self._link.write(JointCommand(command.time_s, verdict.goal_rad))
-        except DriverError as fault:
-            self._recover(str(fault), fault)
-        else:  # if the program stood still in between, the next step counts from here
+            # if the program stood still in between, the next step counts from here
             sent_s = self._clock.now_s()
             if sent_s != now_s:
                 self._memory = verdict.memory._replace(time_s=sent_s)
+            self._check_servos()
+        except DriverError as fault:
+            self._recover(str(fault), fault)
 
-    def request_stop(self, reason: str) -> None:
-        """Latch at the next read or write; may be called from another thread (a stop button)."""
+    def request_stop(self, reason: str, *, may_hold: bool = False) -> None:
+        """Latch at the next read or write; may be called from another thread (a stop button).
+
+        With ``may_hold`` the body may hold first; a stop without it counts more, in any order.
+        """
+        if may_hold and self._stop_requested is not None:
+            return
+        self._stop_may_hold = may_hold
         self._stop_requested = reason
 
     def reset(self, operator: str) -> None:
@@ -240,6 +293,8 @@ class SafeLink:
         """
         if not operator.strip():
             raise ValueError("a reset needs the name of the operator")
+        if self.is_holding:
+            self.disable()
         self.tripped = self._tripped_by = None
         self._stop_requested = None
 
@@ -292,10 +347,12 @@ class SafeLink:
     def _following_fault(self, state: JointState, memory: SafetyMemory) -> str | None:
         """Why to stop because a joint does not follow, with the reason that its servo shows."""
         fault = self._following.update(state, memory.goal_rad)
+        self._is_held_off = fault is not None and not self._following.is_idle
         if fault is None or not isinstance(self._link, ExplainingLink):
             return fault
         joint = self._following.joint
         reason = self._link.explain(joint)
+        self._is_held_off &= reason is None
         return fault if reason is None else f"{self._limits.joint_names[joint]}: {reason}"
 
     def _check(
@@ -303,19 +360,98 @@ class SafeLink:
     ) -> None:
         now_s = self._clock.now_s()
         fault, self._memory = check_state(state, memory, limits or self._limits, now_s)
-        fault = self._stop() or fault or self._following_fault(state, memory)
+        fault = fault or self._loads.update(state)
+        stop, is_sound = self._stop(), fault is None
+        fault = stop or fault or self._following_fault(state, memory)
         if fault is not None:
-            self._trip(fault)
+            softly = self._stops_softly() if stop is not None else self._is_held_off
+            self._trip(fault, may_hold=is_sound and softly)
 
-    def _trip(self, reason: str) -> None:
-        """Latch; the first reason stays."""
+    def _trip(self, reason: str, *, may_hold: bool = False) -> None:
+        """Latch; the first reason stays. Torque goes off, or later after a hold."""
+        is_first = self.tripped is None
         if self.tripped is None:
             self.tripped = self._tripped_by = reason
+        if is_first and may_hold and self._begin_hold():
+            return
+        self._switch_off()
+
+    def _switch_off(self) -> None:
+        """Torque off after a trip."""
         try:
             self.disable()
         except DriverError as fault:
-            self.tripped += f" (torque off failed: {fault})"
+            self.tripped = f"{self.tripped} (torque off failed: {fault})"
             self._off_tries = _OFF_TRIES
+
+    def _activate_output(self, fault: DriverError) -> None:
+        """Stop the servos from outside, once, and report it."""
+        output = self._stop_output
+        if output is None or self._output_is_active or not self._touched:
+            return
+        try:
+            output.activate()
+        except OSError as error:
+            line = f"stop output {output.name}: {error}; switch the servo power off"
+        else:
+            self._output_is_active = True
+            line = f"stop output {output.name}: activated, because torque off is not confirmed"
+        fault.add_note(line)
+        self._on_event(line)
+
+    def _stops_softly(self) -> bool:
+        """Whether the stop that was asked for may hold: an operator's, and no stop button's."""
+        return self._stop_may_hold and self._asked_to_stop() is None
+
+    def _begin_hold(self) -> bool:
+        """Hold with low currents, if that is possible and the newest state is sound."""
+        hold, state, memory, now_s = self._hold, self._state, self._memory, self._clock.now_s()
+        if hold is None or state is None or memory is None or not isinstance(self._link, SoftLink):
+            return False
+        if self._doubt is not None:
+            return False
+        if check_state(state, memory, self._limits, now_s)[0] is not None:
+            return False
+        try:
+            self._link.hold_softly(hold.current_a)
+        except DriverError as fault:
+            self._on_event(f"cannot hold: {fault}")
+            return False
+        self._stop_requested, self._stop_may_hold = None, False  # another stop ends the hold
+        self._memory = SafetyMemory.at_rest(state)
+        self._hold_until_s = self._clock.now_s() + hold.seconds
+        self._on_event(f"holds with low currents for {hold.seconds:g} s, then torque goes off")
+        return True
+
+    def _read_held(self) -> JointState:
+        """Read while it holds; torque off at its end, or at any reason to stop."""
+        try:
+            state = self._link.read()
+        except DriverError as fault:
+            self._end_hold(str(fault))
+            raise SafetyTrippedError(str(self.tripped)) from fault
+        doubt, now_s = None, self._clock.now_s()
+        if self._state is not None:
+            state, doubt = self._steps.update(state, self._state)
+        self._state = state
+        assert self._memory is not None
+        unsound, self._memory = check_state(state, self._memory, self._limits, now_s)
+        reason = self._stop() or doubt or unsound or self._loads.update(state)
+        if reason is not None or now_s >= self._hold_until_s:
+            self._end_hold(reason)
+        return state
+
+    def _end_hold(self, reason: str | None) -> None:
+        """Torque off; a ``reason`` has ended the hold early."""
+        if reason is not None and self.tripped is not None:
+            self.tripped += f" (the hold ended early: {reason})"
+        self._switch_off()
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        """Hold after the first Ctrl-C; the second unwinds the program."""
+        if self._memory is None or self.tripped is not None or self._stop_requested is not None:
+            _unwind(number, frame)
+        self.request_stop(INTERRUPTED, may_hold=True)
 
     def _switch_off_again(self) -> None:
         """Ask for the torque off that the trip could not confirm."""

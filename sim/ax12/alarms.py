@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Indices
-from snakewalk.sim.ax12.protocol1 import Error1
+from snakewalk.drivers.protocol.protocol1 import Error1
 from snakewalk.sim.plant import ServoDrive
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.motor import MotorModel

@@ -7,11 +7,12 @@ from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.config.servo_model import RegisterRow, ServoModel
+from snakewalk.drivers.protocol.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.alarms import Ax12Alarms
-from snakewalk.sim.ax12.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.table import MODEL, end_of, initial_value
 from snakewalk.sim.plant import Plant
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
+from snakewalk.sim.servo.constant_readings import ConstantReadings
 from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MotorModel, make_drive
 from snakewalk.sim.servo.profile import Trajectory
@@ -67,6 +68,7 @@ class Ax12Servos:
         self.powered = np.ones(servos, bool)
         """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
         self._no_output = np.zeros(servos, bool)
+        self._readings = ConstantReadings(self._views.__getitem__)
         self._trajectory = Trajectory(servos, facts.rad_s_per_velocity, np.nan)
         self._turn_rad = np.zeros(servos)
         self._registered: dict[int, tuple[int, bytes]] = {}
@@ -177,6 +179,15 @@ class Ax12Servos:
         """Cut the output stages of servos off their motors, or connect them again."""
         self._no_output[rows] = on
 
+    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
+        """Let servos report a constant value in a register; None: the present one."""
+        self.refresh()
+        self._readings.set(rows, name, value)
+
+    def clear_reading(self, rows: Indices, name: str) -> None:
+        """Let servos report measured values in a register again."""
+        self._readings.clear(rows, name)
+
     def advance(self, until_s: float) -> None:
         """Step physics, trajectories and alarms to ``until_s``."""
         while self._time_s < until_s:
@@ -205,6 +216,8 @@ class Ax12Servos:
         celsius = np.rint(self.protection.temperature_c)
         self["Present Temperature"][:] = np.clip(celsius, 0, 255)
         self["Moving"][:] = self._trajectory.ongoing & self._on() & ~self._wheel()
+        if self._readings.any:
+            self._readings.apply()
 
     def _on(self) -> Bools:
         return np.asarray((self["Torque Enable"] == 1) & self.powered)

@@ -9,7 +9,14 @@ from collections.abc import Iterator
 
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.config.servo_model import ServoModel
-from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, Packet1, Reader1, frame
+from snakewalk.drivers.protocol.protocol1 import (
+    BROADCAST_ID,
+    Error1,
+    Instruction1,
+    Packet1,
+    Reader1,
+    frame,
+)
 from snakewalk.sim.ax12.table import MODEL
 from snakewalk.sim.sniff.decode import DecodedPacket
 

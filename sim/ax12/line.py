@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
-from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
-from snakewalk.sim.ax12.ax12 import Ax12Servos
-from snakewalk.sim.ax12.protocol1 import (
+from snakewalk.drivers.protocol.protocol1 import (
     BROADCAST_ID,
     HEADER,
     Error1,
@@ -18,6 +16,8 @@ from snakewalk.sim.ax12.protocol1 import (
     Reader1,
     frame,
 )
+from snakewalk.drivers.protocol.registers import RETURN_DELAY_UNIT_S
+from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.line.bus_contention import Reply, bus_contention
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.wire import Wire
@@ -47,10 +47,12 @@ class Ax12Line(Wire):
         )
         self.servos = servos
         self._reader = Reader1()
-        self._muted = np.zeros(len(servos), bool)
+        self._muted, self._deaf = np.zeros((2, len(servos)), bool)
         self.setBaudRate(baud)
 
     # for a fault file
+
+    has_alert_bit = False
 
     def ids(self) -> list[int]:
         """The ID of each row."""
@@ -78,6 +80,13 @@ class Ax12Line(Wire):
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
         """Stop servos from replying, or let them reply again; they still receive and obey."""
         self._muted[rows] = on
+
+    def deafen(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos ignore sync writes, or accept them again."""
+        self._deaf[rows] = on
+
+    def set_alert(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Do nothing: replies of Protocol 1.0 name the error, and have no alert bit."""
 
     def refresh_ids(self) -> None:
         """Nothing to do: the IDs are looked up anew for every packet."""
@@ -184,5 +193,7 @@ class Ax12Line(Wire):
             address, size = params[0], params[1]
             for at in range(2, len(params) - size, size + 1):
                 for row in self._addressed(params[at]):
+                    if self._deaf[row]:
+                        continue
                     self.servos.write(row, address, params[at + 1 : at + 1 + size])
         return []

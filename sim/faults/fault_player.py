@@ -1,5 +1,6 @@
 """Plays a fault file on a simulated line: the same file and seed give the same bytes."""
 
+import math
 import random
 from collections.abc import Callable, Collection, Mapping
 from functools import partial
@@ -65,6 +66,14 @@ class FaultyServos(Protocol):
         """Cut the output stages of servos off their motors, or connect them again."""
         ...
 
+    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
+        """Let servos report a constant value in a register; None: the present one."""
+        ...
+
+    def clear_reading(self, rows: Indices, name: str) -> None:
+        """Let servos report measured values in a register again."""
+        ...
+
     def cut_power(self, rows: Indices) -> None:
         """Take the supply away."""
         ...
@@ -82,6 +91,8 @@ class FaultTarget(Protocol):
     """A line and the servos on it, of either protocol."""
 
     clock: SimClock
+    has_alert_bit: bool
+    """Whether replies have a bit that reports an error without its cause."""
 
     @property
     def servos(self) -> FaultyServos:
@@ -110,6 +121,14 @@ class FaultTarget(Protocol):
 
     def mute(self, rows: Indices, on: bool) -> None:
         """Stop servos from replying, or let them reply again."""
+        ...
+
+    def deafen(self, rows: Indices, on: bool) -> None:
+        """Let servos ignore sync writes, or accept them again."""
+        ...
+
+    def set_alert(self, rows: Indices, on: bool) -> None:
+        """Let servos set the alert bit of their replies without an error, or no longer."""
         ...
 
     def refresh_ids(self) -> None:
@@ -187,14 +206,16 @@ class FaultPlayer:
                 for each in named
                 if each not in self._rows
             ]
-            if isinstance(fault, plan.WriteFault):
+            if isinstance(fault, plan.WriteFault | plan.ReadingFault):
                 wrong += self._unwritable(fault, where)
+            if fault.kind == "alert" and not self._line.has_alert_bit:
+                wrong.append(f"{where}: replies of Protocol 1.0 have no alert bit")
             if isinstance(fault, plan.TripFault) and fault.kind != "reboot":
                 wrong += self._undetectable(fault, where)
         if wrong:
             raise ConfigError(wrong)
 
-    def _unwritable(self, fault: plan.WriteFault, where: str) -> list[str]:
+    def _unwritable(self, fault: plan.WriteFault | plan.ReadingFault, where: str) -> list[str]:
         """Messages about a register that a named servo lacks, or a value that does not fit."""
         wrong = []
         for each in self._rows.keys() & set(fault.ids):
@@ -202,7 +223,7 @@ class FaultPlayer:
             kind = self._line.register_type(self._rows[each], name)
             if kind is None:
                 wrong.append(f"{where}: servo {each} has no register {name}")
-            elif not np.iinfo(kind).min <= value <= np.iinfo(kind).max:
+            elif value is not None and not np.iinfo(kind).min <= value <= np.iinfo(kind).max:
                 span = f"{np.iinfo(kind).min} to {np.iinfo(kind).max}"
                 wrong.append(f"{where}: {name} of servo {each} holds {span}, not {value}")
         return wrong
@@ -254,8 +275,14 @@ class FaultPlayer:
                 return self._power_cut(np.arange(self._rows[behind] + 1, len(line.ids())))
             case plan.ClashFault():
                 return partial(self._rename, fault, True), partial(self._rename, fault, False)
-            case plan.WriteFault(register_name=name, value=value):
+            case plan.WriteFault(register_name=name, value=value, every_s=None):
                 return partial(line.write_register, rows, name, value), None
+            case plan.WriteFault():
+                return partial(self._write_again, fault, rows), None
+            case plan.ReadingFault(register_name=name, value=value):
+                return partial(self._servos.set_reading, rows, name, value), partial(
+                    self._servos.clear_reading, rows, name
+                )
             case plan.HeatFault(celsius=celsius):
                 return partial(protection.heat, rows, celsius), None
             case plan.TripFault(kind=kind):
@@ -278,11 +305,23 @@ class FaultPlayer:
                 )
             case "brown_out":
                 return self._power_cut(rows)
+            case "deaf":
+                return partial(line.deafen, rows, True), partial(line.deafen, rows, False)
+            case "alert":
+                return partial(line.set_alert, rows, True), partial(line.set_alert, rows, False)
             case unknown:
                 assert_never(unknown)
 
     def _power_cut(self, rows: Indices) -> _Actions:
         return partial(self._servos.cut_power, rows), partial(self._servos.restore_power, rows)
+
+    def _write_again(self, fault: plan.WriteFault, rows: Indices, count: int = 0) -> None:
+        """Write a register, and let the next write follow."""
+        self._line.write_register(rows, fault.register_name, fault.value)
+        since_s = (count + 1) * (fault.every_s or math.inf)
+        if since_s < (fault.for_s or math.inf):
+            again = partial(self._write_again, fault, rows, count + 1)
+            self._servos.events.schedule(self._start_s + fault.at_s + since_s, again)
 
     def _rename(self, fault: plan.ClashFault, begins: bool) -> None:
         new, old = (fault.takes, fault.id) if begins else (fault.id, fault.takes)

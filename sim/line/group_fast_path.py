@@ -187,6 +187,8 @@ class GroupFastPath:
             rows = self._handler.directory.rows[np.frombuffer(ids, np.uint8)]
             if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
                 return None
+            if self._handler.directory.deaf[rows].any():
+                return None
             known = self._goals = (head, ids, rows)
         packet = np.frombuffer(raw, np.uint8)
         if not is_intact(packet):
@@ -206,6 +208,8 @@ class GroupFastPath:
         if (rows < 0).any() or not self._bank.readable(rows, address, length):
             return None
         if (self._bank["Status Return Level"][rows] < 1).any():
+            return None
+        if self._bank.false_alert[rows].any():
             return None
         delays_s = tuple(
             float(d) * RETURN_DELAY_UNIT_S for d in self._bank["Return Delay Time"][rows]

@@ -217,7 +217,7 @@ class InstructionHandler:
     def _sync_write(self, params: bytes) -> list[Reply]:
         address, length = word(params, 0), word(params, 2)
         for at in range(4, len(params) - length, length + 1):
-            self._write(params[at], address, params[at + 1 : at + 1 + length])
+            self._write(params[at], address, params[at + 1 : at + 1 + length], by_sync=True)
         self._written()
         return []
 
@@ -232,11 +232,14 @@ class InstructionHandler:
         self._written()
         return []
 
-    def _write(self, servo_id: int, address: int, data: bytes) -> None:
+    def _write(self, servo_id: int, address: int, data: bytes, *, by_sync: bool = False) -> None:
+        deaf = self.directory.deaf & by_sync
         for row in self.directory.primary(servo_id):
-            self._instructions.write(row, address, data)
+            if not deaf[row]:
+                self._instructions.write(row, address, data)
         for row in self.directory.secondary(servo_id):
-            self._instructions.write(row, address, data, ram_only=True)
+            if not deaf[row]:
+                self._instructions.write(row, address, data, ram_only=True)
 
     def _one(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
         error = self._instructions.execute(row, code, params, ram_only=ram_only)

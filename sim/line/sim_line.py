@@ -70,6 +70,8 @@ class SimLine(Wire):
 
     # for a fault file
 
+    has_alert_bit = True
+
     @property
     def servos(self) -> Firmware:
         """The servos on the line, by row."""
@@ -102,6 +104,14 @@ class SimLine(Wire):
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
         """Stop servos from replying, or let them reply again; they still receive and obey."""
         self.directory.mute[rows] = on
+
+    def deafen(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos ignore sync writes, or accept them again."""
+        self.directory.deaf[rows] = on
+
+    def set_alert(self, rows: NDArray[np.intp], on: bool) -> None:
+        """Let servos set the alert bit of their replies without an error, or no longer."""
+        self.bank.false_alert[rows] = on
 
     def refresh_ids(self) -> None:
         """Look up the IDs again, after they, power or muting have changed without a packet."""

@@ -2,6 +2,7 @@
 
 import ctypes
 import weakref
+from importlib import import_module
 from typing import Any, Self
 
 import mujoco
@@ -80,19 +81,17 @@ def _free(gl: Any, mjr: mujoco.MjrContext) -> None:
 
 def _context(width: int, height: int) -> Any:
     """Make an OpenGL context: MuJoCo's own choice by MUJOCO_GL falls at its import, too early."""
-    try:
-        ctypes.CDLL("libOSMesa.so.8")
-        from mujoco.osmesa import GLContext as OsMesa  # noqa: PLC0415  loads OpenGL
-
-        return OsMesa(width, height)
-    except (OSError, ImportError, AttributeError, RuntimeError) as error:
-        osmesa = error
-    try:
-        from mujoco.egl import GLContext as Egl  # noqa: PLC0415  loads OpenGL
-
-        return Egl(width, height)
-    except (OSError, ImportError, AttributeError, RuntimeError) as error:
-        raise OffscreenError(
-            f"films need an OpenGL that draws without a screen: OSMesa: {osmesa}; EGL: {error}. "
-            f"Remedy: {REMEDY}"
-        ) from None
+    faults = []
+    for name, library, module in (
+        ("OSMesa", "libOSMesa.so.8", "mujoco.osmesa"),
+        ("EGL", None, "mujoco.egl"),
+    ):
+        try:
+            if library is not None:
+                ctypes.CDLL(library)
+            return import_module(module).GLContext(width, height)  # the import loads OpenGL
+        except (OSError, ImportError, AttributeError, RuntimeError) as error:
+            faults.append(f"{name}: {error}")
+    raise OffscreenError(
+        f"films need an OpenGL that draws without a screen: {'; '.join(faults)}. Remedy: {REMEDY}"
+    )

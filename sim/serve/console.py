@@ -11,7 +11,7 @@ from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.port.port_map import id_range
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.servo.bench import BenchPlant
+from snakewalk.sim.serve.register_access import register_name, rows_of, set_load, set_register
 
 HELP: Final = """\
 set IDS REGISTER VALUE    set 3 Homing Offset 100; IDS: 3, 1-4, 1,3,5-8 or all
@@ -20,7 +20,6 @@ load IDS NM               a constant torque on shafts of a bench, N m: load 2 -0
 fault KIND KEY=VALUE ...  as in a fault file, from now on: fault mute ids=[3] for_s=2
 pace FACTOR               simulated seconds a second
 quit"""
-_MEASURED: Final = ("Present ", "Realtime Tick", "Moving", "Model Number", "Firmware Version")
 
 
 class Console:
@@ -55,51 +54,27 @@ class Console:
             return f"write {usage}"
 
     def _rows(self, text: str) -> list[int]:
-        there = {servo_id: row for row, servo_id in enumerate(self._line.ids())}
         if text == "all":
-            return list(there.values())
+            return rows_of(self._line, None)
         asked = [each for piece in text.split(",") for each in id_range(piece, "IDS", "write 1-4")]
-        missing = [str(each) for each in asked if each not in there]
-        if missing:
-            raise InputError(f"no servo has ID {', '.join(missing)}")
-        return [there[each] for each in asked]
-
-    def _register(self, words: list[str], rows: list[int]) -> str:
-        name, bank = " ".join(words), self._line.bank
-        known = {each.lower(): each for each in bank.names}
-        found = known.get(name.lower())
-        if found is None or not all(bank.has(row, found) for row in rows):
-            raise InputError(f"{name or 'REGISTER'}: no register of all these servos")
-        return found
+        return rows_of(self._line, asked)
 
     def _set(self, words: list[str]) -> str:
         if len(words) < 3:
             raise ValueError
         rows, value = self._rows(words[0]), int(words[-1], 0)
-        name, bank = self._register(words[1:-1], rows), self._line.bank
-        if name.startswith(_MEASURED):
-            raise InputError(f"{name}: is measured, not set; see load and fault")
-        register = bank.register(name)
-        data = register.encode(value)
-        for row in rows:
-            bank.table[row, register.address : register.address + register.size] = list(data)
-        bank.indirect.refresh()
-        self._line.firmware.apply_registers()
-        self._line.refresh_ids()
+        name = set_register(self._line, rows, " ".join(words[1:-1]), value)
         return f"{name} = {value} at {len(rows)} servo{'s' if len(rows) > 1 else ''}"
 
     def _get(self, words: list[str]) -> str:
         rows = self._rows(words[0])
-        name = self._register(words[1:], rows)
+        name = register_name(self._line, " ".join(words[1:]), rows)
         values, ids = self._line.shown(name), self._line.ids()
         return "  ".join(f"{ids[row]}: {values[row]}" for row in rows)
 
     def _load(self, words: list[str]) -> str:
-        plant = self._line.firmware.plant
-        if not isinstance(plant, BenchPlant):
-            raise InputError("load: only shafts of a bench (--servos) have one; a robot has ground")
         rows, load_n_m = self._rows(words[0]), float(words[1])
-        plant.set_load(rows, load_n_m)
+        set_load(self._line, rows, load_n_m)
         return f"{load_n_m:g} N m on {len(rows)} shaft{'s' if len(rows) > 1 else ''}"
 
     def _fault(self, words: list[str]) -> str:

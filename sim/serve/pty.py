@@ -9,6 +9,7 @@ to it, so servos at another are silent; one that sets none is taken to have the 
 """
 
 import fcntl
+import logging
 import math
 import os
 import select
@@ -47,6 +48,11 @@ def _checked_pace(pace: float) -> float:
     return pace
 
 
+_LINK_CHECK_S = 1.0
+"""Time between two looks at the link (ours)."""
+_LOGGER = logging.getLogger("snakewalk")
+
+
 class PtyServer:
     """Serves ``line`` at ``path`` from construction until ``close``; use it in a ``with``.
 
@@ -69,6 +75,8 @@ class PtyServer:
         self._offset_s = line.clock.now_s() - clock.now_s() * pace
         self.missed_s = 0.0
         """Time on the line that was left out because the server came late."""
+        self.latest_s = 0.0
+        """Longest time by which it came late, also if none was left out; ``IDLE_S`` is not late."""
         self._master = self._slave = -1
         self._speed = 0
         self.overrun_bytes = 0
@@ -76,6 +84,7 @@ class PtyServer:
         self.output_flushes = 0
         """How often, at least, the client threw away what the kernel had not handed over yet: it
         tells of all flushes between two looks as of one."""
+        self._link_checked_s = clock.now_s()
         self.path = ""
         """The device to open as a serial port; empty while the port has vanished."""
         self._open()
@@ -132,6 +141,7 @@ class PtyServer:
                 line.openPort()
                 self._open()
             return
+        self._check_link()
         ready = self._wait(wait_s)
         self._catch_up()
         if line.disconnected:
@@ -179,9 +189,10 @@ class PtyServer:
         fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))  # tells flushes, too
         self.path = os.ttyname(self._slave)
         self._speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
-        link = self._link
-        if link is None:
-            return
+        if self._link is not None:
+            self._make_link(self._link)
+
+    def _make_link(self, link: Path) -> None:
         if link.is_symlink() and (not link.exists() or os.readlink(link) == self.path):
             link.unlink()  # left by a server that was killed, whose device's name may be ours now
         try:
@@ -191,9 +202,32 @@ class PtyServer:
             self._link = None  # another's: not to be taken away at the end
             self.close()
             raise InputError(
-                f"{link}: is there already, and {what}: end the server whose it is, or choose "
-                "another name"
+                f"{link}: is there already, and {what}: end the server whose it is, choose another "
+                f"name, or remove it if its server was killed: rm {link}"
             ) from None
+
+    def _check_link(self) -> None:
+        """Report once a second that another program deleted or redirected the link.
+
+        A deleted link is made again; another's is left alone.
+        """
+        link, now_s = self._link, self._clock.now_s()
+        if link is None or now_s - self._link_checked_s < _LINK_CHECK_S:
+            return
+        self._link_checked_s = now_s
+        if link.is_symlink() and os.readlink(link) == self.path:
+            return
+        try:
+            if not link.is_symlink() and not link.exists():
+                link.symlink_to(self.path)
+                _LOGGER.warning("%s: was deleted; it leads to %s again", link, self.path)
+                return
+            where = os.readlink(link) if link.is_symlink() else "a file"
+            text = f"leads to {where} now"
+        except OSError as error:
+            text = f"was deleted and cannot be made again: {error.strerror}"
+        self._link = None
+        _LOGGER.warning("%s: %s; the servos are at %s", link, text, self.path)
 
     def _follow_baud_rate(self) -> None:
         """Follow the client's baud rate, once it has set one."""
@@ -207,7 +241,9 @@ class PtyServer:
     def _catch_up(self) -> None:
         """Bring the line to the present."""
         line = self._line
-        late_s = self._now_s() - line.clock.now_s() - LATE_S * self._pace
+        since_s = self._now_s() - line.clock.now_s()
+        self.latest_s = max(self.latest_s, since_s - IDLE_S * self._pace)
+        late_s = since_s - LATE_S * self._pace
         if late_s > 0.0:
             self._offset_s -= late_s
             self.missed_s += late_s

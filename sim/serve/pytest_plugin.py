@@ -5,11 +5,13 @@
         my_driver.open(bus.path)               # a real serial device, in real time
 
 ``bus.line`` is the same bus as a port object for the DYNAMIXEL SDK in simulated time: no thread, no
-sleep, the same every time. Registers by name: ``bus["Goal Position"]``.
+sleep, the same every time. Registers by name: ``bus["Goal Position"]``; ``bus.set`` and
+``bus.load`` change registers and torques. The report of a failed test states how late the bus was
+served.
 """
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Generator, Iterator
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -17,13 +19,29 @@ if TYPE_CHECKING:
     from snakewalk.sim.serve.servo_bus import ServoBus
 
 
+_BUSES: "pytest.StashKey[list[ServoBus]]" = pytest.StashKey()
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
+    """Add to the report of a failed test how late its buses were served."""
+    outcome = yield
+    report = outcome.get_result()
+    if report.when == "call" and report.failed:
+        lines = [bus.lateness for bus in item.stash.get(_BUSES, [])]
+        text = "\n".join(line for line in lines if line is not None)
+        if text:
+            report.sections.append(("servo_bus", text))
+
+
 @pytest.fixture
-def servo_bus() -> "Iterator[Callable[..., ServoBus]]":
+def servo_bus(request: pytest.FixtureRequest) -> "Iterator[Callable[..., ServoBus]]":
     """Make simulated buses: ``servo_bus("1-6:XL330-M288", baud=..., faults=..., imu="200")``."""
     # pytest loads this in every suite of the environment: what is heavy waits for its first use
     from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415  every suite loads this
 
     made: list[ServoBus] = []
+    request.node.stash[_BUSES] = made
 
     def make(servos: str = "1-4", **options: object) -> ServoBus:
         made.append(ServoBus(servos, **options))  # type: ignore[arg-type]

@@ -1,11 +1,14 @@
 """One simulated bus for a test: in simulated time as a port object, in real time as a device."""
 
+import queue
 import threading
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import load
 from snakewalk.drivers.clock import WallClock
@@ -13,6 +16,24 @@ from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain, parse_imu
 from snakewalk.sim.serve.pty import PtyServer
+from snakewalk.sim.serve.register_access import (
+    register_name,
+    rows_of,
+    set_load,
+    set_register,
+)
+
+_BUSY_MS = 10.0
+"""Lateness that a client with short time-outs notices (ours)."""
+
+
+class _Order:
+    """A change that the serving thread carries out."""
+
+    def __init__(self, change: Callable[[], None]) -> None:
+        self.change = change
+        self.is_done = threading.Event()
+        self.error: Exception | None = None
 
 
 class ServoBus:
@@ -36,6 +57,7 @@ class ServoBus:
         self._server: PtyServer | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
+        self._orders: queue.SimpleQueue[_Order] = queue.SimpleQueue()
 
     @property
     def path(self) -> str:
@@ -43,16 +65,92 @@ class ServoBus:
         if self._server is None:
             self._server = PtyServer(self.line, WallClock())
             self._thread = threading.Thread(
-                target=self._server.serve, args=(self._stop.is_set,), daemon=True
+                target=self._server.serve, args=(self._is_stopped,), daemon=True
             )
             self._thread.start()
         return self._server.path
 
     def __getitem__(self, register: str) -> NDArray[np.integer]:
-        """(S,) values of a register, in the order of the IDs; a copy, as fresh as a read is."""
+        """(S,) values of a register, in the order of the IDs; a copy, as fresh as a read is.
+
+        Raises:
+            KeyError: there is no such register; the closest names are listed.
+
+        """
         if self._server is None:
             self.line.settle()
-        return self.line.shown(register)
+        try:
+            return self.line.shown(register_name(self.line, register, []))
+        except InputError as error:
+            raise KeyError(str(error)) from None
+
+    def set(self, register: str, value: int, ids: Sequence[int] | None = None) -> None:
+        """Set a register of some servos, or of all, as another program would.
+
+        Args:
+            register: by the SDK's name.
+            value: whole number, as it is in the register.
+            ids: of the servos; None: all.
+
+        Raises:
+            InputError: the register or an ID is unknown, or the servo measures the register.
+            ControlTableError: the value does not fit.
+
+        """
+
+        def change() -> None:
+            set_register(self.line, self._rows(ids), register, value)
+
+        self._do(change)
+
+    def load(self, load_n_m: float, ids: Sequence[int] | None = None) -> None:
+        """Put a constant torque on the shafts of some servos, or of all.
+
+        Raises:
+            InputError: an ID is unknown.
+
+        """
+        self._do(lambda: set_load(self.line, self._rows(ids), load_n_m))
+
+    @property
+    def lateness(self) -> str | None:
+        """How late the bus was served, as one line; None before ``path`` was read."""
+        server = self._server
+        if server is None:
+            return None
+        late_ms = server.latest_s * 1e3
+        text = f"bus.path: served up to {late_ms:.0f} ms late; {server.missed_s:.2f} s left out"
+        if late_ms < _BUSY_MS:
+            return text
+        return (
+            f"{text}: the machine was busy, and replies may have missed their time-outs; run with "
+            "fewer workers (-n), or use bus.line, which has simulated time"
+        )
+
+    def _rows(self, ids: Sequence[int] | None) -> list[int]:
+        return rows_of(self.line, ids)
+
+    def _do(self, change: Callable[[], None]) -> None:
+        """Carry out a change between two steps of the server, or at once without one."""
+        if self._thread is None:
+            self.line.settle()
+            change()
+            return
+        order = _Order(change)
+        self._orders.put(order)
+        order.is_done.wait()
+        if order.error is not None:
+            raise order.error
+
+    def _is_stopped(self) -> bool:
+        while not self._orders.empty():
+            order = self._orders.get()
+            try:
+                order.change()
+            except Exception as error:
+                order.error = error
+            order.is_done.set()
+        return self._stop.is_set()
 
     def close(self) -> None:
         """Stop serving; safe to call twice."""

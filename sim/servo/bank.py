@@ -122,6 +122,8 @@ class ServoBank:
         """(S,) names as printed on the servos."""
         self.measures_current = np.array([each.measures_current for each in self._of_row], bool)
         """(S,) False where a servo has no current sensor."""
+        self.false_alert = np.zeros(len(self.ids), bool)
+        """(S,) servos that set the alert bit of their replies without an error."""
         self.table: Bytes = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
         rows = [self._rows_of(kind) for kind in kinds]
         self._kinds = tuple(zip(kinds, rows, strict=True))
@@ -190,7 +192,7 @@ class ServoBank:
 
     def alert(self, rows: Indices | slice | int) -> Bytes:
         """Bit 7 of the error field: set while Hardware Error Status(70) is not 0."""
-        wrong = self["Hardware Error Status"][rows] != 0
+        wrong = (self["Hardware Error Status"][rows] != 0) | self.false_alert[rows]
         alert: Bytes = np.multiply(wrong, ALERT, dtype=np.uint8)
         return alert
 

@@ -22,6 +22,7 @@ from snakewalk.drivers.protocol.registers import (
 from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.blocked_shaft import BlockedShaft
+from snakewalk.sim.servo.constant_readings import ConstantReadings
 from snakewalk.sim.servo.control_loops import CONTROL_S, ControlLoops
 from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import (
@@ -87,6 +88,7 @@ class Firmware:
         """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
         self.no_output = np.zeros(joints, bool)
         """(S,) whether the output stage is dead: registers show a servo that works."""
+        self._readings = ConstantReadings(bank.__getitem__)
         self.events = EventQueue()
         """Events that happen to the servos at a time of their own, such as faults."""
         self.control_loops = ControlLoops(bank, self.drive, motor)
@@ -290,6 +292,15 @@ class Firmware:
         self.no_output[rows] = on
         self.apply_registers()
 
+    def set_reading(self, rows: NDArray[np.intp], name: str, value: int | None) -> None:
+        """Let servos report a constant value in a register; None: the present one."""
+        self.refresh()
+        self._readings.set(rows, name, value)
+
+    def clear_reading(self, rows: NDArray[np.intp], name: str) -> None:
+        """Let servos report measured values in a register again."""
+        self._readings.clear(rows, name)
+
     def cut_power(self, rows: NDArray[np.intp]) -> None:
         """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
         self.powered[rows] = False
@@ -306,6 +317,8 @@ class Firmware:
     def refresh_motion(self) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
         self._present_values.motion(self._frame)
+        if self._readings.any:
+            self._readings.apply()
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Write the present values, at least those that a read of this block shows."""
@@ -317,6 +330,8 @@ class Firmware:
             present.path(self._frame, self._time_s)
         if gather or (address < present.supply_at.stop and stop > present.supply_at.start):
             present.supply()
+        if self._readings.any:
+            self._readings.apply()
         if gather:
             indirect.gather()
 

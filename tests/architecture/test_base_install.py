@@ -40,9 +40,9 @@ def call(folder: Path, *commands: tuple[str, ...]) -> list[Result]:
 
 
 BASE = [
-    ("scan", "--port", "/dev/null", "--baud", "1000000"),
-    ("doctor", "--port", "/dev/null", "--robot", "yaw16"),
-    ("bus", "set", "--port", "/dev/null", "--id", "3", "--return-delay", "0", "--yes"),
+    ("scan", "--port", "./tty", "--baud", "1000000"),
+    ("doctor", "--port", "./tty", "--robot", "yaw16"),
+    ("bus", "set", "--port", "./tty", "--id", "3", "--return-delay", "0", "--yes"),
     ("list",),
     ("gait", "list"),
     ("gait", "show", "rolling"),
@@ -50,7 +50,7 @@ BASE = [
     ("track", "worm-like"),
     ("analyse", "worm-like"),
     ("walk", "--graph", "er:40:5", "--repeats", "2"),
-    ("play", "worm-like", "--port", "/dev/null", "--robot", "yaw16", "--out", "p"),
+    ("play", "worm-like", "--port", "./tty", "--robot", "yaw16", "--out", "p"),
     ("bus", "serve", "--servos", "1-2", "--for", "0.1"),
 ]
 """Commands that need no extra."""
@@ -61,7 +61,7 @@ NEEDY = [
     (("play", "worm-like"), "sim"),
     (("replay", "log.mcap"), "sim"),
     (("shadow", "log.mcap"), "sim"),
-    (("gait", "run", "lateral-undulation", "--shadow", "--port", "/dev/null"), "sim"),
+    (("gait", "run", "lateral-undulation", "--shadow", "--port", "./tty"), "sim"),
     (("bus", "serve", "--robot", "yaw16"), "sim"),
     (("sweep", "rolling", "--points", "1"), "sim"),
     (("sweep", "rolling", "--points", "1", "--dask", "tcp://localhost:1"), "sweep"),
@@ -82,11 +82,11 @@ NEEDY = [
     (("export", "log.mcap", "--ros2", "b.mcap"), "export"),
     (("ros",), "ros"),
     (("export", "log.mcap", "--parquet", "tables"), "export"),
-    (("run", "flat-slalom", "--pose", "camera", "--port", "/dev/null"), "vision"),
+    (("run", "flat-slalom", "--pose", "camera", "--port", "./tty"), "vision"),
 ]
 """Commands, and the extra that each needs."""
 
-ON_SERVOS = ("--port", "/dev/null", "--json")
+ON_SERVOS = ("--port", "./tty", "--json")
 GAIT = ("gait", "run", "lateral-undulation", "--seconds", "2", "--out", "gait", *ON_SERVOS)
 JOB = (
     *("run", "flat-slalom", "--motion", "serpenoid", "--pose", "joints", "--out", "j"),

@@ -70,7 +70,7 @@ def read_source(text: str) -> Source:
 
 @cache
 def sources() -> Mapping[str, Source]:
-    """Every module of the rooms (dotted, without ``snakewalk``), read once for all tests."""
+    """Every module of the packages (dotted, without ``snakewalk``), read once for all tests."""
     return {
         ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): (
             read_source(file.read_text(encoding="utf-8"))

@@ -36,14 +36,14 @@ PATTERNS = {
 }
 """Patterns that are to be removed from docstrings and comments."""
 MOST: Final = {
-    "'what ...' or 'who ...' as a noun": 355,
-    "a fragment: 'Of ...', 'That of ...', 'Likewise'": 227,
-    "'takes' for accepts, uses, needs": 222,
-    "'is none', 'is no X', 'has it that'": 194,
-    "'told', 'tells', 'says of'": 144,
+    "'what ...' or 'who ...' as a noun": 351,
+    "a fragment: 'Of ...', 'That of ...', 'Likewise'": 226,
+    "'takes' for accepts, uses, needs": 221,
+    "'is none', 'is no X', 'has it that'": 193,
+    "'told', 'tells', 'says of'": 143,
     "'so many', 'from ... on', 'beside', 'somebody'": 155,
     "'of now', 'reckon', 'foretold', 'anew', 'mend'": 26,
-    "a metaphor for code: room, house, door, noun": 22,
+    "a metaphor for code: room, house, door, noun": 18,
 }
 """Occurrences that are left; a count that falls is lowered here, none rises."""
 

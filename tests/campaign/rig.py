@@ -91,6 +91,11 @@ class ChangeWatch:
     """
 
     def __init__(self, chain: ServoChain, bank: ServoBank) -> None:
+        self.reports: list[str] = []
+        """What the chain and its recovery have said since the beginning."""
+        self._cold: dict[int, int] = {}
+        """Cycles in which the temperature of a joint read 0 and was not reported."""
+        self._cold_reported: set[int] = set()
         self.lines: list[str] = []
         """What the chain and its recovery have said since the last cycle."""
         self._chain, self._bank = chain, bank
@@ -99,7 +104,7 @@ class ChangeWatch:
         self._recoveries = 0
         self.noticed = self.ended_otherwise = 0
         self.unnoticed: list[str] = []
-        chain.on_event = self.lines.append
+        chain.on_event = self.report
         check = chain._check_liveness
 
         def watched(*, has_time: bool) -> None:
@@ -107,6 +112,11 @@ class ChangeWatch:
             check(has_time=has_time)
 
         chain._check_liveness = watched  # type: ignore[method-assign]
+
+    def report(self, line: str) -> None:
+        """Keep a line of the chain or of its recovery."""
+        self.lines.append(line)
+        self.reports.append(line)
 
     def restart(self) -> None:
         """Begin anew: the chain has been set up."""
@@ -125,7 +135,23 @@ class ChangeWatch:
         for joints, register in [c for c, k in self._cycles.items() if k == NOTICED_CYCLES]:
             self.unnoticed.append(f"unnoticed: {register} of {', '.join(map(str, joints))}")
         self._pending = {each for each in changed if self._cycles[each] < NOTICED_CYCLES}
+        self._look_for_cold_sensors(valid)
         self.lines.clear()
+
+    def _look_for_cold_sensors(self, valid: np.ndarray) -> None:
+        """Count temperatures that read 0: each joint is reported once."""
+        rows = rows_by_id(self._bank)
+        if rows is None:
+            return
+        is_cold = valid & (self._bank["Present Temperature"][rows] == 0)
+        for joint in set(np.flatnonzero(is_cold).tolist()) - self._cold_reported:
+            if any(f"{ROBOT.joint_label(joint)}: temperature reads 0" in x for x in self.lines):
+                self._cold_reported.add(joint)
+                self.noticed += 1
+                continue
+            self._cold[joint] = self._cold.get(joint, 0) + 1
+            if self._cold[joint] == NOTICED_CYCLES:
+                self.unnoticed.append(f"unnoticed: temperature of {joint} reads 0")
 
     def end(self, link: SafeLink) -> None:
         """Count the changes that there were when the link latched, or was brought back."""
@@ -156,6 +182,8 @@ class ChangeWatch:
             expected = dict(self._chain._configured.get(joint, {}))
             expected |= self._chain._fingerprints.get(joint, {})
             expected["Bus Watchdog"] = self._chain._watchdog_ticks
+            if self._chain._goal_check._sent:
+                expected["Goal Position"] = int(self._chain._goal_check._sent[-1][joint])
             row = rows[joint]
             other = {name for name, each in expected.items() if int(bank[name][row]) != each}
             if IDENTITY in other:
@@ -185,7 +213,7 @@ class Rig:
             patience_s=PATIENCE_S,
             limit=10**6,
             overload_reboots=10**6 if policy == "resume" else 0,
-            on_event=self.changes.lines.append,
+            on_event=self.changes.report,
         )
         self.link = SafeLink(self.chain, self.limits, self.line.clock, recovery)
         self.player = FaultPlayer(self.line, plan)

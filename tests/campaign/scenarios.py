@@ -2,13 +2,14 @@
 
 import random
 from itertools import combinations
+from typing import Any
 
 from snakewalk.config.faults import FaultPlan
 
 from .rig import ROBOT
 
 NOISE = ("drop", "corrupt", "truncate", "duplicate", "delay", "late")
-SERVO = ("mute", "stuck", "brown_out", "no_output")
+SERVO = ("mute", "stuck", "brown_out", "no_output", "alert")
 TRIPS = ("reboot", "overload", "overheating", "voltage", "encoder", "shock")
 WRITES = {
     "P gain": ("Position P Gain", (50, 400, 3000)),
@@ -25,8 +26,14 @@ WRITES = {
     "limits": ("Min Position Limit", (100, 1000)),
 }
 """Registers that another program changes while the chain moves, and values that it may write."""
-CHANGES = ("exchange", *WRITES)
-KINDS = (*NOISE, *SERVO, "clash", *TRIPS, "heat", "supply", "unplug", "stall", "port", *CHANGES)
+GOALS = ("second master", "deaf")
+"""Kinds in which servos hold other goals than those that were sent."""
+CHANGES = ("exchange", *GOALS, *WRITES)
+OTHERS = ("remounted", "other robot", "cold sensor", "dip")
+"""A servo without power gets another zero or direction; the port vanishes and another robot with
+the same IDs comes back; a temperature reads 0; the supply is too low for less than 0.3 s."""
+BUS = ("heat", "supply", "unplug", "stall", "port")
+KINDS = (*NOISE, *SERVO, "clash", *TRIPS, *BUS, *OTHERS, *CHANGES)
 SCENARIOS = ((), *((kind,) for kind in KINDS), *combinations(KINDS, 2))
 """None, each alone, each pair."""
 _EVERY_S = 2.5
@@ -39,16 +46,48 @@ def plan(kinds: tuple[str, ...], seed: int, duration_s: float) -> FaultPlan:
     for kind in kinds:
         at_s = rng.uniform(0.7, 1.4)  # the start takes half a second
         while at_s < duration_s:
-            faults.append({"kind": kind, "at_s": at_s, **_how(kind, rng)})
+            faults += [
+                {"kind": kind, **each, "at_s": at_s + each.get("at_s", 0.0)}
+                for each in _how(kind, rng)
+            ]
             at_s += rng.uniform(0.6, 1.4) * _EVERY_S
     return FaultPlan.model_validate({"seed": seed, "fault": faults})
 
 
-def _how(kind: str, rng: random.Random) -> dict[str, object]:
+def _how(kind: str, rng: random.Random) -> list[dict[str, Any]]:
     ids = rng.sample(ROBOT.servo_ids, rng.randint(1, 2))
     for_s = rng.choice((0.01, 0.03, 0.1, 0.3, 0.8))
+    if kind in (*OTHERS, *GOALS):
+        return _several(kind, ids, rng)
+    return [_one(kind, ids, for_s, rng)]
+
+
+def _several(kind: str, ids: list[int], rng: random.Random) -> list[dict[str, Any]]:
+    """Faults of the newer kinds, some of which consist of several."""
+    for_s = rng.choice((0.3, 0.8, 1.5))
+    match kind:
+        case "second master":
+            write = {"register": "Goal Position", "value": rng.choice((1500, 2048, 2500))}
+            return [{"kind": "write", "ids": ids, **write, "every_s": 0.004, "for_s": for_s}]
+        case "deaf":
+            return [{"ids": ids, "for_s": for_s}]
+        case "remounted":
+            name, value = rng.choice((("Homing Offset", 300), ("Drive Mode", 1)))
+            write = {"kind": "write", "ids": ids, "register": name, "value": value, "at_s": 0.1}
+            return [{"kind": "brown_out", "ids": ids, "for_s": 0.3}, write]
+        case "other robot":
+            all_reboot = {"kind": "reboot", "ids": ROBOT.servo_ids, "at_s": 0.15}
+            return [{"kind": "port", "for_s": 0.3}, all_reboot]
+        case "cold sensor":
+            register = {"register": "Present Temperature", "value": 0}
+            return [{"kind": "reading", "ids": ids, **register, "for_s": for_s}]
+        case _:
+            return [{"kind": "supply", "volts": 9.7, "for_s": rng.choice((0.05, 0.15, 0.25))}]
+
+
+def _one(kind: str, ids: list[int], for_s: float, rng: random.Random) -> dict[str, Any]:
     if kind in NOISE:
-        found: dict[str, object] = {"for_s": for_s, "chance": rng.choice((0.05, 0.3, 1.0))}
+        found: dict[str, Any] = {"for_s": for_s, "chance": rng.choice((0.05, 0.3, 1.0))}
         if kind in ("delay", "late"):
             found["by_s"] = rng.choice(
                 (1e-3, 3e-3, 6e-3)

@@ -13,10 +13,11 @@ from snakewalk.drivers.types import JointState
 from snakewalk.sim.line.rx_queue import RxQueue
 from tests.oracles.raw_positions import raw_positions
 
+from . import rig
 from .campaign import Tally, campaign, run_scenario
 from .report import table
 from .rig import JOINTS, ROBOT, Rig
-from .scenarios import CHANGES, KINDS, SCENARIOS, WRITES
+from .scenarios import CHANGES, KINDS, OTHERS, SCENARIOS, WRITES, plan
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -32,6 +33,49 @@ def test_a_change_by_another_program_is_noticed_in_motion(kind: str) -> None:
     assert tally.noticed
     assert tally.complaints == []
     assert tally.violations == 0
+
+
+def test_another_robot_with_the_same_ids_is_never_gone_on_with() -> None:
+    tally = run_scenario(("other robot",), 1, 130)  # an odd seed: the policy is to resume
+    assert tally.trips
+    assert tally.brought_back == 0
+    assert tally.complaints == []
+
+
+def test_a_servo_that_is_mounted_otherwise_while_it_is_off_is_not_gone_on_with() -> None:
+    tally = run_scenario(("remounted",), 1, 130)
+    assert tally.trips
+    assert tally.brought_back == 0
+    assert tally.complaints == []
+
+
+def test_a_temperature_that_reads_0_is_reported() -> None:
+    tally = run_scenario(("cold sensor",), 0, 100)
+    assert tally.noticed
+    assert tally.unnoticed == 0
+
+
+def test_a_temperature_that_is_not_reported_is_counted(mocker: MockerFixture) -> None:
+    mocker.patch("snakewalk.drivers.chain.servo_chain.TemperatureSensors.update", return_value=[])
+    mocker.patch.object(rig, "NOTICED_CYCLES", 10)
+    assert run_scenario(("cold sensor",), 1, 200).unnoticed
+
+
+def test_a_supply_that_is_too_low_for_a_moment_ends_no_run() -> None:
+    tally = run_scenario(("dip",), 3, 130)
+    assert (tally.trips, tally.complaints) == (0, [])
+
+
+def test_a_scenario_without_a_fault_has_no_alarm() -> None:
+    tally = run_scenario((), 1, 130)
+    assert (tally.trips, tally.false_alarms, tally.complaints) == (0, 0, [])
+
+
+def test_any_line_of_a_sound_chain_is_a_false_alarm(mocker: MockerFixture) -> None:
+    mocker.patch(
+        "snakewalk.drivers.chain.servo_chain.TemperatureSensors.update", return_value=["hot"]
+    )
+    assert run_scenario((), 1, 20).false_alarms
 
 
 def test_a_change_that_the_chain_does_not_notice_is_counted(mocker: MockerFixture) -> None:
@@ -56,7 +100,7 @@ def test_only_what_names_a_change_counts_as_noticed(*, other: bool) -> None:
 
 
 def test_some_pairs_of_faults() -> None:
-    pairs = [kinds for kinds in SCENARIOS if len(kinds) == 2][::14]
+    pairs = [kinds for kinds in SCENARIOS if len(kinds) == 2][::20]
     whole, by_kind = campaign([(kinds, k) for k, kinds in enumerate(pairs)], cycles=70)
     assert whole.complaints == []
     assert whole.violations == 0
@@ -68,7 +112,9 @@ def test_some_pairs_of_faults() -> None:
 def test_all_kinds_and_all_pairs_are_in_the_campaign() -> None:
     assert len(SCENARIOS) == 1 + len(KINDS) + len(KINDS) * (len(KINDS) - 1) // 2
     known = str(FaultPlan.model_json_schema())
-    assert all(f"'{kind}'" in known for kind in {*KINDS, "write"} - {*WRITES})
+    several = {*WRITES, *OTHERS, "second master"}
+    assert all(f"'{kind}'" in known for kind in {*KINDS, "write", "reading"} - several)
+    assert all(plan((kind,), 0, 5.0).fault for kind in KINDS)
 
 
 def test_the_same_seed_gives_the_same_campaign() -> None:

@@ -65,7 +65,7 @@ def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
         ("seed = -1", "seed: must be at least 0 (got -1)"),
         ("start_m = [1, 2, 3]", "start_m: must have at most 2 values"),
         ("start_m = [1]", "start_m.1: is required"),
-        ('pose = "G PS"', "pose: holds"),
+        ('pose = ""', "pose: must not be empty"),
         ("track = 3", "track: must be text (got 3)"),
         ("start_m = [1 2]", "not TOML: Unclosed array"),
     ],

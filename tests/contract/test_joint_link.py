@@ -120,8 +120,8 @@ BACKENDS = [
 @pytest.fixture(params=BACKENDS)
 def bus(request: pytest.FixtureRequest) -> Iterator[Bus]:
     if request.param is not None:
-        door, plant = request.param
-        yield from door(plant)
+        make, plant = request.param
+        yield from make(plant)
         return
     device = request.config.getoption("--port")
     if device is None:

@@ -40,9 +40,9 @@ def names_in(path: Path) -> set[str]:
 
 def test_every_package_is_there_in_the_order_of_imports() -> None:
     rows = re.findall(r"^\| `([\w/]+)` \| ", PAGE, re.MULTILINE)
-    rooms = [room.replace(".", "/") for rooms in ORDER.values() for room in rooms]
-    tops = [top for top in ORDER if top not in rooms]
-    assert [room for room in rows if room not in tops] == rooms
+    packages = [each.replace(".", "/") for inner in ORDER.values() for each in inner]
+    tops = [top for top in ORDER if top not in packages]
+    assert [each for each in rows if each not in tops] == packages
 
 
 @pytest.mark.parametrize("heading", LONGEST)
@@ -67,9 +67,9 @@ def test_no_way_is_left_unchecked() -> None:
 
 
 def test_every_package_says_in_a_sentence_what_it_is() -> None:
-    rooms = {
+    purposes = {
         file.parent.relative_to(ROOT): str(ast.get_docstring(ast.parse(file.read_text())))
         for top in ORDER
         for file in (ROOT / top).rglob("__init__.py")
     }
-    assert {room for room, says in rooms.items() if len(says.split()) < 5} == set()
+    assert {each for each, says in purposes.items() if len(says.split()) < 5} == set()

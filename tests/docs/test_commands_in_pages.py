@@ -1,5 +1,6 @@
-"""Every command that the pages print is one: its command, options and values are taken."""
+"""Every command that pages, helps and messages name exists; its options and values are accepted."""
 
+import ast
 import re
 import shlex
 from contextlib import suppress
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 import typer
 from typer.core import TyperGroup
+from typer.testing import CliRunner
 
 from snakewalk.controller.cli.command_line import app
 
@@ -18,21 +20,33 @@ COMMAND = re.compile(r"^ *(?:\$ )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE)
 
 
 def printed(page: Path) -> list[str]:
-    """Command lines in a page's blocks of code, without comments and prompts."""
+    """Command lines in a page's blocks of code, without those of a command that the page adds."""
     text = page.read_text(encoding="utf-8")
+    added = [f"snakewalk {words}" for words in re.findall(r'^@command\("([a-z ]+)"', text, re.M)]
     fenced = re.findall(r"^```\w*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     indented = re.findall(r"(?:^    .*\n)+", text, re.MULTILINE)
     return [
         line.replace("\\\n", " ")
         for block in [*fenced, *indented]
         for line in COMMAND.findall(block)
-        if " [-" not in line  # which options there are, not a command
+        if not line.startswith(tuple(added))
+        and " [-" not in line  # which options there are, not a command
     ]
 
 
 LINES = sorted({(page.name, line) for page in PAGES for line in printed(page)})
 PROGRAM = typer.main.get_command(app)
 UsageError: Any = typer.BadParameter.__base__
+CONTEXT = PROGRAM.make_context("snakewalk", [], resilient_parsing=True)
+FAMILIES = [
+    name
+    for name in PROGRAM.list_commands(CONTEXT)  # type: ignore[attr-defined]
+    if isinstance(PROGRAM.get_command(CONTEXT, name), TyperGroup)  # type: ignore[attr-defined]
+]
+
+
+def shown(*words: str) -> str:
+    return CliRunner().invoke(app, [*words], env={"COLUMNS": "300"}).output
 
 
 def take(line: str) -> None:
@@ -65,6 +79,67 @@ def test_every_printed_command_is_one(tmp_path: Path, monkeypatch: pytest.Monkey
         except UsageError as error:
             wrong.append(f"{page}: {line}: {error.format_message()}")
     assert wrong == []
+
+
+def named(text: str) -> set[str]:
+    """Return the commands that running text names, of one or two words."""
+    found = re.findall(r"(?<!import )\bsnakewalk ([a-z][a-z-]*(?: [a-z][a-z-]*)?)", text)
+    for quoted in re.findall(r"`([^`\n]+)`", text):
+        words = quoted.removeprefix("snakewalk ").split()
+        if words and words[0] in FAMILIES and len(words) > 1 and re.fullmatch("[a-z]+", words[1]):
+            found.append(" ".join(words[:2]))
+    return set(found)
+
+
+def exists(words: str) -> bool:
+    first, *rest = words.split()
+    command = PROGRAM.get_command(CONTEXT, first)  # type: ignore[attr-defined]
+    if isinstance(command, TyperGroup) and rest:
+        return rest[0] in command.list_commands(CONTEXT)  # type: ignore[arg-type]
+    return command is not None
+
+
+def inline(page: Path) -> str:
+    """Return the code within the lines of a page."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    return "\n".join(f"`{each}`" for each in re.findall(r"`([^`\n]+)`", text))
+
+
+def test_every_command_that_a_page_names_exists() -> None:
+    names = {(page.name, words) for page in PAGES for words in named(inline(page))}
+    assert len(names) > 100
+    assert [each for each in sorted(names) if not exists(each[1])] == []
+
+
+def test_every_command_that_a_help_or_a_message_names_exists() -> None:
+    names = {
+        (file.name, words)
+        for file in (ROOT / "controller").rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        for words in named(node.value)
+    }
+    assert len(names) > 100
+    assert [each for each in sorted(names) if not exists(each[1])] == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_help_of_a_family_names_its_commands(family: str) -> None:
+    group = PROGRAM.get_command(CONTEXT, family)  # type: ignore[attr-defined]
+    listed = group.help.partition(": ")[2].removesuffix(".").split(", ")
+    assert listed == group.list_commands(CONTEXT)
+    assert group.help in " ".join(shown("--help").split())
+
+
+def test_a_command_that_does_not_exist_is_found() -> None:
+    assert named("see `policy compare` and snakewalk camera lens") == {
+        "policy compare",
+        "camera lens",
+    }
+    assert not exists("policy compare")
+    assert not exists("nosuch")
+    assert exists("policy run")
+    assert exists("run flat-square")
 
 
 def test_the_pages_print_many_commands_and_a_wrong_one_is_found() -> None:

@@ -1,12 +1,13 @@
 """Runs commands as the base install would: no extra's module can be found.
 
 Standard input is a JSON list of commands (lists of words), standard output a JSON list of
-(exit code, standard output, standard error). The serial port of a command is a line of 16 simulated
-servos with independent shafts, in simulated time.
+(exit code, standard output, standard error). The serial port ``./tty`` of a command is a line of 16
+simulated servos with independent shafts, in simulated time.
 """
 
 import io
 import json
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -96,5 +97,6 @@ def call(words: Sequence[str]) -> tuple[int, str, str]:
 if __name__ == "__main__":
     hide_extras()
     simulate_port()
+    os.symlink(os.ttyname(os.openpty()[1]), "tty")  # a device that exists
     results = [call(words) for words in json.load(sys.stdin)]
     json.dump(results, sys.stdout)

@@ -34,6 +34,9 @@ TARGETS = {
     ),
     "snakewalk.drivers.safety.following_error": ("test_following_error.py",),
     "snakewalk.drivers.safety.measured_step": ("test_measured_step.py",),
+    "snakewalk.drivers.chain.goal_check": ("test_goal_check_edges.py",),
+    "snakewalk.drivers.chain.fingerprint": ("test_fingerprint.py",),
+    "snakewalk.drivers.chain.temperature_sensors": ("test_temperature_sensors.py",),
     "snakewalk.drivers.protocol.parser": (
         *("test_reader_edges.py", "test_packet_reader.py", "test_packets.py"),
         "test_crc_and_stuffing.py",

@@ -20,7 +20,7 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("config", "drivers", "sim", "controller")
+FOLDERS = ("config", "drivers", "sim", "controller")
 BUILD = "import sys; from setuptools import build_meta as b; b.build_{kind}(sys.argv[1])"
 
 USERS_TEST = """
@@ -129,7 +129,7 @@ def build(kind: str, source: Path, folder: Path) -> Path:
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Copy of what is shipped, links as links, so that nothing is built in this clone."""
     copy = tmp_path_factory.mktemp("source")
-    for folder in (*ROOMS, "snakewalk"):
+    for folder in (*FOLDERS, "snakewalk"):
         rubbish = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / folder, copy / folder, symlinks=True, ignore=rubbish)
     for file in ("pyproject.toml", "README.md", "LICENSE"):
@@ -156,7 +156,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
     subprocess.run([*pip, *quiet, "--prefix", str(home), str(wheel)], check=True, timeout=120)
 
     project = tmp_path_factory.mktemp("project")
-    for name in ROOMS:
+    for name in FOLDERS:
         (project / name).mkdir()
         (project / name / "__init__.py").write_text('OWNER = "user"\n')
     (project / "test_user.py").write_text(USERS_TEST)
@@ -166,9 +166,9 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 def shipped(source: Path) -> set[str]:
     """Every file that a wheel has to hold, as it is named in it."""
     kinds = {".css", ".html", ".js", ".py", ".toml", ".typed"}
-    rooms = [file for room in ROOMS for file in (source / room).rglob("*")]
+    found = [file for name in FOLDERS for file in (source / name).rglob("*")]
     own = [file for file in (source / "snakewalk").iterdir() if not file.is_symlink()]
-    files = {file.relative_to(source) for file in rooms if file.suffix in kinds}
+    files = {file.relative_to(source) for file in found if file.suffix in kinds}
     return {f"snakewalk/{file}" for file in files} | {f"snakewalk/{file.name}" for file in own}
 
 

@@ -16,7 +16,6 @@ from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
-    refuse_to_overwrite,
 )
 
 Rate = Annotated[float | None, typer.Option(help="frames a second, instead of what the file says")]
@@ -28,6 +27,7 @@ Rate = Annotated[float | None, typer.Option(help="frames a second, instead of wh
         "fish match top.mp4 --side side.mp4 -o postures.npz",
         "fish match tank/top --background tank/top-background.png --picture match.png",
     ),
+    results=("output", "picture"),
 )
 def match(
     footage: Annotated[
@@ -54,7 +54,6 @@ def match(
     as_json: Json = False,
 ) -> None:
     """Lay a deformable fish over every frame: head, spine angles, and from the side its pitch."""
-    refuse_to_overwrite([output, picture], force)
     check_picture(picture)
     check_npz(output)
     if length is not None and not 0.0 < length < 1e3:

@@ -16,7 +16,6 @@ from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
-    refuse_to_overwrite,
 )
 
 
@@ -26,6 +25,7 @@ from snakewalk.controller.console.result_files import (
         "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
         "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
     ),
+    results=("output", "picture"),
 )
 def synthesise(
     postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
@@ -63,7 +63,6 @@ def synthesise(
     as_json: Json = False,
 ) -> None:
     """Put segments of a film together anew, at random or through control points."""
-    refuse_to_overwrite([output, picture], force)
     check_picture(picture)
     options = SynthesisOptions(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,

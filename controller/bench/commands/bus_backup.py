@@ -10,11 +10,13 @@ from snakewalk.controller.bench.eeprom_backup import back_up_all, backup_text
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import ChainPort, Force, Json, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 
 
 @command(
-    "bus backup", examples=("bus backup -o servos.json", "bus backup --baud 57600 -o one.json")
+    "bus backup",
+    examples=("bus backup -o servos.json", "bus backup --baud 57600 -o one.json"),
+    results=("out",),
 )
 def backup(
     out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
@@ -24,7 +26,6 @@ def backup(
     as_json: Json = False,
 ) -> None:
     """Write the EEPROM of all servos on the bus into a file; changes nothing."""
-    refuse_to_overwrite([out], force)
     with open_lines(port, baud) as lines:
         found = back_up_all(lines, lambda step: typer.echo(step, err=True))
     with atomic_write(out) as part:

@@ -13,10 +13,14 @@ from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import ChainPort, Force, Json, console
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 
 
-@command("bus identify", examples=("bus identify", "bus identify --baud 1000000 -o mine.toml"))
+@command(
+    "bus identify",
+    examples=("bus identify", "bus identify --baud 1000000 -o mine.toml"),
+    results=("out",),
+)
 def bus_identify(
     port: ChainPort = None,
     baud: Annotated[
@@ -31,7 +35,6 @@ def bus_identify(
     """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
-    refuse_to_overwrite([out], force)
     scan.check_bauds(baud or ())
     with open_lines(port, baud[0] if baud else 1_000_000) as lines:
         entries = [

@@ -1,9 +1,10 @@
-"""``snakewalk calibrate``: find out which servo is which joint, and write the robot's file."""
+"""``snakewalk calibrate``: find the joint of each servo, and write the robot's file."""
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,8 +13,8 @@ from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml
-from snakewalk.controller.bench import chain_calibration
-from snakewalk.controller.bench.chain_calibration import SeenBend
+from snakewalk.controller.bench.calibration import chain_calibration
+from snakewalk.controller.bench.calibration.progress import ProgressFile, SeenBend
 from snakewalk.controller.bench.eeprom_backup import back_up, backup_text
 from snakewalk.controller.bench.fingerprints import read_fingerprints, write_fingerprints
 from snakewalk.controller.bench.homing_offset import homing_written, plan_homing, without_zeros
@@ -27,10 +28,7 @@ from snakewalk.drivers.port.network_port import open_port
 from snakewalk.drivers.safety.stop_button import StopButton
 
 if TYPE_CHECKING:
-    from snakewalk.config.robot import RobotConfig
-    from snakewalk.controller.bench.chain_calibration import SeenBend
     from snakewalk.controller.bench.homing_offset import HomingOffset
-
 
 Sweep = Annotated[
     bool, typer.Option("--sweep/--no-sweep", help="look for the ends of each joint's range")
@@ -62,34 +60,41 @@ def calibrate(
     yes: Annotated[
         bool, typer.Option("--yes", "-y", help="with --homing-offset: write without asking")
     ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="continue an interrupted calibration from OUT.part"),
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Wiggle one servo at a time, weakly, ask which joint moved, and write the robot's file.
 
     Hang the robot up, or hold it: joints should carry no weight. Then lay it straight when asked.
+    Each answer is saved at once in OUT.part; --resume continues from there.
     """
-    if out.suffix != ".toml":
-        raise InputError(f"{out}: a robot's file ends in .toml")
-    if not 0.0 < current <= 2.0:
-        raise InputError(f"--current {current:g}: over 0 and at most 2 A")
-    if homing_offset and not yes and not sys.stdin.isatty():
-        raise InputError("--homing-offset: asks before it writes, and nobody is there: say --yes")
-    if yes and not homing_offset:
-        raise InputError("--yes: goes with --homing-offset; the robot's file is always written")
+    _check_options(out, current, homing_offset=homing_offset, yes=yes)
     backup = out.with_name(f"{out.stem}-eeprom.json") if homing_offset else None
-    refuse_to_overwrite([out, backup], force)
+    # the backup of the first start has the registers as they were
+    keeps_backup = resume and backup is not None and backup.exists()
+    refuse_to_overwrite([out, None if keeps_backup else backup], force)
     like = load_robot(robot)
     if like.limbs:
         raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
+    answers = ProgressFile(out)
+    journal = answers.start(like, resume=resume, force=force)
     device = pick_port(port)
+    if resume:
+        typer.echo(f"{answers.path}: {journal.known.summary}", err=True)
     heading = f"Found by snakewalk calibrate, like {like.name}."
     facts: dict[str, object] = {"robot": str(out)}
     with (
         open_port(device, baud or like.servo.baud) as line,
         StopButton(out.stem, device) as button,
+        _saved(answers),
     ):
-        if backup is not None:  # before anything is written: what a chain needs is EEPROM, too
+        if (
+            backup is not None and not keeps_backup
+        ):  # before anything is written: a start writes EEPROM, too
             chain_calibration.find_servos(line, line.latency_s)
             _write(backup, backup_text(back_up(line, line.latency_s)))
         found = chain_calibration.calibrate(
@@ -102,31 +107,71 @@ def calibrate(
             sweep=sweep,
             stop_requested=button.pressed,
             on_progress=lambda step: typer.echo(step, err=True),
+            journal=journal,
         )
-        described = found.robot
-        if baud is not None:
-            servo = described.servo.model_copy(update={"baud": baud})
-            described = described.model_copy(update={"servo": servo})
+        described = found.robot if baud is None else _at_baud(found.robot, baud)
         _write(out, robot_toml(described, heading))
         if backup is not None:
             bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
-            offsets = plan_homing(bus, described)
-            written = yes or _confirmed(offsets, backup)
-            if written:
-                described = without_zeros(described)
-                there = "The zeros are in the servos, in Homing Offset(20)."
-                with homing_written(bus, offsets):
-                    _write(out, robot_toml(described, f"{heading}\n{there}"))
-            after = {str(each.servo_id): each.after for each in offsets}
-            facts |= {"backup": str(backup), "homing_offsets": after, "homing_written": written}
+            described, homing = _with_homing(bus, described, out, heading, backup, yes)
+            facts |= homing
         bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
         fingerprints = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
         facts["fingerprints"] = str(fingerprints)
+    answers.remove()
     _show(described, found.notes, facts, as_json)
 
 
-def _write(out: Path, text: str) -> None:
+def _check_options(out: Path, current: float, *, homing_offset: bool, yes: bool) -> None:
+    if out.suffix != ".toml":
+        raise InputError(f"{out}: a robot's file ends in .toml")
+    if not 0.0 < current <= 2.0:
+        raise InputError(f"--current {current:g}: over 0 and at most 2 A")
+    if homing_offset and not yes and not sys.stdin.isatty():
+        raise InputError("--homing-offset: asks before it writes, and nobody is there: say --yes")
+    if yes and not homing_offset:
+        raise InputError("--yes: goes with --homing-offset; the robot's file is always written")
 
+
+def _at_baud(robot: RobotConfig, baud: int) -> RobotConfig:
+    return robot.model_copy(update={"servo": robot.servo.model_copy(update={"baud": baud})})
+
+
+def _with_homing(
+    bus: DynamixelBus, described: RobotConfig, out: Path, heading: str, backup: Path, yes: bool
+) -> tuple[RobotConfig, dict[str, object]]:
+    """Write the zeros into the servos, after a question; returns the robot, and facts to show."""
+    offsets = plan_homing(bus, described)
+    written = yes or _confirmed(offsets, backup)
+    if written:
+        described = without_zeros(described)
+        there = "The zeros are in the servos, in Homing Offset(20)."
+        with homing_written(bus, offsets):
+            _write(out, robot_toml(described, f"{heading}\n{there}"))
+    after = {str(each.servo_id): each.after for each in offsets}
+    return described, {
+        "backup": str(backup),
+        "homing_offsets": after,
+        "homing_written": written,
+    }
+
+
+@contextmanager
+def _saved(answers: ProgressFile) -> Iterator[None]:
+    """Report after an interruption where the answers are, and how to continue."""
+    try:
+        yield
+    except BaseException:
+        if answers.path.exists():
+            typer.echo(
+                f"{answers.path}: holds the answers so far; continue with the same command and "
+                "--resume",
+                err=True,
+            )
+        raise
+
+
+def _write(out: Path, text: str) -> None:
     with atomic_write(out) as part:
         part.write_text(text, encoding="utf-8")
 
@@ -147,41 +192,75 @@ class _Person:
 
     def which(
         self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
-    ) -> "SeenBend":
-        """Wiggle until the answers make sense."""
+    ) -> SeenBend:
+        """Wiggle until the answers make sense; each repeated question has its reason."""
         while True:
             wiggle()
-            answer = _ask(f"ID {servo_id}: which joint moved? 1 is next to the head, a = again: ")
-            if not answer.isdigit() or not 1 <= int(answer) <= len(self._axes):
-                continue
-            joint = int(answer) - 1
-            if joint in known:
-                label = joint_label(self._names[joint], known[joint])
-                typer.echo(f"{label}: its servo is known already", err=True)
-                continue
-            yaw = self._axes[joint] == "y"
-            asked = "to the left or right (l, r)" if yaw else "up or down (u, d)"
-            label = joint_label(self._names[joint], servo_id)
-            side = _ask(f"{label}: the head side went first {asked}, a = again: ").lower()
-            if side[:1] in ("l", "r") if yaw else side[:1] in ("u", "d"):
-                return SeenBend(joint, 1 if side[0] in "lu" else -1)
+            joint = self._joint(servo_id, known)
+            direction = None if joint is None else self._direction(joint, servo_id)
+            if joint is not None and direction is not None:
+                return SeenBend(joint=joint, direction=direction)
 
     def straighten(self) -> None:
         """Wait until the body is straight."""
         _ask("torque is off: lay the body straight and level, then press Enter: ")
 
+    def _joint(self, servo_id: int, known: Mapping[int, int]) -> int | None:
+        """Ask for the joint; None: the servo has to move again."""
+        count = len(self._axes)
+        while True:
+            answer = _ask(f"ID {servo_id}: which joint moved? 1 is next to the head, a = again: ")
+            if answer.lower() == "a":
+                return None
+            if not answer.isdecimal() or not 1 <= int(answer) <= count:
+                typer.echo(
+                    f"'{answer}': not a joint; type a number from 1 to {count}, or a to see ID "
+                    f"{servo_id} move again",
+                    err=True,
+                )
+                continue
+            joint = int(answer) - 1
+            if joint not in known:
+                return joint
+            label = joint_label(self._names[joint], known[joint])
+            free = ", ".join(str(each + 1) for each in range(count) if each not in known)
+            typer.echo(
+                f"{answer} is {label}, assigned by an earlier answer; ID {servo_id} moves again, "
+                f"one of the joints {free}. If the earlier answer was wrong, press Ctrl-C and "
+                "start again with --force",
+                err=True,
+            )
+            return None
+
+    def _direction(self, joint: int, servo_id: int) -> Literal[1, -1] | None:
+        """Ask for the side; None: the servo has to move again."""
+        letters, asked = ("lr", "to the left or right (l, r)")
+        if self._axes[joint] != "y":
+            letters, asked = ("ud", "up or down (u, d)")
+        label = f"{joint + 1} is {joint_label(self._names[joint], servo_id)}"
+        while True:
+            side = _ask(f"{label}: the head side went first {asked}, a = again: ").lower()
+            if side[:1] == "a":
+                return None
+            if side and side[0] in letters:
+                return 1 if side[0] == letters[0] else -1
+            typer.echo(
+                f"'{side}': not a direction of this joint; type {letters[0]} or {letters[1]}, or "
+                f"a to see ID {servo_id} move again",
+                err=True,
+            )
+
 
 def _ask(question: str) -> str:
-
     typer.echo(question, nl=False, err=True)
     try:
         return input().strip()
     except EOFError:
-        raise InputError("calibrate asks what has moved: answers came to an end") from None
+        raise InputError("calibrate: the input ended before the last question") from None
 
 
 def _show(
-    robot: "RobotConfig", notes: "Sequence[str]", facts: dict[str, object], as_json: bool
+    robot: RobotConfig, notes: Sequence[str], facts: dict[str, object], as_json: bool
 ) -> None:
     if not as_json:
         rows = zip(robot.signs, robot.zeros_rad, robot.limit_rad, strict=True)

@@ -17,10 +17,13 @@ from snakewalk.controller.bench.fingerprints import (
     fingerprint_finding,
     read_all,
 )
-from snakewalk.controller.bench.port_lines import open_lines
+from snakewalk.controller.bench.port_lines import PortLines, open_lines
 from snakewalk.controller.bench.scan import pick_port
+from snakewalk.controller.bench.servo_checks import unnamed_robot
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import BUS, command
+from snakewalk.controller.console.device_kind import check_port_name
+from snakewalk.controller.console.finding import Finding
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot
@@ -37,8 +40,9 @@ def doctor(
     port: Annotated[
         str | None,
         typer.Option(
+            callback=check_port_name,
             help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT, or robot, "
-            "whose file says which; default: the only USB adapter there is"
+            "whose file says which; default: the only USB adapter there is",
         ),
     ] = None,
     robot: Robot = None,
@@ -107,12 +111,19 @@ def doctor(
                     on_it=ids,
                     on_progress=lambda step: status.update(f"{device}: {step}"),
                 )
-            path = own_file(robot_file)
-            if path is not None:
-                found = read_all(lines, described)
-                finding = fingerprint_finding(FingerprintFile(path), described, found)
-                findings += [] if finding is None else [finding]
+            findings += _fingerprints(robot_file, described, lines)
+    if robot is None and run == DEFAULT_RUN:
+        unnamed = unnamed_robot(findings, described)
+        findings += [] if unnamed is None else [unnamed]
     show_findings(findings, {"port": device, "robot": described.name}, as_json)
+
+
+def _fingerprints(robot_file: str, robot: RobotConfig, lines: PortLines) -> list[Finding]:
+    path = own_file(robot_file)
+    if path is None:
+        return []
+    finding = fingerprint_finding(FingerprintFile(path), robot, read_all(lines, robot))
+    return [] if finding is None else [finding]
 
 
 def _accept(

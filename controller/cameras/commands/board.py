@@ -12,7 +12,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.calibration_board import CalibrationBoard, read_pattern
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 
 Pattern = Annotated[str, typer.Option(help="charuco, which may be seen in part, or chessboard")]
 Squares = Annotated[str, typer.Option(help="across x down, also of a chessboard", metavar="NxM")]
@@ -37,6 +37,7 @@ def read_squares(text: str) -> tuple[int, int]:
 @command(
     "camera board",
     examples=("camera board -o board.pdf", "camera board -o a3.pdf --squares 9x6 --square 42"),
+    results=("out",),
 )
 def board(
     out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
@@ -49,7 +50,6 @@ def board(
     """Draw the board for `camera calibrate`; print it without scaling, and glue it on a plate."""
     made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
     check_print(out)
-    refuse_to_overwrite([out], force)
     write_print(out, [made.picture(DOTS)])
     width, height = (round(1000.0 * side, 1) for side in made.size_m)
     show({"board": str(out), "width_mm": width, "height_mm": height, "square_mm": square}, as_json)

@@ -25,7 +25,7 @@ from snakewalk.controller.cameras.device_camera import open_device
 from snakewalk.controller.cameras.lens_calibration import calibrate_lens
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.images.video import open_footage
 from snakewalk.drivers.clock import WallClock
 
@@ -40,6 +40,7 @@ _PAUSE_S = 0.7
         "camera calibrate pictures -o lens.yml",
         "camera calibrate 0 -o lens.yml --size 1280x720",
     ),
+    results=("out",),
 )
 def calibrate_camera(
     source: Annotated[str, typer.Argument(help="folder of pictures, a film, or a device's number")],
@@ -59,7 +60,6 @@ def calibrate_camera(
     if out.suffix.lower() not in _ENDINGS:
         raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
     board = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
-    refuse_to_overwrite([out], force)
     if source.isdigit():
         seen, size_px = _from_device(source, size, board, views)
     else:

@@ -10,12 +10,12 @@ from snakewalk.controller.cameras.commands.board import DOTS, check_print, write
 from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
-from snakewalk.controller.console.result_files import refuse_to_overwrite
 
 
 @command(
     "camera markers",
     examples=("camera markers -o markers.pdf", "camera markers -o a3.pdf --side 250 --count 4"),
+    results=("out",),
 )
 def markers(
     out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
@@ -37,7 +37,6 @@ def markers(
         raise InputError(f"--first {first} --count {count}: numbers end at {COUNT - 1}")
     if not 10.0 <= side <= 1000.0:
         raise InputError(f"--side {side:g}: must be 10 to 1000 mm")
-    refuse_to_overwrite([out], force)
     pages = [marker_sheet(number, 1e-3 * side, DOTS) for number in range(first, first + count)]
     write_print(out, pages)
     high, wide = (round(one / DOTS * 25.4 + 20.0, 1) for one in pages[0].shape)

@@ -30,7 +30,6 @@ from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
-    refuse_to_overwrite,
 )
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.generated import EMBEDDED
@@ -42,6 +41,7 @@ from snakewalk.controller.track.readers.load import check_rate
     "track",
     group=RECORDINGS,
     examples=("track", "track MIDLINES.csv --rate 60 --picture track.png"),
+    results=("picture", "output"),
 )
 def track(
     recordings: Annotated[
@@ -71,7 +71,6 @@ def track(
 ) -> None:
     """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
     check_picture(picture)
-    refuse_to_overwrite([picture, output], force)
 
     names = recordings or list(EMBEDDED)
     if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):

@@ -10,11 +10,15 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, RobotName, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 
 
-@command("robot export", examples=("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",))
+@command(
+    "robot export",
+    examples=("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",),
+    results=("urdf", "mjcf"),
+)
 def export_robot(
     name: RobotName,
     urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,
@@ -37,7 +41,6 @@ def export_robot(
         raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
     if ros2_control is not None and urdf is None:
         raise InputError(f"--ros2-control {ros2_control}: is a part of a URDF: give --urdf FILE")
-    refuse_to_overwrite([urdf, mjcf], force)
     robot = load_robot(name)
     texts = {}
     if urdf is not None:

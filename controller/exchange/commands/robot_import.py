@@ -9,7 +9,7 @@ from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Assume, Force, Json, console, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.exchange.robot_import import robot_import
 
 
@@ -19,6 +19,7 @@ from snakewalk.controller.exchange.robot_import import robot_import
         "robot import snake.urdf -o snake.toml",
         "robot import swimmer.xml -o swimmer.toml --scale 0.1 --servo XL330-M288",
     ),
+    results=("out",),
 )
 def import_robot(
     file: Annotated[Path, typer.Argument(help="URDF, xacro or MuJoCo model (.xml)")],
@@ -37,7 +38,6 @@ def import_robot(
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:
         raise InputError(f"--scale {scale:g}: 0.001 to 1000")
-    refuse_to_overwrite([out], force)
     made = robot_import.import_robot(
         file,
         out.stem,

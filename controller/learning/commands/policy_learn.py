@@ -1,21 +1,28 @@
 """``snakewalk policy learn``: a wave with its feedback, learnt by CMA-ES."""
 
 from pathlib import Path
+from statistics import fmean
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
-from snakewalk.controller.learning.wave_search import search_wave
+from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.learning.wave_search import (
+    SearchProgress,
+    search_progress,
+    search_wave,
+)
 
 
 @command(
     "policy learn",
     examples=("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+    results=("out",),
 )
 def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
@@ -25,27 +32,81 @@ def learn_policy(
     population: Annotated[
         int, typer.Option(min=4, max=10_000, help="candidates of a generation")
     ] = 12,
-    steps: Annotated[int, typer.Option(min=50, max=100_000, help="of 20 ms, in an episode")] = 250,
+    steps: Annotated[
+        int, typer.Option(min=50, max=100_000, help="steps of 20 ms in one episode")
+    ] = 250,
     seed: Annotated[int, typer.Option(min=0, help="of candidates and starts")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="continue an interrupted search from OUT.part")
+    ] = False,
     force: Force = False,
 ) -> None:
-    """Learn a wave with its feedback by CMA-ES, on episodes of the Gymnasium environment."""
+    """Learn a wave with its feedback by CMA-ES, on episodes of the Gymnasium environment.
+
+    Each generation is saved at once in OUT.part. --resume continues from there, with the same
+    result as without the interruption.
+    """
     if out.suffix != ".toml":
         raise InputError(f"{out}: a policy's file ends in .toml")
-    refuse_to_overwrite([out], force)
-    with ProgressBar(f"{robot} on {world}", generations) as bar:
-        policy = search_wave(
-            out.stem,
-            robot=robot,
-            world=world,
-            generations=generations,
-            population=population,
-            steps=steps,
-            seed=seed,
-            workers=workers,
-            on_progress=lambda done, mean_m: bar.update(done, note=f"{mean_m:.2f} m an episode"),
+    part_file = out.with_name(f"{out.name}.part")
+    progress = search_progress(
+        robot=robot, world=world, population=population, steps=steps, seed=seed
+    )
+    if resume:
+        progress = _resumed(part_file, progress)
+    elif part_file.exists() and not force:
+        raise InputError(
+            f"{part_file}: holds an interrupted search; continue it with --resume, or start again "
+            "with --force"
         )
+
+    def save(progress: SearchProgress) -> None:
+        with atomic_write(part_file) as part:
+            part.write_text(progress.model_dump_json(indent=1), encoding="utf-8")
+        note = f"{fmean(progress.rewards_m[-1]):.2f} m an episode"
+        bar.update(len(progress.rewards_m), note=note)
+
+    with ProgressBar(f"{robot} on {world}", generations) as bar:
+        bar.update(len(progress.rewards_m))
+        try:
+            policy = search_wave(
+                out.stem, progress, generations=generations, workers=workers, on_progress=save
+            )
+        except KeyboardInterrupt as stop:
+            if part_file.exists():
+                stop.add_note(f"{part_file}: holds the generations so far; continue by --resume")
+            raise
     with atomic_write(out) as part:
         part.write_text(policy.toml(), encoding="utf-8")
-    console.print(f"{out}: {policy.origin.steps} steps; snakewalk policy run {out}")
+    part_file.unlink(missing_ok=True)
+    console.print(f"{out}: {policy.origin.steps} steps in all; snakewalk policy run {out}")
+
+
+def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
+    """Progress in a file.
+
+    Raises:
+        InputError: the file is missing or broken, or of a search with other arguments.
+
+    """
+    try:
+        found = SearchProgress.model_validate_json(file.read_bytes())
+    except FileNotFoundError:
+        raise InputError(
+            f"{file}: no such file, so there is nothing to continue; leave --resume out"
+        ) from None
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        place = ".".join(map(str, fault["loc"]))
+        raise InputError(f"{file}: {place}: {fault['msg']}; start again with --force") from None
+    before, now = found.model_dump(), asked.model_dump()
+    other = [
+        f"{file}: its search has {key} {before[key]}, asked for {now[key]}; give the same, or "
+        "start again with --force"
+        for key in before
+        if key != "rewards_m" and before[key] != now[key]
+    ]
+    if other:
+        raise InputError(other)
+    return found

@@ -1,6 +1,5 @@
 """``snakewalk policy run``: a learnt policy on servos or in the simulator."""
 
-from contextlib import ExitStack
 from typing import Annotated
 
 import typer
@@ -8,27 +7,17 @@ import typer
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Film,
-    Force,
-    Json,
     Robot,
-    Ros,
-    RunFolder,
-    RunPort,
     Set,
     Shadow,
-    View,
-    ViewAt,
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.console.progress import TimeBar
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.factory import prepare_policy
 from snakewalk.controller.run.finish import show_run, summarized
-from snakewalk.controller.run.watchers import watched
 
 Name = Annotated[
     str,
@@ -52,34 +41,19 @@ def run_policy(
     seconds: Annotated[
         float, typer.Option(min=1.0, max=3600.0, help="then it comes to rest")
     ] = 20.0,
-    port: RunPort = None,
-    shadow: Shadow = False,
-    view: View = False,
-    view_at: ViewAt = VIEW_AT,
-    ros: Ros = False,
-    film: Film = True,
-    out: RunFolder = None,
-    force: Force = False,
     seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
-    as_json: Json = False,
+    shadow: Shadow = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)
     run_name = prepared.run.name
-    with ExitStack() as stack:
-        folder = stack.enter_context(run_folder(f"policy-{run_name}-{prepared.robot.name}", out))
-        watchers = stack.enter_context(watched(view, view_at, ros))
-        bar = stack.enter_context(TimeBar(run_name, seconds))
-        finished = execute(
-            prepared,
-            folder,
-            port,
-            force=force,
-            view=watchers,
-            shadow=shadow,
-            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
-            on_event=bar.on_event,
+    results = f"policy-{run_name}-{prepared.robot.name}"
+    with watched_by(options) as watchers:
+        finished, folder = carry_out(
+            prepared, results, TimeBar(run_name, seconds), options, watchers, shadow=shadow
         )
     result: dict[str, object] = {
         "policy": name,
@@ -94,4 +68,4 @@ def run_policy(
         "electrical_energy_j": finished.summary.electrical_energy_j,
         "peak_current_a": finished.summary.peak_current_a,
     }
-    show_run(finished, folder, result, as_json, film=film)
+    show_run(finished, folder, result, options.as_json, film=options.film)

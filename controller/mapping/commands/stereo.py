@@ -80,14 +80,7 @@ def stereo(
     (0, 0) of the world is below the left camera, x is where it looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
-    from snakewalk.controller.mapping.stereo_camera import (  # noqa: PLC0415  an extra
-        read_calibration,
-        rectify,
-    )
-    from snakewalk.controller.mapping.stereo_ground import (  # noqa: PLC0415  an extra
-        CameraStand,
-        stereo_ground,
-    )
+    from snakewalk.controller.mapping import stereo_camera, stereo_ground  # noqa: PLC0415  an extra
 
     faults = not_positive(
         {"--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale}
@@ -99,11 +92,12 @@ def stereo(
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
-    pair = rectify(read_calibration(calibration, _UNITS_M[unit]), _picture(left), _picture(right))
+    calibrated = stereo_camera.read_calibration(calibration, _UNITS_M[unit])
+    pair = stereo_camera.rectify(calibrated, _picture(left), _picture(right))
     stand = None
     if height is not None and tilt is not None:
-        stand = CameraStand(height, math.radians(tilt), math.radians(roll))
-    made = stereo_ground(
+        stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))
+    made = stereo_ground.stereo_ground(
         pair, disparities, spacing / scale, error, stand, math.inf if far is None else far
     )
     seen = made.elevation

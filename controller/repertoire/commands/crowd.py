@@ -12,13 +12,15 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.repertoire.crowd_film import FPS, CrowdScene, film_crowd
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 
 
 @command(
-    "repertoire crowd", examples=("repertoire crowd", "repertoire crowd --bodies 300 -o herd.mp4")
+    "repertoire crowd",
+    examples=("repertoire crowd", "repertoire crowd --bodies 300 -o herd.mp4"),
+    results=("out",),
 )
 def crowd(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
@@ -39,7 +41,6 @@ def crowd(
     require_extra("films need", "av")
     if out.suffix != ".mp4":
         raise InputError(f"{out}: a film ends in .mp4")
-    refuse_to_overwrite([out], force)
     repertoire = load_repertoire(file)
     robot, place = load_robot(repertoire.robot), load_world(world)
     ground = build_ground(place)

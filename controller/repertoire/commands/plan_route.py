@@ -7,7 +7,8 @@ from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.options import show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
-from snakewalk.controller.repertoire.commands.repertoire_run import carry_out
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.repertoire.commands.repertoire_run import run_route
 from snakewalk.controller.repertoire.repertoire_planning import (
     plan_facts,
     plan_route,
@@ -47,7 +48,7 @@ def plan_with_repertoire(
         found["plan"] = str(out)
     complete = True
     if carry:
-        found["ran"], complete = carry_out(job, None, None, False, None, force)
+        found["ran"], complete = run_route(job, None, RunOptions(film=False, force=force))
     show(found, as_json)
     if not complete:
         raise SystemExit(1)

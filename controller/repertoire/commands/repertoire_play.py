@@ -11,22 +11,14 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.playback import ScheduleConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Film,
-    Force,
-    Json,
     Robot,
-    Ros,
-    RunFolder,
-    RunPort,
     Set,
-    View,
-    ViewAt,
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite, run_folder
+from snakewalk.controller.console.progress import TimeBar
+from snakewalk.controller.console.result_files import check_picture
+from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.schedule_run import (
@@ -34,9 +26,8 @@ from snakewalk.controller.repertoire.schedule_run import (
     ScheduleMotion,
     read_schedule,
 )
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.finish import show_run
-from snakewalk.controller.run.watchers import watched
 
 Speed = Annotated[
     float | None, typer.Option(help="wanted, m/s; negative: tail first; default: 0.4")
@@ -59,6 +50,7 @@ Patience = Annotated[
         "repertoire play --speed 0.6 --turn 0.3",
         "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
     ),
+    results=("picture",),
 )
 def play_actions(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
@@ -70,21 +62,14 @@ def play_actions(
     robot: Robot = None,
     world: World = None,
     set_: Set = None,
-    port: RunPort = None,
-    view: View = False,
-    view_at: ViewAt = VIEW_AT,
-    ros: Ros = False,
-    film: Film = True,
     picture: Annotated[
         Path | None, typer.Option(help="draw wanted and measured speed and turn")
     ] = None,
-    out: RunFolder = None,
-    force: Force = False,
     seed: Annotated[int, typer.Option(min=0, help="of the changes by --patience")] = 0,
-    as_json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
-    refuse_to_overwrite([picture], force)
     check_picture(picture)
     prepared = prepare_schedule(
         file,
@@ -95,19 +80,10 @@ def play_actions(
         seed=seed,
         keys=key_values("--set", set_),
     )
-    with (
-        run_folder(f"actions-{prepared.run.name}", out) as folder,
-        watched(view, view_at, ros) as watchers,
-        TimeBar(prepared.run.name, prepared.config.duration_s) as bar,
-    ):
-        finished = execute(
-            prepared,
-            folder,
-            port,
-            force=force,
-            view=watchers,
-            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
-            on_event=bar.on_event,
+    bar = TimeBar(prepared.run.name, prepared.config.duration_s)
+    with watched_by(options) as watchers:
+        finished, folder = carry_out(
+            prepared, f"actions-{prepared.run.name}", bar, options, watchers
         )
     assert isinstance(finished.source, ScheduleMotion), "a schedule's run has no other motion"
     played = finished.source.played
@@ -126,7 +102,7 @@ def play_actions(
         if picture is not None:
             plots().draw_schedule(prepared, played, picture)
             result["picture"] = str(picture)
-    show_run(finished, folder, result, as_json, film=film)
+    show_run(finished, folder, result, options.as_json, film=options.film)
 
 
 def _asked(

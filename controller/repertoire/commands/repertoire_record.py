@@ -27,7 +27,9 @@ from snakewalk.controller.repertoire.repertoire_planning import default_file, fl
 
 
 @command(
-    "repertoire record", examples=("repertoire record", "repertoire record -o yaw16.npz --json")
+    "repertoire record",
+    examples=("repertoire record", "repertoire record -o yaw16.npz --json"),
+    results=("out", "picture"),
 )
 def record(
     robot: GivenRobot = "yaw16",
@@ -44,7 +46,6 @@ def record(
 ) -> None:
     """Run forward, left and right actions on the physics and keep a settled cycle of each."""
     check_picture(picture)
-    refuse_to_overwrite([out, picture], force)
     body, ground = load_robot(robot), load_world(world)
     flat(ground)
     file = out or default_file(robot, world)

@@ -7,7 +7,7 @@ import typer
 
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.repertoire.commands.action_table import (
     Picture,
     plots,
@@ -16,7 +16,9 @@ from snakewalk.controller.repertoire.commands.action_table import (
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 
 
-@command("repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",))
+@command(
+    "repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",), results=("picture",)
+)
 def show_file(
     file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
     picture: Picture = None,
@@ -24,7 +26,6 @@ def show_file(
     as_json: Json = False,
 ) -> None:
     """Show the actions of a repertoire: speed, turn and closure error of a cycle."""
-    refuse_to_overwrite([picture], force)
     check_picture(picture)
     repertoire = load_repertoire(file)
     if picture is not None:

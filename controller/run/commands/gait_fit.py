@@ -16,7 +16,6 @@ from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
-    refuse_to_overwrite,
 )
 from snakewalk.controller.gaits.backbone import fit_backbone
 
@@ -26,6 +25,7 @@ COLUMNS = ("x_m", "y_m", "z_m")
 @command(
     "gait fit",
     examples=("gait fit CURVE.csv --picture fit.png", "gait fit CURVE.csv -o joints.npz"),
+    results=("output", "picture"),
 )
 def fit_gait(
     curve: Annotated[
@@ -45,7 +45,6 @@ def fit_gait(
     check_picture(picture)
     if output is not None and output.suffix.lower() != ".npz":
         raise InputError(f"{output}: joint angles go to a file that ends in .npz")
-    refuse_to_overwrite([output, picture], force)
     body = load_robot(robot or "alternating16")
     points_m = _read(curve)
     try:

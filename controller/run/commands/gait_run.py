@@ -8,22 +8,15 @@ import typer
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
-    VIEW_AT,
     Compliant,
-    Film,
-    Force,
-    Json,
     Robot,
-    Ros,
-    RunFolder,
-    RunPort,
     Set,
     Shadow,
-    View,
-    ViewAt,
     World,
 )
+from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.commands.gait_options import Name, Param
+from snakewalk.controller.run.gait_job import GaitJob
 
 Then = Annotated[
     list[str] | None,
@@ -68,24 +61,15 @@ def run_gait(
     look_at: LookAt = None,
     live: Live = False,
     gamepad: OnGamepad = None,
-    port: RunPort = None,
     compliance: Compliant = None,
     shadow: Shadow = False,
-    view: View = False,
-    view_at: ViewAt = VIEW_AT,
-    ros: Ros = False,
-    film: Film = True,
-    out: RunFolder = None,
-    force: Force = False,
     seed: Annotated[int, typer.Option(help="of every random choice")] = 0,
-    as_json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.gait_job import GaitJob  # noqa: PLC0415  --help stays quick
-
     GaitJob(
         name=name, robot=robot, world=world, param=param, keys=set_, then=then, by=by,
         seconds=seconds, look_heading_rad=look_heading_rad, look_at=look_at, live=live,
-        gamepad=gamepad, port=port, compliance=compliance, shadow=shadow, view=view,
-        view_at=view_at, ros=ros, out=out, force=force, seed=seed,
-    ).carry_out(film=film, as_json=as_json)  # fmt: skip
+        gamepad=gamepad, compliance=compliance, shadow=shadow, seed=seed, options=options,
+    ).carry_out()  # fmt: skip

@@ -9,14 +9,18 @@ from rich.table import Table
 
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, console, show
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.run.commands.gait_options import Name, Param, needed_joints, parameters
 from snakewalk.controller.run.factory import prepare_gait
 
 
-@command("gait show", examples=("gait show sidewinding", "gait show rolling --picture rolling.png"))
+@command(
+    "gait show",
+    examples=("gait show sidewinding", "gait show rolling --picture rolling.png"),
+    results=("picture",),
+)
 def show_gait(
     name: Name,
     robot: Robot = None,
@@ -29,7 +33,6 @@ def show_gait(
 ) -> None:
     """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
     check_picture(picture)
-    refuse_to_overwrite([picture], force)
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
     gait, body = prepared.gait, prepared.robot
     cycle = GaitCycle(gait, body)

@@ -27,6 +27,7 @@ from snakewalk.controller.console.plugins import require
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.summary import path_relief, path_warnings
+from snakewalk.drivers.safety.trip_hold import TripHold
 
 
 @command(
@@ -113,6 +114,15 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "joint_torque_n_m": round(float(ahead.joint_torque_n_m.max()), 3),
         "predicted_gain": round(prepared.gain, 3),
     }
+    safety = prepared.run.safety
+    if safety.on_trip == "hold":
+        hold = TripHold.from_config(prepared.robot, safety)
+        assert hold is not None
+        low_a, high_a = float(hold.current_a.min()), float(hold.current_a.max())
+        amps = f"{low_a:.2f} A" if low_a == high_a else f"{low_a:.2f} to {high_a:.2f} A"
+        found["on_trip"] = f"hold for {safety.hold_s:g} s with at most {amps} a joint"
+    if safety.stop_output is not None:
+        found["stop_output"] = safety.stop_output
     if ahead.slide is not None:
         found["steeper_than_held"] = (
             f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "

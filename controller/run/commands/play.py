@@ -8,26 +8,16 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import (
-    VIEW_AT,
-    Film,
-    Force,
-    Json,
     Robot,
-    Ros,
-    RunFolder,
-    RunPort,
     Set,
-    View,
-    ViewAt,
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import run_folder
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.console.progress import TimeBar
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.run.finish import show_run
-from snakewalk.controller.run.watchers import watched
 
 
 @command(
@@ -52,14 +42,8 @@ def play(
         bool, typer.Option("--clip", help="hold joints within their limits where it bends further")
     ] = False,
     set_: Set = None,
-    port: RunPort = None,
-    view: View = False,
-    view_at: ViewAt = VIEW_AT,
-    ros: Ros = False,
-    film: Film = True,
-    out: RunFolder = None,
-    force: Force = False,
-    as_json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
     prepared = prepare_playback(
@@ -71,20 +55,9 @@ def play(
         clip=clip,
         keys=key_values("--set", set_),
     )
-    with (
-        run_folder(f"play-{prepared.run.name}", out) as folder,
-        watched(view, view_at, ros) as watchers,
-        TimeBar(prepared.run.name, prepared.duration_s) as bar,
-    ):
-        finished = execute(
-            prepared,
-            folder,
-            port,
-            force=force,
-            view=watchers,
-            on_progress=in_real_time(bar.on_progress) if watchers and not port else bar.on_progress,
-            on_event=bar.on_event,
-        )
+    bar = TimeBar(prepared.run.name, prepared.duration_s)
+    with watched_by(options) as watchers:
+        finished, folder = carry_out(prepared, f"play-{prepared.run.name}", bar, options, watchers)
     result: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,
@@ -96,7 +69,7 @@ def play(
         "tripped": finished.outcome.tripped,
         "peak_current_a": finished.summary.peak_current_a,
     }
-    show_run(finished, folder, result, as_json, film=film)
+    show_run(finished, folder, result, options.as_json, film=options.film)
 
 
 def _speed(text: str) -> float | None:

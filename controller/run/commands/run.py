@@ -8,27 +8,20 @@ from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
-    VIEW_AT,
     Compliant,
-    Film,
-    Force,
-    Json,
     Look,
     Motion,
     Observe,
     Robot,
-    Ros,
-    RunFolder,
     RunName,
-    RunPort,
     Seed,
     Set,
     Shadow,
     TrackFile,
-    View,
-    ViewAt,
     World,
 )
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.run.job import Job
 
 
 @command(
@@ -38,7 +31,6 @@ from snakewalk.controller.console.options import (
 )
 def run(
     run: RunName = DEFAULT_RUN,
-    port: RunPort = None,
     robot: Robot = None,
     world: World = None,
     track: TrackFile = None,
@@ -62,7 +54,6 @@ def run(
         ),
     ] = None,
     set_: Set = None,
-    out: RunFolder = None,
     compliance: Compliant = None,
     shadow: Shadow = False,
     live: Annotated[
@@ -73,11 +64,7 @@ def run(
             "and waits for more",
         ),
     ] = False,
-    view: View = False,
-    view_at: ViewAt = VIEW_AT,
-    ros: Ros = False,
     observe: Observe = None,
-    film: Film = True,
     look: Look = "servos",
     accept_dead_reckoning: Annotated[
         bool,
@@ -87,19 +74,13 @@ def run(
             rich_help_panel="Evidence",
         ),
     ] = False,
-    force: Force = False,
-    as_json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Run a job on servos or in the simulator; leaves a log, a report and a film."""
-    from snakewalk.controller.run.job import Job  # noqa: PLC0415  --help stays quick
-
     job = Job(
         run=run, robot=robot, world=world, track=track, seed=seed, motion=motion, pose=pose,
-        map_source=map_, keys=set_, compliance=compliance, port=port, out=out, force=force,
-        live=live, view=view, view_at=view_at, ros=ros, observe=observe, shadow=shadow,
+        map_source=map_, keys=set_, compliance=compliance, live=live, observe=observe,
+        shadow=shadow, options=options,
     )  # fmt: skip
-    raise SystemExit(
-        job.carry_out(
-            film=film, look=look, accept_dead_reckoning=accept_dead_reckoning, as_json=as_json
-        )
-    )
+    raise SystemExit(job.carry_out(look=look, accept_dead_reckoning=accept_dead_reckoning))

@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.run_comparison import compared_run, differing, log_names
@@ -30,6 +30,7 @@ _LONGEST = 44
         "compare runs/flat-square-walk-seed0/log.mcap runs/flat-square-walk-seed1/log.mcap",
         "compare runs/*/log.mcap --picture compared.png --json",
     ),
+    results=("picture",),
 )
 def compare(
     logs: Annotated[list[Path], typer.Argument(help="log.mcap of two runs or more")],
@@ -43,7 +44,6 @@ def compare(
     if len(logs) < 2:
         raise InputError(f"{logs[0]}: one log is compared with nothing; give two or more")
     check_picture(picture)
-    refuse_to_overwrite([picture], force)
 
     runs = []
     for log, name in zip(logs, log_names(logs), strict=True):

@@ -16,7 +16,7 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Set, console, key_values
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.sweep_measure import measure
 from snakewalk.controller.studies.sweep_points import plan_sweep
@@ -45,6 +45,8 @@ _HEADS = {
         "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
         "sweep --dask tcp://cluster:8786 --points 500",
     ),
+    results=("picture",),
+    tables=("out",),
 )
 def sweep(
     gaits: Annotated[
@@ -77,8 +79,6 @@ def sweep(
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
     check_picture(picture)
-    refuse_to_overwrite([picture], force)
-    refuse_to_overwrite([out], force=True)  # a table grows
     keys = key_values("--set", set_)
 
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")

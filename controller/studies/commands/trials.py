@@ -25,7 +25,7 @@ from snakewalk.controller.console.options import (
     console,
 )
 from snakewalk.controller.console.progress import show_progress
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.run.factory import moves_by_gait
 from snakewalk.controller.studies import trials as study
 from snakewalk.controller.studies.commands.pictures import pictures
@@ -90,6 +90,8 @@ TrialsOut = Annotated[
     "trials",
     group=JOB,
     examples=("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
+    results=("picture",),
+    tables=("out",),
 )
 def trials(
     runs: Annotated[
@@ -139,8 +141,6 @@ def trials(
     is the same for the same files: after an update of the program begin a new --out.
     """
     check_picture(picture)
-    refuse_to_overwrite([picture], force)
-    refuse_to_overwrite([out], force=True)  # a table grows
     require_extra("trials need", "mujoco")
     overs = [study.parse_over(text) for text in over or ()]
     _check_keys([key for key, _ in overs])

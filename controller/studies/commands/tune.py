@@ -12,7 +12,7 @@ from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import Json, Robot, Set, key_values, show
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.gaits.gait import fitting_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.studies import tune as search
@@ -23,6 +23,7 @@ from snakewalk.controller.studies.sweep_points import robot_file
     "tune",
     group=MOTION,
     examples=("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"),
+    results=("out",),
 )
 def tune(
     gait: Annotated[
@@ -47,7 +48,6 @@ def tune(
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a set of parameters ends in .toml")
-    refuse_to_overwrite([out], force)
     keys = key_values("--set", set_)
 
     require_extra("tuning needs", "mujoco")

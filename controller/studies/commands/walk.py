@@ -10,7 +10,7 @@ from rich.table import Table
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import show_progress
-from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.shape.walks import RULES, check_rule
 from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.graph_study import graph_source, run_study
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     "walk",
     group=MOTION,
     examples=("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json"),
+    results=("picture",),
 )
 def walk(
     graph: Annotated[
@@ -49,7 +50,6 @@ def walk(
 ) -> None:
     """Walk graphs of states until all are seen: how many steps, and how soon states come again."""
     check_picture(picture)
-    refuse_to_overwrite([picture], force)
 
     graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
     for spec in graphs:  # refuse bad input before any work starts

@@ -42,6 +42,7 @@ class Shadow:
         """Pose of its head; a simulated body always has one."""
         self._lay_down = cast(Callable[[InitialPose], None], backend.lay_down)
         self._chain.enable()
+        self._chain.checks_in_read = False  # as in the loop of a run
         self._start_s = self._clock.now_s()
 
     def restart(self, pose: InitialPose) -> None:
@@ -62,4 +63,5 @@ class Shadow:
         if delay_s > 0.0:
             self._clock.sleep_until_s(self._clock.now_s() + delay_s)
         self._chain.write(JointCommand(self._clock.now_s(), sent_rad))
+        self._chain.check_servos()
         return state

@@ -244,7 +244,7 @@ KINDS = [
         "a servo too hot",
         heat(75.0),
         "temperature",
-        "joint pitch_02 (ID 2) is the warmest: 75 C",
+        "joint pitch_02 (ID 2) is the warmest: 7",
         "fail",
     ),
     Kind(

@@ -18,13 +18,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import JointConfig, RobotConfig
 from snakewalk.config.template import robot_toml
-from snakewalk.controller.bench.chain_calibration import (
-    WIGGLE_RAD,
+from snakewalk.controller.bench.calibration.chain_calibration import (
     ChainCalibration,
-    SeenBend,
     calibrate,
     find_servos,
 )
+from snakewalk.controller.bench.calibration.progress import SeenBend
+from snakewalk.controller.bench.calibration.slow_motions import WIGGLE_RAD
 from snakewalk.controller.bench.commands import calibrate as calibrate_command
 from snakewalk.controller.bench.homing_offset import (
     HomingOffset,
@@ -85,7 +85,7 @@ class Onlooker:
         assert others.max() < 0.2 * WIGGLE_RAD  # and one joint at a time
         assert joint not in known
         bend = film[np.abs(film[:, joint]).argmax(), joint]
-        return SeenBend(joint, 1 if bend > 0.0 else -1)
+        return SeenBend(joint=joint, direction=1 if bend > 0.0 else -1)
 
     def straighten(self) -> None:
         assert not self.plant_has_torque()
@@ -285,7 +285,7 @@ def trio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trio:
 def test_a_person_answers_at_the_terminal(trio: Trio) -> None:
     result = trio()
     assert result.exit_code == 0, result.output
-    assert "joint yaw_01 (ID 9): its servo is known already" in result.output
+    assert "1 is joint yaw_01 (ID 9), assigned by an earlier answer" in result.output
     found = load_robot(str(trio.out))
     assert found.name == "mine"
     assert found.servo_ids == trio.robot.servo_ids

@@ -410,8 +410,11 @@ def _parameter(page: Path) -> Any:
     return pytest.param(page, id=name, marks=() if tour else pytest.mark.slow)
 
 
-RUN_PAGES = [_parameter(page) for page in PAGES if printed(page)]
-"""The tour is run always; all of them take more than a minute."""
+RUN_PAGES = [
+    _parameter(page) for page in PAGES if printed(page) and not page.name.startswith("add-")
+]
+"""The tour is run always; all of them need more than a minute. Pages that add something to
+snakewalk have tests of their own in ``tests/docs``."""
 
 
 @pytest.fixture(scope="session")

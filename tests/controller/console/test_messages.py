@@ -110,7 +110,7 @@ def commands(group: Any, path: str = "snakewalk") -> dict[str, set[str]]:
 
 
 def test_a_command_does_not_build_the_options_of_all(mocker: MockerFixture) -> None:
-    built = mocker.spy(command_line, "with_messages")
+    built = mocker.spy(command_line, "called")
     assert CliRunner().invoke(app, ["--help"]).exit_code == 0
     assert built.call_count == 0
     assert CliRunner().invoke(app, ["schema", "run"]).exit_code == 0
@@ -145,3 +145,30 @@ def test_a_fallback_reported_at_import_is_shown(
         "snakewalk: numba 9: loops count references",
         "snakewalk: MuJoCo 9: public steps",
     ]
+
+
+def test_a_full_disk_is_reported_once_and_the_command_goes_on(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with messages("info", Path("/dev/full")):
+        LOGGER.info("first")
+        LOGGER.info("second")
+    shown = capsys.readouterr().err
+    assert shown.count("--log-file /dev/full: No space left on device; it ends here") == 1
+    assert "Traceback" not in shown
+    assert {"first", "second"} <= set(shown.splitlines())
+
+
+def test_a_log_file_whose_folder_was_deleted_is_written_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "logs" / "log.txt"
+    file.parent.mkdir()
+    with messages("warning", file):
+        LOGGER.info("before")
+        file.unlink()
+        file.parent.rmdir()
+        LOGGER.info("after")
+        assert "was deleted meanwhile; it is written again" in capsys.readouterr().err
+    texts = [line.split(" ", 3)[-1].strip() for line in file.read_text().splitlines()]
+    assert texts[-3:] == ["before", "after", "done"]

@@ -12,6 +12,7 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
 from snakewalk.controller.runlog.topics import (
+    BatteryTable,
     FrictionTable,
     PathTable,
     PoseSourceTable,
@@ -106,6 +107,9 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.add(WalkTable, 0.3, state=5, visited=2, candidates=4, **walk)
         friction = {"along_95": (0.11, 0.15), "across_95": (0.5, 0.6)}
         file.add(FrictionTable, 0.3, along=0.13, across=0.56, **friction)
+        windings = angles + 40.0
+        load = {"voltage_v": 11.8, "current_a": 1.5, "charge_ah": 0.01, "winding_c": windings}
+        file.add(BatteryTable, 0.3, **load)
         file.add(QposTable, 0.3, qpos=np.arange(7 + joints) / 7.0)
         file.event(0.38, "trip", "joint 7: current", level="error")
     return path

@@ -10,7 +10,7 @@ from snakewalk.controller.exchange.flat_table import flat_tables, write_csv, wri
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import TABLES
 
-UNITS = ("_rad", "_rad_s", "_a", "_s", "_m", "_m_s", "_c", "_v", "_j")
+UNITS = ("_rad", "_rad_s", "_a", "_ah", "_s", "_m", "_m_s", "_c", "_v", "_j")
 UNITLESS = {
     "fault",
     "sequence",

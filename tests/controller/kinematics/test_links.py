@@ -1,5 +1,7 @@
 """Forward kinematics: closed forms of a chain carried by its head."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -112,3 +114,16 @@ def test_links_that_differ_meet_at_their_joints_and_two_axes_at_one_place() -> N
     assert weights.sum() == pytest.approx(UNEVEN.link_count)
     assert weights[0] / weights[1] == pytest.approx(30.0)
     np.testing.assert_array_equal(link_weights(YAW), 1.0)
+
+
+def test_noise_of_the_heads_rotation_does_not_slow_the_body() -> None:
+    """A body at rest whose poses have noise of 3 degrees advances by nothing on average."""
+    robot, rng = load_robot("yaw16"), np.random.default_rng(3)
+    joint_rad = 0.4 * np.sin(np.arange(robot.joint_count))
+    turns = Rotation.from_rotvec(rng.normal(0.0, np.deg2rad(3.0), (400, 3))).as_matrix()
+    views = [body_in_world(robot, BodyPose(0.0, np.zeros(3), turn), joint_rad) for turn in turns]
+    pairs = list(pairwise(views))
+    unbiased = np.mean([now.unbiased_advance_since_m(before) for before, now in pairs])
+    biased = np.mean([now.advance_since_m(before) for before, now in pairs])
+    assert abs(unbiased) < 1e-4
+    assert biased < -1e-3

@@ -11,6 +11,7 @@ from snakewalk.controller.learning.environment import SnakeEnvironment  # noqa: 
 from snakewalk.controller.learning.policy_environment import PolicyEnvironment  # noqa: E402
 from snakewalk.controller.learning.wave_search import (  # noqa: E402
     episode_reward_m,
+    search_progress,
     search_wave,
 )
 from snakewalk.controller.motion.policy import (  # noqa: E402
@@ -59,16 +60,8 @@ def test_a_search_gives_the_same_wave_for_the_same_seed() -> None:
     pytest.importorskip("cma")
 
     def search() -> PolicyWave:
-        found = search_wave(
-            "tiny",
-            robot="yaw16",
-            world="flat",
-            generations=1,
-            population=4,
-            steps=25,
-            seed=5,
-            workers=1,
-        )
+        progress = search_progress(robot="yaw16", world="flat", population=4, steps=25, seed=5)
+        found = search_wave("tiny", progress, generations=1, workers=1)
         assert (found.origin.steps, found.origin.method) == (4 * 25, "cma")
         return found.wave
 

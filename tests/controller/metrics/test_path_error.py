@@ -9,6 +9,7 @@ from snakewalk.controller.metrics.path_error import (
     distance_m,
     length_m,
     path_error_m,
+    smooth_track_m,
     travelled_m,
     waypoint_times_s,
 )
@@ -123,3 +124,23 @@ def test_what_the_encoders_add_to_a_track_is_no_way(hz: float) -> None:
     points = np.column_stack([0.2 * times, np.zeros(len(times))]) + noise
     assert length_m(points) > 8.05
     assert travelled_m(pose_along(points, times)) == pytest.approx(0.2 * times[-1], rel=1e-3)
+
+
+def test_noise_of_single_poses_does_not_lengthen_the_track() -> None:
+    rng, times = np.random.default_rng(5), np.arange(0.0, 40.0, 0.02)
+    turn = 0.1 * times
+    circle = 2.0 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)])
+    noisy = circle + rng.normal(0.0, 0.03, circle.shape)
+    assert travelled_m(pose_along(circle, times)) == pytest.approx(8.0, rel=1e-3)
+    assert travelled_m(pose_along(noisy, times)) == pytest.approx(8.0, rel=0.02)
+
+
+def test_the_smooth_track_keeps_parabolas_and_unknown_rows() -> None:
+    times = np.arange(0.0, 4.0, 0.02)
+    points = np.column_stack([times, 0.1 * times**2])
+    pose = pose_along(points, times)
+    pose.centre_m[50] = np.nan
+    smooth = smooth_track_m(pose)
+    assert np.isnan(smooth[50]).all()
+    known = np.isfinite(smooth[:, 0])
+    assert smooth[known, :2] == pytest.approx(points[known], abs=1e-4)

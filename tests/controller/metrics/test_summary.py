@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from snakewalk.controller.metrics.path_error import travelled_m
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
@@ -46,7 +47,11 @@ def test_speed_counts_only_while_the_shape_moves(record: RunRecord) -> None:
     stopped = dataclasses.replace(record, pose=dataclasses.replace(pose, pulse_m_s=still))
     n = summary(stopped)
     assert n.eta is None
-    assert n.speed_m_s == pytest.approx(float(pose.speed_m_s.mean()), rel=1e-5)
+    assert n.speed_m_s == pytest.approx(travelled_m(pose) / np.ptp(pose.time_s), rel=1e-5)
+    moving = np.flatnonzero(pose.pulse_m_s > 0.0)
+    span_s = pose.time_s[moving[-1]] - pose.time_s[moving[0]]
+    travelled = travelled_m(pose, moving[0], moving[-1])
+    assert summary(record).speed_m_s == pytest.approx(travelled / span_s, rel=1e-5)
 
 
 def test_a_trip_is_the_outcome(make: Make, tmp_path: Path) -> None:

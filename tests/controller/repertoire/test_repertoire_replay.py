@@ -173,8 +173,8 @@ def test_between_recorded_actions_the_tail_never_goes_too_far(repertoire: Repert
 def test_what_was_recorded_is_one_settled_cycle(repertoire: Repertoire) -> None:
     for segment in repertoire.segments:
         if segment.kind != "brake":
-            assert segment.closure_m < 1.5e-3, segment.name
-            assert segment.closure_rad < 2.5e-3, segment.name
+            assert segment.closure_m < 1e-3, segment.name
+            assert segment.closure_rad < 2e-3, segment.name
         np.testing.assert_allclose(segment.link_m.mean(axis=1), 0.0, atol=1e-9)
         # axes of the links lead from one link to the next
         half = 0.035 * segment.link_rotation[..., 0]

@@ -112,6 +112,7 @@ def test_a_gait_runs_over_the_bus_without_clamp_or_miss_and_goes_its_way(sidewou
     assert record.header.run.gait.name == "sidewinding"
     way = gait_displacement(record)
     assert way.cycles >= 2
+    assert numbers.speed_m_s == pytest.approx(way.speed_m_s, rel=1e-5)  # one definition of speed
     assert way.left_bl > 0.25
     assert abs(way.forward_bl) < 0.1
     asked = record.cycle.asked_rad[25:]  # behind the ramp over the last encoder step

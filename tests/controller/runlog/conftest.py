@@ -10,6 +10,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.controller.runlog.record import MotorEnergy, PlanSummary, Winding
 from snakewalk.controller.runlog.topics import (
+    BatteryTable,
     FrictionTable,
     PathTable,
     PoseTable,
@@ -99,6 +100,14 @@ def write_log(path: Path, cycles: int) -> Path:
             across=0.56,
             along_95=(0.11, 0.15),
             across_95=(0.5, 0.6),
+        )
+        log.add(
+            BatteryTable,
+            1.0,
+            voltage_v=11.8,
+            current_a=1.5,
+            charge_ah=0.01,
+            winding_c=np.full(JOINTS, 41.0),
         )
         log.add(PathTable, 1.0, points_m=[[0.0, 1.0], [2.0, 2.0]])
     return path

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.reader import LogError, read_log
@@ -133,3 +134,23 @@ def test_an_event_steers_no_terminal_that_shows_the_log(tmp_path: Path) -> None:
     with RunLog(tmp_path / "run.mcap", lambda topic, row: rows.append(row)) as log:
         log.event(0.1, "map", "robot \x1b[2J\u202etxt.exe")
     assert [json.loads(row)["text"] for row in rows] == ["robot ?[2J?txt.exe"]
+
+
+def test_a_log_whose_folder_is_deleted_is_reported_at_once_and_written_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path, angles_rad = tmp_path / "run" / "log.mcap", np.zeros(JOINTS)
+    with RunLog(path) as log:
+        for k in range(100):
+            if k == 30:
+                part_path(path).unlink()
+                path.parent.rmdir()
+            time_s = 0.02 * k
+            log.cycle(time_s, angles_rad, angles_rad, joint_state(k), deadline_s=0.02, lateness_s=0)
+            if k < 30:
+                assert not caplog.records
+        (warning,) = caplog.records
+        assert "was deleted during the run; it is kept open" in warning.getMessage()
+    with path.open("rb") as file:
+        rows = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
+    assert rows.count("/cycle") == 100

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.control_cycle import SPIN_FROM_BAUD, SPIN_S, ControlCycle
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
-from snakewalk.drivers.bus.serial_fast_path import REPLY_NS, WRITE_NS, SerialFastPath
+from snakewalk.drivers.bus.serial_fast_path import REPLY_NS, SPIN_NS, WRITE_NS, SerialFastPath
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.port.serial_wait import LATE, new_latency_estimate, update
@@ -296,3 +296,29 @@ def test_one_odd_reply_hardly_changes_the_estimate(before: list[int], odd_ns: in
     was_ns = latency_estimate[LATE]
     update(latency_estimate, odd_ns, 2_000_000_000, 40_000)
     assert abs(latency_estimate[LATE] - was_ns) <= 5_000
+
+
+@pytest.mark.parametrize(
+    ("baud", "given_s", "expected_s"),
+    [
+        (57_600, None, 0.0),
+        (1_000_000, None, 0.0),
+        (2_000_000, None, 0.0),
+        (SPIN_FROM_BAUD, None, SPIN_S),
+        (4_000_000, None, SPIN_S),
+        (1_000_000, SPIN_S, SPIN_S),
+        (4_000_000, 0.0, 0.0),
+    ],
+)
+def test_a_slow_wire_is_not_polled(baud: int, given_s: float | None, expected_s: float) -> None:
+    """Polling took half of a read's CPU time to save 10 us."""
+    master, slave = os.openpty()
+    try:
+        port = SerialPort(os.ttyname(slave), baud)
+        path = ControlCycle(port, IDS, spin_s=given_s)._fast_path
+        assert isinstance(path, SerialFastPath)
+        assert path._plan[SPIN_NS] == expected_s * 1e9
+        port.closePort()
+    finally:
+        os.close(master)
+        os.close(slave)

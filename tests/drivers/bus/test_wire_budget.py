@@ -1,9 +1,12 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakewalk.drivers.bus.budget import chain_budget, wire_budget
+from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.drivers.bus.budget import chain_budget, check_ages, wire_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
@@ -68,3 +71,23 @@ def test_reading_alone_sends_no_goals() -> None:
     assert wire_budget(3, 57_600, fast=False, goal_bytes=0).write_bytes == 0
     with pytest.raises(ValueError, match="at least one servo"):
         wire_budget(0, 1_000_000, fast=True)
+
+
+def test_a_cycle_whose_values_are_too_old_or_whose_pauses_are_too_long_is_rejected() -> None:
+    """64 servos at 57,600 baud and 2 Hz switched torque on, and stopped in the first cycle."""
+    budget = chain_budget(64, 57_600, fast=True)
+    budget.check(2.0)
+    with pytest.raises(BudgetError, match=r"positions are 0\.26 s old .*_limit_s 0\.1:") as old:
+        check_ages(budget, 2.0, stale_limit_s=0.1, watchdog_s=0.2)
+    assert len(old.value.faults) == 1
+    near = chain_budget(16, 1_000_000, fast=True)
+    check_ages(near, 50.0, stale_limit_s=0.1, watchdog_s=0.2)
+    with pytest.raises(BudgetError, match=r"hear nothing for 0\.49 s .*watchdog_s 0\.2, and stop"):
+        check_ages(near, 2.0, stale_limit_s=0.1, watchdog_s=0.2)
+
+
+def test_a_gait_of_64_servos_on_a_slow_bus_is_rejected_before_torque(tmp_path: Path) -> None:
+    robot = tmp_path / "long.toml"
+    robot.write_text(f'name = "long"\njoint_axes = "{"y" * 64}"\n[servo]\nbaud = 57600\n')
+    with pytest.raises(BudgetError, match="divide the chain into several ports"):
+        prepare_gait("lateral-undulation", robot=str(robot), keys={"run.cycle_hz": 2.0})

@@ -7,7 +7,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.chain.temperature_sensors import (
+    CHANGED_K,
     COOLING_S,
+    EXPECTED_ALONE_K,
     EXPECTED_RISE_K,
     RISE_S_PER_K,
     TemperatureSensors,
@@ -88,6 +90,51 @@ def test_a_temperature_that_was_not_read_and_a_current_that_was_not_are_no_evide
     found = sensors()
     for time_s in np.arange(0.0, 60.0, STEP_S):
         assert found.update(np.full(J, 25.0), np.full(J, np.nan), float(time_s)) == []
+
+
+def reported(changes_k: list[float], rise_k: float) -> list[str]:
+    """Lines after readings have changed by ``changes_k`` (J,) and currents should have warmed."""
+    found, first_c = sensors(), np.full(J, 30.0)
+    found.update(first_c, np.zeros(J), 0.0)
+    found.expected_rise_k[:] = rise_k
+    return found.update(first_c + np.array(changes_k), np.zeros(J), 0.0)
+
+
+@pytest.mark.parametrize(("below_k", "count"), [(0.0, 1), (1e-9, 0)])
+def test_a_constant_reading_counts_from_the_expected_rise_on(below_k: float, count: int) -> None:
+    others = [0.0, CHANGED_K, CHANGED_K, CHANGED_K]
+    assert len(reported(others, EXPECTED_RISE_K - below_k)) == count
+
+
+@pytest.mark.parametrize(("below_k", "count"), [(0.0, J), (1e-9, 0)])
+def test_a_chain_that_is_constant_counts_from_a_higher_rise_on(below_k: float, count: int) -> None:
+    assert len(reported([0.0] * J, EXPECTED_ALONE_K - below_k)) == count
+
+
+@pytest.mark.parametrize(
+    ("changes_k", "count"),
+    [
+        ([0.0, 0.0, 0.0, CHANGED_K], 3),  # one that changes is enough, if it warms up
+        ([0.0, 0.0, 0.0, CHANGED_K - 0.01], 0),
+        ([0.0, 0.0, 1.0, CHANGED_K], 2),  # half of those that change
+        ([0.0, 1.0, 1.0, CHANGED_K], 0),  # a third
+        ([0.0, 1.0, CHANGED_K, CHANGED_K], 1),
+        ([1.0, 1.0, 1.0, CHANGED_K], 0),
+    ],
+)
+def test_half_of_the_readings_that_change_must_show_the_heat(
+    changes_k: list[float], count: int
+) -> None:
+    assert len(reported(changes_k, EXPECTED_RISE_K)) == count
+
+
+def test_time_that_runs_backwards_cools_nothing() -> None:
+    found = sensors()
+    found.update(np.full(J, 25.0), np.full(J, HALF_A), 10.0)
+    found.update(np.full(J, 25.0), np.full(J, HALF_A), 12.0)
+    before_k = found.expected_rise_k.copy()
+    found.update(np.full(J, 25.0), np.full(J, HALF_A), 11.5)
+    assert (found.expected_rise_k == before_k).all()
 
 
 ROBOT = RobotConfig(name="two", joint_axes="yy")

@@ -103,9 +103,9 @@ def test_a_port_that_is_not_there_is_an_input_error() -> None:
 def test_a_file_is_no_port(tmp_path: os.PathLike[str]) -> None:
     path = os.path.join(tmp_path, "file")
     open(path, "w").close()
-    with pytest.raises(PortError, match="is no serial device"):
+    with pytest.raises(PortError, match="is not a serial device"):
         SerialPort(path)
-    with pytest.raises(PortError, match="is no serial device"):
+    with pytest.raises(PortError, match="is not a serial device"):
         SerialPort("/dev/null")
 
 

@@ -294,6 +294,18 @@ def test_the_first_motor_without_current_is_named_before_a_joint_that_does_not_f
     assert "0.10 rad from its goal with 0.00 A, expected about 0.10 A" in str(faults[3])
 
 
+def test_a_motor_that_does_not_push_is_told_from_a_joint_that_does_not_follow() -> None:
+    following = FollowingError(JUDGED)
+    assert not following.is_idle
+    assert idle(0.1, 0.0, following=following) is not None
+    assert following.is_idle
+    following = FollowingError(LIMITS)
+    for k in range(8):
+        fault = following.update(state(time_s=0.1 * k), one(0.5, 0))
+    assert fault is not None
+    assert not following.is_idle
+
+
 def test_the_output_of_a_robots_motors_is_that_of_their_models() -> None:
     limits = SafetyLimits.from_config(load_robot("alternating16"), SafetyConfig())
     assert limits.output is not None

@@ -6,9 +6,9 @@ import dynamixel_sdk as sdk
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.drivers.protocol.protocol1 import Error1
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import Ax12Line
-from snakewalk.sim.ax12.protocol1 import Error1
 from snakewalk.sim.servo.bench import BenchPlant
 
 OK = (sdk.COMM_SUCCESS, 0)

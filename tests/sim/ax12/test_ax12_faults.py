@@ -11,8 +11,8 @@ from snakewalk.config.errors import ConfigError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked
 from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.protocol.protocol1 import Error1, frame
 from snakewalk.sim.ax12.line import Ax12Line
-from snakewalk.sim.ax12.protocol1 import Error1, frame
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain

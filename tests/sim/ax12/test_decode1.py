@@ -3,10 +3,10 @@
 import json
 from pathlib import Path
 
+from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, Error1, Instruction1, frame
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.ax12.line import Ax12Line
-from snakewalk.sim.ax12.protocol1 import BROADCAST_ID, Error1, Instruction1, frame
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.sniff.decode import DecodedPacket
 from snakewalk.sim.sniff.trace import TraceWriter

@@ -286,3 +286,69 @@ def test_a_kind_that_the_player_does_not_know_is_not_played_as_another() -> None
     line = a_line(2)
     with pytest.raises(AssertionError, match="melt"):
         FaultPlayer(line, FaultPlan.model_construct(seed=0, fault=(unknown,)))
+
+
+GOALS = encode_instruction(
+    InstructionPacket(
+        ALL,
+        Instruction.SYNC_WRITE,
+        bytes((116, 0, 4, 0)) + b"".join(bytes((k, 0, 9, 0, 0)) for k in range(1, 5)),
+    )
+)
+GAINS = encode_instruction(
+    InstructionPacket(
+        ALL,
+        Instruction.SYNC_WRITE,
+        bytes((84, 0, 2, 0)) + b"".join(bytes((k, 77, 0)) for k in range(1, 5)),
+    )
+)
+
+
+def test_a_deaf_servo_ignores_sync_writes_only() -> None:
+    line = scripted(fault("deaf", ids=[2], at_s=0.1, for_s=1.0))
+    wait(line, 0.2)
+    was = line.bank["Goal Position"][1], line.bank["Position P Gain"][1]
+    exchange(line, GOALS)
+    exchange(line, GAINS)
+    assert line.bank["Goal Position"].tolist() == [2304, was[0], 2304, 2304]
+    assert line.bank["Position P Gain"].tolist() == [77, was[1], 77, 77]
+    assert write(line, 2, 84, 77, 2) == 0
+    assert line.bank["Position P Gain"][1] == 77
+    wait(line, 1.0)
+    exchange(line, GOALS)
+    assert line.bank["Goal Position"].tolist() == [2304] * 4
+
+
+def test_an_alert_without_an_error_is_set_while_it_lasts() -> None:
+    line = scripted(fault("alert", ids=[3], at_s=0.1, for_s=1.0))
+    for pause_s, alerts in ((0.0, []), (0.2, [3]), (1.0, [])):
+        wait(line, pause_s)
+        replies = PacketParser().feed(exchange(line, READ_ALL))
+        assert [each.servo_id for each in replies if each.error & ALERT] == alerts
+        (status,) = ask(line, 3, Instruction.READ, bytes((70, 0, 1, 0)))
+        assert status.params == b"\0"
+        assert bool(status.error & ALERT) == bool(alerts)
+
+
+@pytest.mark.parametrize("value", [None, 0])
+def test_a_dead_sensor_reports_a_constant_value(value: int | None) -> None:
+    keys = {} if value is None else {"value": value}
+    line = scripted(
+        fault("reading", ids=[1], register="Present Temperature", at_s=0.1, for_s=1.0, **keys)
+        + fault("heat", ids=[1, 2], celsius=60.0, at_s=0.2)
+    )
+    wait(line, 0.3)
+    assert line.shown("Present Temperature")[:2].tolist() == [25 if value is None else 0, 60]
+    wait(line, 1.0)
+    assert line.shown("Present Temperature")[0] == line.shown("Present Temperature")[1]
+
+
+def test_a_register_is_written_again_and_again() -> None:
+    line = scripted(
+        fault("write", ids=[1], register="Goal PWM", value=5, at_s=0.1, every_s=0.01, for_s=0.5)
+    )
+    for pause_s, still_s, expected in ((0.0, 0.105, 5), (0.0, 0.2, 5), (0.4, 0.1, 700)):
+        wait(line, pause_s)
+        line.bank["Goal PWM"][0] = 700
+        wait(line, still_s)
+        assert line.bank["Goal PWM"][0] == expected

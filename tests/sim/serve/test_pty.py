@@ -171,3 +171,24 @@ def test_the_link_of_a_killed_server_is_taken_where_its_device_is_ours_now(
     with PtyServer(a_line(), SimClock(), link=link) as server:
         assert os.readlink(link) == server.path
     assert not link.is_symlink()
+
+
+def test_a_link_that_another_program_changes_is_reported_when_it_happens(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    link, clock = tmp_path / "tty", SimClock()
+    with PtyServer(a_line(), clock, link=link) as server:
+        link.unlink()
+        clock.advance(1.5)
+        server.step(0.0)
+        assert os.readlink(link) == server.path
+        link.unlink()
+        link.symlink_to("/dev/null")
+        clock.advance(1.5)
+        server.step(0.0)
+        path = server.path
+    assert [each.getMessage() for each in caplog.records] == [
+        f"{link}: was deleted; it leads to {path} again",
+        f"{link}: leads to /dev/null now; the servos are at {path}",
+    ]
+    assert os.readlink(link) == "/dev/null"  # another's is left alone

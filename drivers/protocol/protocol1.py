@@ -1,4 +1,4 @@
-"""Protocol 1.0 packets as a servo sees them; e-manual, DYNAMIXEL Protocol 1.0.
+"""Protocol 1.0 packets; e-manual, DYNAMIXEL Protocol 1.0.
 
 ``FF FF | id | length | instruction or error | parameters | checksum``; the length counts all behind
 itself, the checksum is the complement of the sum from the id on.

@@ -1,0 +1,1 @@
+"""Calibration of a chain: the joint of each servo, its direction, zero and range."""

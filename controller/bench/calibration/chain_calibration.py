@@ -1,0 +1,319 @@
+"""Calibration: the joint of each servo, its direction, its zero and its range.
+
+Only the IDs and models of the servos are known. Every motion passes a ``SafeLink`` around a chain
+of all servos in current-based position mode with a small goal current: one joint moves, slowly, the
+others hold where they are. A person who sees the robot says which joint has moved; the range ends
+where a servo pushes with all the current that it may use and does not turn.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.joint_names import joint_label
+from snakewalk.config.loader import checked
+from snakewalk.config.robot import JointConfig, RobotConfig
+from snakewalk.controller.bench.calibration.progress import (
+    CalibrationProgress,
+    JointRange,
+    Journal,
+    SeenBend,
+)
+from snakewalk.controller.bench.calibration.slow_motions import (
+    BUS_TRIES,
+    RANGE_RAD,
+    CalibrationBench,
+)
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import model_of
+
+CURRENT_A = 0.3
+"""Goal current by default, A: an XM430 turns with an eighth of its stall torque (ours)."""
+BEYOND_RAD = 0.25
+"""How far beyond the limit of the robot the sweep looks for a stop (ours)."""
+MARGIN_RAD = 0.1
+"""How far before a stop the limit is set; the simulator's stops are as far beyond limits (ours)."""
+LEAST_LIMIT_RAD = 0.1
+"""A joint with less range is of no use (ours)."""
+_SCANS = 3
+"""Scans until the bus has as many servos as the robot has joints (ours)."""
+_PROBES = 6
+"""Probes of a servo until its replies come once each and whole: two servos with one ID never do
+that, and a busy line does it soon (ours)."""
+
+
+class Observer(Protocol):
+    """Somebody, or something, that sees the robot."""
+
+    def which(
+        self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
+    ) -> SeenBend:
+        """Say which joint a servo moves; ``wiggle`` moves it, as often as it is called.
+
+        ``known`` are the joints that have been found already, with their servos' IDs.
+        """
+        ...
+
+    def straighten(self) -> None:
+        """Lay the body straight and level; torque is off meanwhile."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class ChainCalibration:
+    """What was found, as a robot and in words."""
+
+    robot: RobotConfig
+    ranges: tuple[JointRange, ...]
+    """One value per joint, head first; empty if no range was swept."""
+    notes: tuple[str, ...]
+    """What a person should look at: joints with less range than the others, or without a stop."""
+
+
+def find_servos(port: BytePort, latency_s: float, count: int | None = None) -> dict[int, str]:
+    """Model of each servo on the bus, by ID.
+
+    Args:
+        port: the line.
+        latency_s: how long adapter and driver may hold bytes back.
+        count: number of servos to expect; with fewer or more the bus is scanned again.
+
+    Raises:
+        InputError: two servos share an ID.
+        ControlTableError: a servo is of a model that is not known.
+        PortError: the port is gone.
+
+    """
+    bus = DynamixelBus(port, latency_s=latency_s, tries=BUS_TRIES)
+    found = bus.scan()
+    for _ in range(_SCANS - 1):
+        if count is None or len(found) == count:
+            break
+        found |= bus.scan()
+    shared = [str(servo_id) for servo_id in sorted(found) if not _is_alone(bus, servo_id)]
+    if shared:
+        raise InputError(
+            f"{port.name}: replies of ID {', '.join(shared)} come doubled or damaged: two servos "
+            "share it, or the line is bad; connect one alone and give it another ID: snakewalk "
+            "bus set --new-id"
+        )
+    return {each: model_of(found[each].model_number) for each in sorted(found)}
+
+
+def _is_alone(bus: DynamixelBus, servo_id: int) -> bool:
+    probes = (bus.probe(servo_id) for _ in range(_PROBES))
+    return any(probe.answered and not probe.doubled and not probe.damaged for probe in probes)
+
+
+def unknown_chain(like: RobotConfig, servos: Mapping[int, str], current_a: float) -> RobotConfig:
+    """Chain of all servos in the order of their IDs, each free over its whole turn, none strong.
+
+    Raises:
+        InputError: there are not as many servos as the robot has joints.
+
+    """
+    if len(servos) != like.joint_count:
+        shown = ", ".join(map(str, servos)) or "none"
+        raise InputError(
+            f"robot {like.name} has {like.joint_count} joints, the bus {len(servos)} servos (ID "
+            f"{shown}): connect all of the robot's, and no others, or say another robot"
+        )
+    joints = tuple(
+        JointConfig(
+            axis="p",  # whatever it is: pitch joints have a goal current
+            id=servo_id,
+            model=model,
+            name=f"servo_{servo_id}",
+            limit_rad=RANGE_RAD,
+            position_p_gain=like.servo.position_p_gain,
+            current_limit_a=current_a,
+        )
+        for servo_id, model in sorted(servos.items())
+    )
+    return like.model_copy(update={"joint_axes": "p" * len(joints), "joints": joints})
+
+
+def calibrate(
+    port: BytePort,
+    like: RobotConfig,
+    observer: Observer,
+    *,
+    name: str,
+    latency_s: float = 0.004,
+    current_a: float = CURRENT_A,
+    sweep: bool = True,
+    stop_requested: Callable[[], str | None] = lambda: None,
+    on_progress: Callable[[str], None] = lambda step: None,
+    journal: Journal | None = None,
+) -> ChainCalibration:
+    """Find out everything about the chain on ``port``.
+
+    Args:
+        port: the line.
+        like: a robot with the same axes and links; its IDs, signs and zeros do not matter.
+        observer: who sees the robot.
+        name: of the robot that is found.
+        latency_s: how long adapter and driver may hold bytes back.
+        current_a: goal current of every servo.
+        sweep: whether the ends of the ranges are looked for.
+        stop_requested: returns why the safe link has to latch, or None.
+        on_progress: gets a line for each step.
+        journal: of an interrupted calibration, whose answers are not asked again; it is saved
+            after each answer and each range.
+
+    Raises:
+        InputError: the servos are not the robot's, a joint does not move, two servos seem to move
+            the same joint, or a joint cannot have the range that the robot wants.
+        DriverError: a servo does not do what an instruction asks, or safety has latched.
+
+    """
+    if journal is None:
+        journal = Journal(CalibrationProgress(joint_axes=like.joint_axes))
+    on_progress("search for servos")
+    servos = find_servos(port, latency_s, like.joint_count)
+    journal.known.check_servos(servos, "--resume")
+    unknown = unknown_chain(like, servos, current_a)
+    bench = CalibrationBench(port, unknown, latency_s, stop_requested, on_progress)
+    journal.note(servos=servos)
+    steps = _Steps(like, bench, on_progress, journal)
+    for row, servo_id in enumerate(unknown.servo_ids):
+        if servo_id not in journal.known.bends:
+            steps.ask(observer, servo_id, partial(bench.wiggle, row))
+    bench.name_joints([steps.label(servo_id) for servo_id in unknown.servo_ids])
+    if not journal.known.zeros_rad:
+        on_progress("lay the body straight")
+        observer.straighten()
+        straight_rad = dict(zip(unknown.servo_ids, bench.where_rad().tolist(), strict=True))
+        journal.note(zeros_rad=straight_rad)
+    if sweep:
+        steps.sweep(unknown.servo_ids)
+    return _found(like, name, unknown, journal.known, sweep=sweep)
+
+
+@dataclass
+class _Steps:
+    """Steps of a calibration, each of which adds to the progress."""
+
+    like: RobotConfig
+    bench: CalibrationBench
+    on_progress: Callable[[str], None]
+    journal: Journal
+
+    @property
+    def known(self) -> CalibrationProgress:
+        """The progress so far."""
+        return self.journal.known
+
+    def label(self, servo_id: int) -> str:
+        """Label of the joint that a servo moves."""
+        return joint_label(self.like.joint_names[self.known.bends[servo_id].joint], servo_id)
+
+    def ask(self, observer: Observer, servo_id: int, wiggle: Callable[[], None]) -> None:
+        """Ask which joint a servo moves.
+
+        Raises:
+            InputError: the joint is known already, or the robot does not have it.
+
+        """
+        self.on_progress(f"ID {servo_id}: which joint")
+        seen = {bend.joint: other for other, bend in self.known.bends.items()}
+        bend = observer.which(servo_id, wiggle, seen)
+        if not 0 <= bend.joint < self.like.joint_count or bend.joint in seen:
+            raise InputError(
+                f"ID {servo_id}: the joint that moved, number {bend.joint + 1} from the head, is "
+                f"known already or not of {self.like.name}"
+            )
+        self.journal.note(bends={**self.known.bends, servo_id: bend})
+
+    def sweep(self, servo_ids: Sequence[int]) -> None:
+        """Find the ends of each joint's range, from the head on."""
+        rows = {servo_id: row for row, servo_id in enumerate(servo_ids)}
+        in_order = sorted(servo_ids, key=lambda servo_id: self.known.bends[servo_id].joint)
+        straight_rad = np.array([self.known.zeros_rad[servo_id] for servo_id in servo_ids])
+
+        stops: dict[tuple[int, int], float | None] = {}
+
+        def push_each() -> None:
+            with self.bench.straight(straight_rad) as push:
+                for servo_id in [each for each in in_order if each not in self.known.ranges]:
+                    bend, row = self.known.bends[servo_id], rows[servo_id]
+                    reach_rad = self.like.limit_rad[bend.joint] + BEYOND_RAD
+                    for side in 1, -1:
+                        at = servo_id, side
+                        if at not in stops:
+                            self.on_progress(f"range of {self.label(servo_id)}")
+                            keep = partial(stops.__setitem__, at)
+                            push(row, side * bend.direction, reach_rad, keep)
+                    low, high = stops[servo_id, -1], stops[servo_id, 1]
+                    ends = JointRange(low_rad=None if low is None else -low, high_rad=high)
+                    self.journal.note(ranges={**self.known.ranges, servo_id: ends})
+
+        if len(self.known.ranges) < len(in_order):
+            self.bench.retried(push_each, lambda: len(stops))
+
+
+def _found(
+    like: RobotConfig,
+    name: str,
+    unknown: RobotConfig,
+    known: CalibrationProgress,
+    *,
+    sweep: bool,
+) -> ChainCalibration:
+    """Put together the robot and the notes.
+
+    Raises:
+        InputError: a joint has no range to speak of, or its servo's turn ends within it.
+
+    """
+    joints, faults, notes = [], [], []
+    rows = {known.bends[servo_id].joint: row for row, servo_id in enumerate(unknown.servo_ids)}
+    ids = [unknown.servo_ids[rows[joint]] for joint in range(like.joint_count)]
+    ranges = [known.ranges[servo_id] for servo_id in ids] if sweep else []
+    stopless = [k for k, r in enumerate(ranges) if r.low_rad is None or r.high_rad is None]
+    for joint, servo_id in enumerate(ids):
+        limit = like.limit_rad[joint]
+        said = joint_label(like.joint_names[joint], servo_id)
+        if ranges:
+            stops = [
+                abs(stop)
+                for stop in (ranges[joint].low_rad, ranges[joint].high_rad)
+                if stop is not None
+            ]
+            if stops and min(stops) - MARGIN_RAD < limit - 0.02:
+                limit = round(min(stops) - MARGIN_RAD, 3)
+                notes.append(f"{said}: stops at {_both(ranges[joint])}: its limit is {limit:g} rad")
+            elif joint in stopless and len(stopless) <= len(ranges) // 2:
+                notes.append(
+                    f"{said}: stops at {_both(ranges[joint])}: no stop where other joints have one"
+                )
+        if limit < LEAST_LIMIT_RAD:
+            faults.append(f"{said}: only {limit + MARGIN_RAD:.2f} rad to its stop: free it")
+            continue
+        model = known.servos[servo_id]
+        found = {
+            "id": servo_id,
+            "model": None if model == like.servo.model else model,
+            "sign": known.bends[servo_id].direction,
+            "zero_rad": round(known.zeros_rad[servo_id], 5),
+        }
+        if limit != like.limit_rad[joint]:
+            found["limit_rad"] = limit
+        own = like.joints[joint] if like.joints else JointConfig()
+        joints.append(own.model_copy(update=found))
+    if faults:
+        raise InputError(faults)
+    keys = {"name": name, "joints": tuple(joints)}
+    # checked again: a zero and a limit together may leave the servo's turn
+    robot = checked(RobotConfig, like.model_copy(update=keys).model_dump(), f"robot {name}")
+    return ChainCalibration(robot, tuple(ranges), tuple(notes))
+
+
+def _both(found: JointRange) -> str:
+    ends = (found.low_rad, found.high_rad)
+    return " and ".join("none" if end is None else f"{end:+.2f} rad" for end in ends)

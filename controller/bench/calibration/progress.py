@@ -1,0 +1,141 @@
+"""Progress of a calibration, saved after each answer so that an interruption loses none."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, ValidationError
+
+from snakewalk.config.base import Strict
+from snakewalk.config.errors import ConfigError, InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.console.result_files import atomic_write
+
+
+class SeenBend(Strict):
+    """The joint that moved when a servo was wiggled."""
+
+    joint: int
+    """Which joint moved, counted from 0 at the head."""
+    direction: Literal[1, -1]
+    """1: first it bent the head side to the left (yaw), or lifted it (pitch); -1: the other way."""
+
+
+class JointRange(Strict):
+    """Angles at which a joint met its stops."""
+
+    low_rad: float | None
+    """None: not within ``BEYOND_RAD`` of the robot's limit."""
+    high_rad: float | None
+
+
+class CalibrationProgress(Strict):
+    """Everything that is known of a chain so far; all tables are by servo ID."""
+
+    joint_axes: str
+    """Axes of the robot that the chain is compared with."""
+    servos: dict[int, str] = Field({})
+    """Models of the servos on the bus."""
+    bends: dict[int, SeenBend] = Field({})
+    zeros_rad: dict[int, float] = Field({})
+    """Positions of the straight body; empty until it was laid straight."""
+    ranges: dict[int, JointRange] = Field({})
+
+    def check_servos(self, servos: dict[int, str], source: str) -> None:
+        """Compare with the servos on the bus.
+
+        Raises:
+            InputError: they are not the servos of this progress.
+
+        """
+        if self.servos and self.servos != servos:
+            before, now = (", ".join(map(str, each)) or "none" for each in (self.servos, servos))
+            raise InputError(
+                f"{source}: has servos with ID {before}, the bus has {now}, or their models "
+                "differ; connect the same servos, or start again with --force"
+            )
+
+    @property
+    def summary(self) -> str:
+        """Text such as ``5 of 16 joints known, not laid straight``."""
+        straight = "laid straight" if self.zeros_rad else "not laid straight"
+        joints = f"{len(self.bends)} of {len(self.joint_axes)} joints known, {straight}"
+        return f"{joints}, {len(self.ranges)} ranges swept"
+
+
+@dataclass
+class Journal:
+    """Progress of a calibration that is going on, and the function that saves it."""
+
+    known: CalibrationProgress
+    save: Callable[[CalibrationProgress], None] = lambda progress: None
+
+    def note(self, **found: object) -> None:
+        """Add to the progress, and save it."""
+        self.known = self.known.model_copy(update=found)
+        self.save(self.known)
+
+
+class ProgressFile:
+    """The file next to the robot's file that holds the progress until the robot's is written."""
+
+    def __init__(self, robot_file: Path) -> None:
+        self.path = robot_file.with_name(f"{robot_file.name}.part")
+        """``my-robot.toml.part``."""
+
+    def start(self, robot: RobotConfig, *, resume: bool, force: bool) -> Journal:
+        """Return the journal to continue, or an empty one, which saves to the file.
+
+        Args:
+            robot: with the axes of the chain.
+            resume: continue the file's.
+            force: ignore a file that is there.
+
+        Raises:
+            InputError: the file to continue is missing or of another robot, or there is one and
+                neither ``resume`` nor ``force`` is given.
+            ConfigError: the file is broken.
+
+        """
+        if not resume:
+            if self.path.exists() and not force:
+                raise InputError(
+                    f"{self.path}: holds the answers of an interrupted calibration; continue it "
+                    "with --resume, or start again with --force"
+                )
+            return Journal(CalibrationProgress(joint_axes=robot.joint_axes), self.save)
+        progress = self._read()
+        if progress.joint_axes != robot.joint_axes:
+            raise InputError(
+                f"{self.path}: was made for joint_axes {progress.joint_axes}, robot {robot.name} "
+                f"has {robot.joint_axes}; name the same --robot"
+            )
+        return Journal(progress, self.save)
+
+    def save(self, progress: CalibrationProgress) -> None:
+        """Write the file, whole or not at all; without an answer there is nothing to keep."""
+        if not progress.bends:
+            return
+        with atomic_write(self.path) as part:
+            part.write_text(progress.model_dump_json(indent=1), encoding="utf-8")
+
+    def remove(self) -> None:
+        """Delete the file: the robot's file holds everything."""
+        with suppress(FileNotFoundError):
+            self.path.unlink()
+
+    def _read(self) -> CalibrationProgress:
+        try:
+            return CalibrationProgress.model_validate_json(self.path.read_bytes())
+        except FileNotFoundError:
+            raise InputError(
+                f"{self.path}: no such file, so there is nothing to continue; leave --resume out"
+            ) from None
+        except ValidationError as error:
+            fault = error.errors(include_url=False)[0]
+            place = ".".join(map(str, fault["loc"]))
+            raise ConfigError(
+                f"{self.path}: {place}: {fault['msg']}; start again with --force"
+            ) from None

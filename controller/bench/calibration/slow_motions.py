@@ -1,0 +1,300 @@
+"""Slow motions of one servo of an unknown chain; torque is off between them.
+
+A line of a busy machine loses replies and delays them. Each cycle reads again if replies are
+missing, the state may be older than in a run, and a motion that was ended by the line is repeated.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.controller.kinematics.smoothstep import cubic
+from snakewalk.controller.runtime.loop import ticks
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import (
+    BusError,
+    ChainError,
+    FaultCause,
+    PortError,
+    SafetyTrippedError,
+)
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.registers import Alarm
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.vet import stale_fault
+from snakewalk.drivers.types import JointCommand, JointState
+
+WIGGLE_RAD = 0.25
+"""How far a joint is wiggled (ours)."""
+WIGGLE_S = 0.8
+"""Duration of the way there, and of the way back (ours)."""
+MOVED_SHARE = 0.5
+"""A joint that makes less of its wiggle is held or has no power (ours)."""
+SWEEP_RAD_S = 1.0
+"""Speed of the sweep (ours)."""
+STOP_LAG_RAD = 0.1
+"""A joint that is so far behind its goal, and pushes ... (ours)."""
+STOP_EFFORT = 0.8
+"""... with this share of its goal current, for ... (ours)."""
+STOP_S = 0.2
+"""... so long, s, has met its stop (ours)."""
+REST_S = 0.3
+"""How long a joint may come to rest before the next moves, s (ours)."""
+RANGE_RAD = 3.1
+"""A servo knows one turn only."""
+BUS_TRIES = 6
+"""Tries of a transaction: more than in a run, since no deadline waits for it (ours)."""
+_STALE_S = 0.4
+"""Age of a state that ends a motion: weak and slow motions may be seen later than a run (ours)."""
+_WATCHDOG_S = 1.5
+"""Longer than a busy host stands still (ours): a servo that its watchdog has stopped rejects goals,
+which looks as if it were blocked."""
+_READS = 3
+"""Reads in a cycle until all servos have replied (ours)."""
+_POSE_READS = 40
+"""Reads until the pose of all servos is complete (ours)."""
+_MOTION_TRIES = 10
+"""Tries of a motion that the line ends (ours)."""
+_CYCLE_S = 0.02
+Push = Callable[[int, int, float, Callable[[float | None], None]], None]
+"""Pushes a joint: row, side, reach in rad, and a function that gets the distance to its stop."""
+_HANG_UP = "hang the robot up, so that its joints carry no weight"
+
+
+class LineLostError(BusError):
+    """Replies were missing for too long, so that a motion ended; torque is off."""
+
+
+class CalibrationBench:
+    """Moves one servo at a time of a chain of which only IDs and models are known."""
+
+    def __init__(
+        self,
+        port: BytePort,
+        robot: RobotConfig,
+        latency_s: float,
+        stop_requested: Callable[[], str | None],
+        on_progress: Callable[[str], None],
+    ) -> None:
+        self._robot = robot
+        self._stop_requested, self._on_progress = stop_requested, on_progress
+        self._clock = port.clock
+        bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s, tries=BUS_TRIES)
+        self._chain = ServoChain(bus, robot, watchdog_s=_WATCHDOG_S)
+        limits = SafetyLimits.from_config(robot, SafetyConfig())
+        self._limits = replace(limits, stale_limit_s=_STALE_S)
+        self._state: JointState | None = None
+
+    def name_joints(self, labels: Sequence[str]) -> None:
+        """Call the servos by these labels in messages, in the order of their IDs."""
+        self._limits = replace(self._limits, joint_names=tuple(labels))
+
+    def retried(self, motion: Callable[[], None], progress: Callable[[], int] = lambda: 0) -> None:
+        """Run a motion, and again if the line ended it; progress gives it all tries again.
+
+        Raises:
+            LineLostError: the line ended it too often.
+            DriverError: another reason ended it.
+
+        """
+        tries, before = _MOTION_TRIES, progress()
+        while True:
+            try:
+                motion()
+                return
+            except PortError:
+                raise
+            except BusError as error:
+                if progress() != before:
+                    tries, before = _MOTION_TRIES, progress()
+                tries -= 1
+                if tries <= 0:
+                    raise
+                self._on_progress(f"{error}: the line lost replies; the motion is repeated")
+
+    def where_rad(self) -> Floats:
+        """Where the servos are; their torque is off, and stays off.
+
+        Raises:
+            BusError: a servo does not reply.
+
+        """
+        here = np.full(len(self._robot.servo_ids), np.nan)
+        for _ in range(_POSE_READS):
+            state = SafeLink(self._chain, self._limits, self._clock).read()
+            here = np.where(state.valid, state.position_rad, here)
+            if np.isfinite(here).all():
+                return here
+        silent = np.array(self._robot.servo_ids)[np.isnan(here)].tolist()
+        raise BusError(f"no reply from ID {', '.join(map(str, silent))}; check power and cable")
+
+    def wiggle(self, row: int) -> None:
+        """Turn one servo a little in its positive direction and back.
+
+        Raises:
+            InputError: it does not move.
+            DriverError: safety has latched.
+
+        """
+        self.retried(lambda: self._wiggle(row))
+
+    def _wiggle(self, row: int) -> None:
+        with self._link() as (link, here):
+            most = 0.0
+            for time_s, state in self._cycles(link, 2.0 * WIGGLE_S):
+                most = max(most, float(state.position_rad[row] - here[row]))
+                share = cubic(max(0.0, min(time_s, 2.0 * WIGGLE_S - time_s)) / WIGGLE_S)
+                self._write(link, here, row, here[row] + WIGGLE_RAD * share)
+        if most < MOVED_SHARE * WIGGLE_RAD:
+            raise InputError(
+                f"ID {self._robot.servo_ids[row]}: moved by {most:.2f} of {WIGGLE_RAD:g} rad: is "
+                f"it held, or too weak for its load? {_HANG_UP}, or raise --current"
+            )
+
+    @contextmanager
+    def straight(self, straight_rad: Floats) -> Iterator[Push]:
+        """Hold the body straight; gives a function that pushes one joint: see ``_push``."""
+        with self._link() as (link, here):
+            for row, zero_rad in enumerate(straight_rad):
+                self._go(link, here, row, float(here[row]), float(zero_rad))
+            yield partial(self._push, link, here)
+
+    def _push(
+        self,
+        link: SafeLink,
+        here: Floats,
+        row: int,
+        side: int,
+        reach_rad: float,
+        keep: Callable[[float | None], None],
+    ) -> None:
+        """Bend one joint one way and back.
+
+        A stop is where the servo pushes with all that it may and does not follow any more.
+
+        Args:
+            link: holds the others.
+            here: (J,) where they are, rad.
+            row: of the servo.
+            side: 1 or -1.
+            reach_rad: how far to look for a stop.
+            keep: gets the distance to the stop, rad, or None, before the joint goes back.
+
+        """
+        zero_rad = float(here[row])
+        reach_rad = min(reach_rad, RANGE_RAD - abs(zero_rad))
+        stop, pushing_s, last_s, goal = None, 0.0, 0.0, zero_rad
+        least_a = STOP_EFFORT * self._robot.current_limits_a[row]
+        for time_s, state in self._cycles(link, reach_rad / SWEEP_RAD_S + STOP_S):
+            far = side * (goal - float(state.position_rad[row]))
+            pushes = far > STOP_LAG_RAD and side * float(state.current_a[row]) >= least_a
+            pushing_s = pushing_s + time_s - last_s if pushes else 0.0
+            last_s = time_s
+            if pushing_s >= STOP_S:
+                stop = side * (float(state.position_rad[row]) - zero_rad)
+                break
+            if not pushes:
+                ahead = side * (goal - zero_rad) + SWEEP_RAD_S * _CYCLE_S
+                goal = zero_rad + side * min(ahead, reach_rad)
+            self._write(link, here, row, goal)
+        keep(stop)
+        self._go(link, here, row, goal, zero_rad)
+
+    def _go(self, link: SafeLink, here: Floats, row: int, start: float, end: float) -> None:
+        """Move one servo evenly, and let it come to rest."""
+        last_s = abs(end - start) / SWEEP_RAD_S
+        for time_s, _ in self._cycles(link, last_s + REST_S):
+            share = min(time_s / last_s, 1.0) if last_s > 0.0 else 1.0
+            self._write(link, here, row, start + share * (end - start))
+        here[row] = end
+
+    @contextmanager
+    def _link(self) -> Iterator[tuple[SafeLink, Floats]]:
+        """A safe link with torque on, and the pose that it holds; torque is off behind it.
+
+        Raises:
+            ChainError: a servo has an alarm, or is not as described.
+            LineLostError: servos did not reply.
+            DriverError: as ``SafeLink``.
+
+        """
+        stop = self._stop_requested
+        with SafeLink(self._chain, self._limits, self._clock, stop_requested=stop) as link:
+            try:
+                here = np.array(link.enable().position_rad)
+            except ChainError as error:
+                raise self._explained(error) from error
+            yield link, here
+
+    def _explained(self, error: ChainError) -> Exception:
+        """Error of a start: silence may be repeated, an alarm has advice."""
+        faults = () if self._chain.inspection is None else self._chain.inspection.faults
+        causes = {fault.cause for fault in faults}
+        if causes == {FaultCause.NO_ANSWER}:
+            return LineLostError(str(error))
+        if FaultCause.ALARM in causes:
+            return ChainError(f"{error}; {_HANG_UP}, then: snakewalk bus reboot --id ID")
+        return error
+
+    def _cycles(self, link: SafeLink, seconds: float) -> Iterator[tuple[float, JointState]]:
+        """Time since the first cycle and the state, at 50 Hz.
+
+        Raises:
+            LineLostError: replies were missing for too long.
+            SafetyTrippedError: safety has latched for another reason.
+
+        """
+        start_s = self._clock.now_s()
+        for tick in ticks(self._clock, _CYCLE_S, start_s + seconds):
+            state = self._read(link)
+            for _ in range(_READS - 1):
+                if state.valid.all() or link.tripped is not None:
+                    break
+                state = self._read(link)
+            if link.tripped is not None:
+                raise self._tripped(link.tripped, state)
+            self._state = state
+            yield tick.deadline_s - start_s, state
+
+    def _read(self, link: SafeLink) -> JointState:
+        try:
+            return link.read()
+        except SafetyTrippedError as error:
+            if isinstance(error.__cause__, BusError):  # the servos did not do what was asked
+                raise LineLostError(str(error)) from error
+            raise
+
+    def _tripped(self, reason: str, state: JointState) -> Exception:
+        """Error for a latch with this state."""
+        overloaded = np.flatnonzero(state.hardware_error & Alarm.OVERLOAD)
+        if len(overloaded):
+            ids = ", ".join(str(self._robot.servo_ids[row]) for row in overloaded)
+            return SafetyTrippedError(
+                f"{reason}; {_HANG_UP}, then: snakewalk bus reboot --id {ids}, and continue with "
+                "--resume"
+            )
+        if (state.age_s > _STALE_S).any():
+            return LineLostError(reason)
+        return SafetyTrippedError(reason)
+
+    def _write(self, link: SafeLink, here: Floats, row: int, goal_rad: float) -> None:
+        goals = here.copy()
+        goals[row] = goal_rad
+        stale = None
+        if self._state is not None:
+            stale = stale_fault(self._state, self._limits, self._clock.now_s())
+        try:
+            link.write(JointCommand(self._clock.now_s(), goals))
+        except SafetyTrippedError as error:
+            if stale is not None or isinstance(error.__cause__, BusError):
+                raise LineLostError(str(error)) from error
+            raise

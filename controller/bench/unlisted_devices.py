@@ -1,0 +1,216 @@
+"""Devices on a line that the robot does not list, and echoes of sent packets."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.probe import broadcast_ping
+from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import model_numbers
+from snakewalk.drivers.protocol.imu_table import imu_model
+from snakewalk.drivers.protocol.packet import (
+    BITS_PER_BYTE,
+    MAX_ID,
+    Instruction,
+    InstructionPacket,
+    encode_instruction,
+)
+from snakewalk.drivers.protocol.registers import FACTORY_BAUD, alarm_names
+
+FACTORY_ID = 1
+_PROTOCOL_1_BAUDS = (1_000_000, FACTORY_BAUD)
+"""Factory rates of AX and of older MX servos."""
+_PROTOCOL_1_IDS = 20
+"""Missing IDs that are asked in Protocol 1.0 (ours)."""
+_PROTOCOL_1_PING = 0x01
+_PROTOCOL_1_REPLY_BYTES = 6
+_ECHO_S = 0.02
+"""Longest delay of an echo, and of a reply in Protocol 1.0 (ours)."""
+
+
+def transmit_echo(port: BytePort, listed: Collection[int]) -> Finding | None:
+    """Finding if the host receives what it sends.
+
+    Args:
+        port: the line.
+        listed: IDs of the robot; another ID is pinged.
+
+    """
+    servo_id = next((i for i in range(MAX_ID, 0, -1) if i not in listed), 0)
+    packet = encode_instruction(InstructionPacket(servo_id, Instruction.PING, b""))
+    port.clearPort()
+    port.write(packet)
+    wire_s = 2 * len(packet) * BITS_PER_BYTE / port.getBaudRate()
+    data = port.read_until(len(packet), port.clock.now_s() + wire_s + _ECHO_S)
+    if data != packet:
+        return None
+    return Finding(
+        "transmit echo",
+        "fail",
+        "the host receives each byte that it sends: replies cannot be told from requests",
+        "switch the adapter's echo off, or use one that switches its receiver off while it sends",
+    )
+
+
+def protocol_1(port: BytePort, missing: Sequence[int], latency_s: float) -> Finding | None:
+    """Finding if servos reply to pings of Protocol 1.0; asks missing IDs and the factory's."""
+    asked = sorted({*missing[:_PROTOCOL_1_IDS], FACTORY_ID})
+    before = port.getBaudRate()
+    found: dict[int, list[int]] = {}
+    try:
+        for baud in dict.fromkeys((before, *_PROTOCOL_1_BAUDS)):
+            if baud == before or port.setBaudRate(baud):
+                found[baud] = [i for i in asked if _replies_in_protocol_1(port, i, latency_s)]
+    finally:
+        port.setBaudRate(before)
+    there = [
+        f"{shown_subject(ids, 'reply')} at {baud} baud" for baud, ids in found.items() if len(ids)
+    ]
+    if not there:
+        return None
+    return Finding(
+        "protocol",
+        "fail",
+        f"in Protocol 1.0 {', '.join(there)}",
+        "a run needs Protocol 2.0: set Protocol Type(13) to 2, or update the firmware with "
+        "DYNAMIXEL Wizard 2.0; AX servos have Protocol 1.0 only and cannot run",
+    )
+
+
+def _replies_in_protocol_1(port: BytePort, servo_id: int, latency_s: float) -> bool:
+    body = bytes((servo_id, 2, _PROTOCOL_1_PING))
+    packet = b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
+    port.clearPort()
+    port.write(packet)
+    byte_s = BITS_PER_BYTE / port.getBaudRate()
+    wire_s = (len(packet) + _PROTOCOL_1_REPLY_BYTES) * byte_s
+    data = port.read_until(_PROTOCOL_1_REPLY_BYTES, port.clock.now_s() + wire_s + latency_s + 2e-3)
+    is_status = len(data) == _PROTOCOL_1_REPLY_BYTES and data[:4] == bytes(
+        (0xFF, 0xFF, servo_id, 2)
+    )
+    return is_status and data != packet and data[5] == ~sum(data[2:5]) & 0xFF
+
+
+def unlisted(
+    port: BytePort, others: Mapping[int, PingReply], latency_s: float, *, noisy: bool
+) -> list[Finding]:
+    """Findings about devices that replied and are not the robot's: presence, IDs, alarms, torque.
+
+    Args:
+        port: the line.
+        others: their replies to a broadcast ping, by ID.
+        latency_s: how long adapter and driver may hold bytes back.
+        noisy: damage on this line shows nothing about IDs.
+
+    """
+    if not others:
+        return []
+    findings = [
+        Finding(
+            "servo IDs",
+            "warn",
+            f"{shown_subject(list(others), 'are')} on the bus and not in the robot",
+            "name a robot that has them with --robot, or take them off the bus",
+        )
+    ]
+    numbers, alarms, torque, shared = model_numbers(), [], [], []
+    for servo_id, reply in others.items():
+        model = numbers.get(reply.model_number)
+        if model is None:
+            name = imu_model(reply.model_number) or f"model number {reply.model_number}"
+            findings.append(
+                Finding(
+                    "servo IDs",
+                    "warn",
+                    f"ID {servo_id} is {name}, not a known servo model",
+                    "another device on this bus: it takes time on the wire only if it is asked",
+                )
+            )
+            continue
+        bus = DynamixelBus(port, model, latency_s=latency_s)
+        ping = bus.probe(servo_id)
+        if ping.doubled or (not noisy and ping.damaged == ping.requests):
+            shared.append(servo_id)
+            continue
+        alarm, is_on = _state(bus, servo_id, reply)
+        alarms += [] if alarm is None else [f"servo {servo_id}: {alarm}"]
+        torque += [servo_id] if is_on else []
+    if shared:
+        found = f"{shown_subject(shared, 'answer')} twice or damaged: two servos have this ID"
+        findings.append(Finding("duplicate IDs", "fail", found, _ALONE))
+    if alarms:
+        found = f"{', '.join(alarms)} (not in the robot)"
+        remedy = "remove the cause, then switch the servo power off, on"
+        findings.append(Finding("alarms", "fail", found, remedy))
+    if torque:
+        found = f"on at {shown_ids(torque)} (not in the robot)"
+        remedy = "a run does not switch it off: switch the power off, on, or take them off the bus"
+        findings.append(Finding("torque", "warn", found, remedy))
+    return findings
+
+
+_ALONE = "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
+
+
+def _state(bus: DynamixelBus, servo_id: int, reply: PingReply) -> tuple[str | None, bool]:
+    """Alarm of a servo, if it has one, and whether its torque is on."""
+    try:
+        registers = bus.read_each(servo_id, ("Torque Enable", "Hardware Error Status"))
+    except (BusError, InputError):
+        return ("the alert bit is set" if reply.alert else None), False
+    error = registers["Hardware Error Status"]
+    return (alarm_names(error) if error else None), bool(registers["Torque Enable"])
+
+
+def factory_servos(
+    port: BytePort,
+    found: Collection[int],
+    missing: Sequence[int],
+    *,
+    noisy: bool,
+    on_progress: Callable[[str], None],
+) -> Finding | None:
+    """Finding about servos at the factory's baud rate that the robot does not list there.
+
+    Args:
+        port: the line.
+        found: IDs that answer at the robot's rate; if all of them answer at the factory's as well,
+            the line has no baud rates.
+        missing: IDs of the robot that answer at no rate.
+        noisy: damage on this line shows nothing.
+        on_progress: gets the step.
+
+    """
+    before = port.getBaudRate()
+    if before == FACTORY_BAUD or not port.setBaudRate(FACTORY_BAUD):
+        return None
+    on_progress(f"{FACTORY_BAUD} baud")
+    try:
+        answer = broadcast_ping(port)
+    finally:
+        port.setBaudRate(before)
+    new = [reply.servo_id for reply in answer.replies]
+    if found and set(found) <= set(new):
+        return None
+    if not new and (noisy or not answer.noise_bytes):
+        return None
+    where = f"at {FACTORY_BAUD} baud, the factory's"
+    if not new or (answer.noise_bytes and not noisy):
+        return Finding(
+            "baud rate",
+            "fail",
+            f"damaged replies come {where}: several new servos with ID {FACTORY_ID}",
+            "connect them one by one: snakewalk bus set "
+            f"--port {port.name} --baud {FACTORY_BAUD} --id {FACTORY_ID} --new-id ID --new-baud "
+            f"{before}",
+        )
+    new_id = missing[0] if len(missing) == 1 else "ID"
+    return Finding(
+        "baud rate",
+        "fail" if missing else "warn",
+        f"{shown_subject(new, 'answer')} {where}, not at {before}: new from the factory?",
+        f"snakewalk bus set --port {port.name} --baud {FACTORY_BAUD} --id {new[0]} --new-id "
+        f"{new_id} --new-baud {before}",
+    )

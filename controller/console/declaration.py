@@ -1,0 +1,101 @@
+"""Declaration of a command, read from its file without importing what its body uses.
+
+``--help``, completion and the check of options need a command's signature, docstring and
+``@command`` only. A module of a command imports everything that it uses at its top, which costs
+seconds. This module therefore evaluates only the statements of the file that the declaration
+needs. The whole module is imported when the command runs.
+"""
+
+import ast
+import importlib.util
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+_COMMANDS: Final = ".commands."
+"""Part of the name of each module that holds a command, or options of several commands."""
+
+
+def declaration(target: str) -> Callable[..., Any] | None:
+    """Return a function with the signature, docstring and declaration of a command.
+
+    The function must not be called. Returns None if the source of the module is not available.
+
+    Args:
+        target: ``module:function``.
+
+    """
+    module, _, name = target.partition(":")
+    found = _names(module, {name}, is_declared=True)
+    return None if found is None else found[name]
+
+
+def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[str, Any] | None:
+    """Return names of a module's namespace, after the statements that they need.
+
+    ``is_declared`` leaves the bodies of the named functions out.
+    """
+    spec = importlib.util.find_spec(module)
+    file = Path("" if spec is None or spec.origin is None else spec.origin)
+    if file.suffix != ".py" or not file.is_file():
+        return None
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    defined = {name: node for node in tree.body for name in _defined(node)}
+    namespace: dict[str, Any] = {"__name__": module, "__file__": str(file)}
+    needed: dict[ast.stmt, set[str]] = {}
+    waiting = sorted(names)
+    while waiting:
+        name = waiting.pop()
+        node = defined.get(name)
+        if node is None:  # a builtin
+            continue
+        if is_declared and name in names and isinstance(node, ast.FunctionDef):
+            node.body = [ast.Expr(ast.Constant(ast.get_docstring(node, clean=False)))]
+        if node not in needed:
+            waiting += _used(node)
+        needed.setdefault(node, set()).add(name)
+    for node in sorted(needed, key=lambda each: each.lineno):
+        namespace |= _imported(node, needed[node])
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            code = ast.fix_missing_locations(ast.Module([node], []))
+            exec(compile(code, str(file), "exec"), namespace)
+    return namespace
+
+
+def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
+    """Return the names that an import statement provides, as far as they are needed."""
+    namespace: dict[str, Any] = {}
+    if isinstance(node, ast.ImportFrom):
+        wanted = [each for each in node.names if (each.asname or each.name) in names]
+        found = None
+        if _COMMANDS in (node.module or ""):
+            found = _names(node.module or "", {each.name for each in wanted})
+        if found is not None:
+            return {each.asname or each.name: found[each.name] for each in wanted}
+        node = ast.ImportFrom(node.module, wanted, node.level)
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        code = ast.fix_missing_locations(ast.Module([node], []))
+        exec(compile(code, "<imports of a command>", "exec"), namespace)
+        namespace.pop("__builtins__", None)
+    return namespace
+
+
+def _defined(node: ast.stmt) -> Iterator[str]:
+    """Yield the names that a statement of a module defines."""
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        for each in node.names:
+            yield each.asname or each.name.partition(".")[0]
+    elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+        yield node.name
+    elif isinstance(node, ast.Assign | ast.AnnAssign):
+        for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+            yield from (each.id for each in ast.walk(target) if isinstance(each, ast.Name))
+
+
+def _used(node: ast.stmt) -> set[str]:
+    """Return the names that a statement reads."""
+    return {
+        each.id
+        for each in ast.walk(node)
+        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)
+    }

@@ -1,0 +1,57 @@
+"""Kind of a device by its name; nothing is opened, so that no line of an adapter changes."""
+
+import os
+import stat
+from pathlib import Path
+
+from snakewalk.config.robot import SIMULATED
+from snakewalk.drivers.errors import PortError
+
+_OF_THE_FILE = "robot"
+"""Name for the ports in the robot's file."""
+_PSEUDO_TERMINALS = range(136, 144)
+"""Major numbers of Linux's pseudo-terminals, which have no entry below ``/sys/dev/char``."""
+
+
+def check_port_name(port: str | None) -> str | None:
+    """Return ``--port`` if no name in it is that of a file, a folder or another kind of device.
+
+    A name that does not exist passes; opening it reports that.
+
+    Raises:
+        PortError: one line per fault.
+
+    """
+    if port is None:
+        return None
+    names = [part.rpartition("=")[2] for part in port.split(",")] if "=" in port else [port]
+    faults = [fault for fault in map(_fault, names) if fault is not None]
+    if faults:
+        raise PortError(faults)
+    return port
+
+
+def _fault(name: str) -> str | None:
+    if name in (SIMULATED, _OF_THE_FILE):
+        return None
+    path = Path(name)
+    if path.is_symlink() and not path.exists():
+        return (
+            f"{name}: leads to {os.readlink(path)}, which is gone: its server has ended; start it "
+            "again"
+        )
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
+    if stat.S_ISCHR(found.st_mode) and _is_terminal(found.st_rdev):
+        return None
+    return f"{name}: is not a serial device; name one such as /dev/ttyUSB0"
+
+
+def _is_terminal(device: int) -> bool:
+    major, minor = os.major(device), os.minor(device)
+    if major in _PSEUDO_TERMINALS:
+        return True
+    subsystem = Path(f"/sys/dev/char/{major}:{minor}/subsystem")
+    return not subsystem.exists() or subsystem.resolve().name == "tty"

@@ -1,0 +1,32 @@
+"""The options of every command that moves a body."""
+
+from dataclasses import dataclass
+
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Film,
+    Force,
+    Json,
+    Ros,
+    RunFolder,
+    RunPort,
+    View,
+    ViewAt,
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunOptions:
+    """Where a run goes, who watches it, and how its results are shown.
+
+    A command declares all of these options by one parameter of this type.
+    """
+
+    port: RunPort = None
+    view: View = False
+    view_at: ViewAt = VIEW_AT
+    ros: Ros = False
+    film: Film = True
+    out: RunFolder = None
+    force: Force = False
+    as_json: Json = False

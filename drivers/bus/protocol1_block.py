@@ -1,0 +1,123 @@
+"""Group reads and writes of one register on a bus of Protocol 1.0 servos.
+
+Protocol 1.0 has no sync read, and an AX-12A has no bulk read. So each servo is asked by a READ of
+its own. Goals leave in one SYNC WRITE, to which no servo replies.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.servo_model import RegisterRow
+from snakewalk.drivers.bus.control_cycle import CycleCounters
+from snakewalk.drivers.bus.group_read import GroupReadReply
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
+from snakewalk.drivers.protocol.protocol1 import (
+    BROADCAST_ID,
+    Error1,
+    Instruction1,
+    Packet1,
+    Reader1,
+    frame,
+)
+
+_REFUSED = Error1.RANGE | Error1.CHECKSUM | Error1.INSTRUCTION
+"""Errors of a reply that contains no value."""
+_STATUS_BYTES = 6
+"""Length of a reply without parameters."""
+_QUIET_S = 2e-3
+"""Silence after which no reply to an older request is under way (ours)."""
+
+
+class Protocol1Block:
+    """One register of servos of Protocol 1.0; a ``GroupCycle``."""
+
+    fast = False
+    given_up_on: Sequence[str] = ()
+
+    def __init__(
+        self,
+        port: BytePort,
+        servo_ids: Sequence[int],
+        register: RegisterRow,
+        *,
+        latency_s: float = 0.003,
+    ) -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            port: a line with these servos.
+            servo_ids: IDs in the order of the values.
+            register: the same for all of them.
+            latency_s: time for servo and adapter besides the wire.
+
+        """
+        self.counters = CycleCounters()
+        self._port, self._ids, self._register = port, tuple(servo_ids), register
+        address, size = register.address, register.size
+        self._requests = [
+            frame(each, Instruction1.READ, bytes((address, size))) for each in self._ids
+        ]
+        self._latency_s = latency_s
+        self._sent_at_s = port.clock.now_s()
+        self._is_quiet = True
+
+    @property
+    def since_sent_s(self) -> float:
+        """How old the values of a read are at most, s."""
+        return self._port.clock.now_s() - self._sent_at_s
+
+    def write_goals(self, goals: NDArray[np.int32]) -> None:
+        """Send values (N,) of the register to all servos."""
+        size = self._register.size
+        entries = b"".join(
+            bytes((each,)) + int(goal).to_bytes(size, "little")
+            for each, goal in zip(self._ids, goals, strict=True)
+        )
+        params = bytes((self._register.address, size)) + entries
+        self._port.write(frame(BROADCAST_ID, Instruction1.SYNC_WRITE, params))
+
+    def read(self) -> GroupReadReply:
+        """Read the register of each servo.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        self._sent_at_s = self._port.clock.now_s()
+        count, size = len(self._ids), self._register.size
+        data = np.zeros((count, size), np.uint8)
+        error = np.zeros(count, np.uint8)
+        valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        for k in range(count):
+            packet = self._ask(k)
+            if packet is None:
+                continue
+            answered[k], error[k] = True, packet.instruction
+            if not packet.instruction & _REFUSED and len(packet.params) == size:
+                data[k], valid[k] = np.frombuffer(packet.params, np.uint8), True
+        flawless = bool(valid.all()) and not error.any()
+        return GroupReadReply(
+            data, valid, error, answered, clean=True, whole=flawless, flawless=flawless
+        )
+
+    def _ask(self, k: int) -> Packet1 | None:
+        """Ask one servo; its intact reply, or None.
+
+        After a reply that did not come the line is drained until it is quiet, so that a late one
+        is not taken for the reply to the next request.
+        """
+        port = self._port
+        if not self._is_quiet:
+            port.drain_until_quiet(_QUIET_S)
+        port.clearPort()
+        port.write(self._requests[k])
+        reply_bytes = _STATUS_BYTES + self._register.size
+        wire_s = (len(self._requests[k]) + reply_bytes) * BITS_PER_BYTE / port.getBaudRate()
+        raw = port.read_until(reply_bytes, port.clock.now_s() + wire_s + self._latency_s)
+        packets = [each for each in Reader1().feed(raw) if each.intact]
+        found = [each for each in packets if each.servo_id == self._ids[k]]
+        self._is_quiet = len(found) == 1
+        return found[0] if len(found) == 1 else None

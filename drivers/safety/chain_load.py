@@ -1,0 +1,113 @@
+"""Chain load: estimates of the current that the chain draws, and of the motors' windings.
+
+Servos report the current of their motors. A bridge draws less from the supply, by its duty: at the
+voltage V a motor at the current I and the speed w has the duty (R I + K w) / V. The windings are
+hotter than the housings, whose sensors react in minutes: the difference follows the loss R I^2 with
+a time constant of seconds.
+"""
+
+import math
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.drivers.types import JointState
+
+WINDING_SHARE = 1.0
+"""Thermal resistance from winding to housing, of that from housing to air in the model's file
+(ours). Catalogues of coreless motors of 16 mm give a quarter for the bare motor; in a servo the
+case cools it, and nobody has measured a servo's winding here."""
+WINDING_TIME_S = 12.0
+"""Time constant of the winding (ours); catalogues of coreless motors of 16 mm give 5 to 15 s."""
+LONGEST_STEP_S = 1.0
+"""A pause between two states counts as this much, s (ours)."""
+_FLOATS = readonly_array()
+
+
+class ChainLoad:
+    """Total current, charge and winding temperatures of J servos; ``update`` with every state."""
+
+    def __init__(self, motor: Floats) -> None:
+        """Start cold.
+
+        Args:
+            motor: (5, J) resistance, ohm; back-EMF, V s/rad; current at rest, A; heating of the
+                housing, K/W; nominal voltage, V. ``motor_columns`` returns it.
+
+        """
+        self._motor = motor
+        self.winding_k = np.zeros(motor.shape[1])
+        """(J,) by which the windings are hotter than their housings."""
+        self.current_a = 0.0
+        """Drawn by the chain now."""
+        self.charge_ah = 0.0
+        """Drawn since the start."""
+        self._time_s = math.inf
+
+    def update(self, state: JointState) -> None:
+        """Evaluate a state."""
+        step_s = min(max(state.time_s - self._time_s, 0.0), LONGEST_STEP_S)
+        self._time_s = state.time_s
+        share = -math.expm1(-step_s / WINDING_TIME_S)
+        self.current_a = _draw(
+            *(state.current_a, state.velocity_rad_s, state.voltage_v, self._motor),
+            *(WINDING_SHARE, share, self.winding_k),
+        )
+        self.charge_ah += self.current_a * step_s / 3600.0
+
+    def winding_c(self, state: JointState) -> Floats:
+        """(J,) temperatures of the windings; NaN where the housing's is not known."""
+        return np.asarray(state.temperature_c + self.winding_k)
+
+
+def motor_columns(robot: RobotConfig) -> Floats:
+    """(5, J) motors of a robot, as ``ChainLoad`` needs them; zeros for a model without a record."""
+    columns = []
+    for facts in robot.servo_records:
+        motor = facts.motor
+        if motor is None:
+            columns.append((0.0, 0.0, 0.0, 0.0, robot.servo.supply_v))
+            continue
+        no_load_rad_s = motor.no_load_rpm * math.tau / 60.0
+        columns.append(
+            (
+                motor.nominal_v / motor.stall_current_a,
+                motor.nominal_v / no_load_rad_s,
+                motor.standby_a,
+                motor.winding_k_per_w,
+                motor.nominal_v,
+            )
+        )
+    return np.array(columns).T.copy()
+
+
+@compiled(
+    f"float64({', '.join([_FLOATS] * 3)}, float64[:, ::1], float64, float64, float64[::1])",
+    makes_arrays=False,
+)
+def _draw(
+    current_a: Floats,
+    velocity_rad_s: Floats,
+    voltage_v: Floats,
+    motor: Floats,
+    winding_share: float,
+    time_share: float,
+    winding_k: Floats,
+) -> float:
+    """Current that all bridges draw, A; ``winding_k`` (J,) moves towards its equilibrium.
+
+    A value that was not read (NaN) counts as zero, a voltage as the nominal one.
+    """
+    total_a = 0.0
+    for k in range(len(current_a)):
+        resistance_ohm, emf_v_s, standby_a = motor[0, k], motor[1, k], motor[2, k]
+        amps = current_a[k] if np.isfinite(current_a[k]) else 0.0
+        speed = velocity_rad_s[k] if np.isfinite(velocity_rad_s[k]) else 0.0
+        volts = voltage_v[k] if voltage_v[k] > 0.0 else motor[4, k]
+        duty = min(abs(resistance_ohm * amps + emf_v_s * speed) / volts, 1.0)
+        total_a += standby_a + duty * abs(amps)
+        target_k = winding_share * motor[3, k] * resistance_ohm * amps * amps
+        winding_k[k] += time_share * (target_k - winding_k[k])
+    return total_a

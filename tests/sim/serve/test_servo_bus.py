@@ -1,0 +1,139 @@
+"""The fixture's bus: registers and loads set by a test, lateness in reports, and light imports."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.sim.line.clock import SimClock
+from snakewalk.sim.serve.pty import IDLE_S, LATE_S, PtyServer
+from snakewalk.sim.serve.pytest_plugin import _BUSES, pytest_runtest_makereport
+from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.helpers.bus import a_line
+
+MakeBus = Callable[..., ServoBus]
+
+
+def test_registers_and_loads_are_set_in_simulated_time(servo_bus: MakeBus) -> None:
+    bus = servo_bus("1,4,7")
+    bus.set("homing offset", 100, ids=[4])
+    bus.set("Drive Mode", 1)
+    assert bus["Homing Offset"].tolist() == [0, 100, 0]
+    assert bus["Drive Mode"].tolist() == [1, 1, 1]
+    start = bus["Present Position"].copy()
+    bus.load(0.5, ids=[1])
+    bus.line.clock.advance(0.2)
+    moved = abs(bus["Present Position"] - start) > 50
+    assert moved.tolist() == [True, False, False]
+
+
+def test_registers_are_set_while_the_bus_is_served(servo_bus: MakeBus) -> None:
+    bus = servo_bus("1-2")
+    assert bus.lateness is None
+    assert bus.path
+    bus.set("Homing Offset", -7, ids=[2])
+    assert bus["Homing Offset"].tolist() == [0, -7]
+    with pytest.raises(InputError, match="no servo has ID 9; the bus has 1, 2"):
+        bus.load(0.1, ids=[9])
+    assert bus.lateness is not None
+    assert bus.lateness.startswith("bus.path: served up to ")
+
+
+def test_protocol_1_servos_have_the_same_calls(servo_bus: MakeBus) -> None:
+    bus = servo_bus("3:AX-12A")
+    bus.set("Torque Limit", 500)
+    assert bus["Torque Limit"].tolist() == [500]
+
+
+def test_a_misspelt_register_has_the_closest_names(servo_bus: MakeBus) -> None:
+    bus = servo_bus("1")
+    with pytest.raises(KeyError, match=r"Goal Positon: no register .* did you mean Goal Position"):
+        _ = bus["Goal Positon"]
+    with pytest.raises(InputError, match="did you mean Homing Offset"):
+        bus.set("Homing Ofset", 3)
+    with pytest.raises(InputError, match="Present Position: is measured, not set"):
+        bus.set("Present Position", 3)
+    with pytest.raises(ControlTableError):
+        bus.set("Torque Enable", 300)
+
+
+def test_the_server_measures_how_late_it_came() -> None:
+    clock = SimClock()
+    with PtyServer(a_line(), clock) as server:
+        clock.advance(IDLE_S)
+        server.step(0.0)
+        assert server.latest_s == pytest.approx(0.0)
+        clock.advance(0.3)
+        server.step(0.0)
+        assert server.latest_s == pytest.approx(0.3 - IDLE_S)
+        assert server.missed_s == pytest.approx(0.3 - LATE_S)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.212])
+def test_the_report_of_a_failed_test_states_how_late_the_bus_was(late_s: float) -> None:
+    """It was `assert -3001 == 0` without a reason."""
+    bus = ServoBus("1")
+    try:
+        assert bus.path
+        server = bus._server
+        assert server is not None
+        server.serve = lambda stopped: None  # type: ignore[method-assign]
+        bus._stop.set()
+        server.latest_s = late_s
+        item = SimpleNamespace(stash=pytest.Stash())
+        item.stash[_BUSES] = [bus]
+        report = SimpleNamespace(when="call", failed=True, sections=[])
+        hook = pytest_runtest_makereport(item)  # type: ignore[arg-type]
+        next(hook)
+        with pytest.raises(StopIteration):
+            hook.send(SimpleNamespace(get_result=lambda: report))
+        ((title, text),) = report.sections
+        assert title == "servo_bus"
+        assert text.startswith("bus.path: served up to ")
+        if late_s:
+            assert "up to 212 ms late" in text
+            assert "fewer workers (-n)" in text
+    finally:
+        bus.close()
+
+
+LEFT_OUT = ("numba", "llvmlite", "scipy", "networkx", "typer", "rich", "mcap", "dynamixel_sdk")
+IMPORTS = f"""
+import json, sys
+before = set(sys.modules)
+class LeftOut:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {LEFT_OUT!r}:
+            raise ModuleNotFoundError(name, name=name)
+sys.meta_path.insert(0, LeftOut())
+import snakewalk.sim.serve.pytest_plugin
+plugin = sorted(name for name in sys.modules if name.startswith("snakewalk"))
+from snakewalk.sim.serve.servo_bus import ServoBus
+ServoBus("1-2")["Present Position"]
+known = {{name.partition(".")[0] for name in set(sys.modules) - before}}
+known = [name for name in known if not name.startswith("_sysconfigdata")]
+print(json.dumps([plugin, sorted(set(known) - set(sys.stdlib_module_names))]))
+"""
+LIGHT = {
+    *("snakewalk", "numpy", "pydantic", "pydantic_core", "typing_extensions"),
+    *("annotated_types", "typing_inspection", "serial"),
+    *("pytest", "_pytest", "pluggy", "iniconfig", "packaging", "pygments", "py"),
+}
+"""Packages that a light install has; all others must wait until a feature needs them."""
+
+
+def test_the_fixture_imports_only_packages_of_the_light_install() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True, timeout=120
+    )
+    plugin, known = json.loads(done.stdout)
+    assert plugin == [
+        *("snakewalk", "snakewalk.sim", "snakewalk.sim.serve"),
+        "snakewalk.sim.serve.pytest_plugin",
+    ]
+    assert set(known) <= LIGHT
