@@ -92,7 +92,9 @@ class ServoChain:
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
         self.checks_in_read = True
-        """Whether ``read`` calls ``check_servos``; a ``SafeLink`` calls it after the goals."""
+        """Whether every ``read`` calls ``check_servos``; a ``SafeLink`` calls it after the goals.
+
+        A ``read`` behind another calls it in any case."""
         self._bus = bus
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
@@ -113,6 +115,7 @@ class ServoChain:
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
         self._has_time: bool | None = None
+        self._has_written = False
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
@@ -353,8 +356,9 @@ class ServoChain:
             self._has_time = is_alone and reply.complete
             if self._liveness is not None:
                 self._check(self._liveness.check_goals, self._has_time)
-            if self.checks_in_read:
+            if self.checks_in_read or not self._has_written:
                 self.check_servos()
+            self._has_written = False
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
         if imu is not None:
@@ -431,6 +435,7 @@ class ServoChain:
                 "stopped the servos"
             )
         self._send_goals(command.goal_rad)
+        self._has_written = True
         self._sent_at_s = self._clock.now_s()
 
     def explain(self, joint: int) -> str | None:

@@ -7,6 +7,7 @@ on the wire, so a goal beyond a limit is seen where it counts.
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.bus.chain_bus import GroupCycle
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.liveness import SLOW_EVERY
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -105,13 +107,13 @@ class ChangeWatch:
         self.noticed = self.ended_otherwise = 0
         self.unnoticed: list[str] = []
         chain.on_event = self.report
-        check = chain._check_liveness
+        make_check = chain._check
 
-        def watched(*, has_time: bool) -> None:
+        def watched(check: Callable[..., GroupCycle | None], has_time: bool) -> None:
             self._pending |= self._changed()
-            check(has_time=has_time)
+            make_check(check, has_time)
 
-        chain._check_liveness = watched  # type: ignore[method-assign]
+        chain._check = watched  # type: ignore[method-assign]
 
     def report(self, line: str) -> None:
         """Keep a line of the chain or of its recovery."""

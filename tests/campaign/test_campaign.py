@@ -79,7 +79,7 @@ def test_any_line_of_a_sound_chain_is_a_false_alarm(mocker: MockerFixture) -> No
 
 
 def test_a_change_that_the_chain_does_not_notice_is_counted(mocker: MockerFixture) -> None:
-    mocker.patch.object(ServoChain, "_check_liveness")
+    mocker.patch.object(ServoChain, "_check")
     assert run_scenario(("I gain",), 0, 160).unnoticed
 
 

@@ -153,10 +153,16 @@ ROWS = [
     ("run flat-square --port robot", "the file of yaw16 has no [[ports]]"),
     ("run flat-square --port .", ".: is not a serial device"),
     ("run flat-square --pose imu", "pose: robot yaw16 has no IMU"),
-    ("run pose.toml", "pose.toml:3: pose a guess: unknown; valid: camera, imu, joints, simulator"),
+    (
+        "run pose.toml",
+        "pose.toml:3: pose a guess: unknown; valid: camera, ros, imu, joints, simulator, udp",
+    ),
     ("plan pose.toml", "pose.toml:3: pose a guess: unknown"),
     ("trials pose.toml --seeds 1", "pose a guess: unknown"),
-    ("run flat-square --pose gps", "pose gps: unknown; valid: camera, imu, joints, simulator"),
+    (
+        "run flat-square --pose gps",
+        "pose gps: unknown; valid: camera, ros, imu, joints, simulator, udp",
+    ),
     ("run flat-square --out /proc/x", "/proc/x: cannot be made"),
     ("run flat-square --log-file nosuch/x.log", "--log-file nosuch/x.log: No such file"),
     ("run flat-square --motion=", "nothing after --motion: fill it"),

@@ -91,7 +91,6 @@ NOT_RUN = {
     "pose check": "needs a sender: tests/docs/test_rehearsal_page.py",
     "rehearse": "makes whole runs: tests/controller/rehearsal",
     "judge": "needs a served run: tests/controller/rehearsal",
-    "--pose-out": "needs a client: tests/controller/rehearsal",
 }
 """Command, or option, and why no line with it is run here."""
 

@@ -32,8 +32,8 @@ def test_a_simulated_body_on_level_ground_comes_near_its_prediction_without_an_a
         "flat-slalom", motion="serpenoid", waypoints_m=((2.0, 0.0),), time_limit_s=30.0
     )
     finished = execute(prepared, tmp_path)
-    speed_m_s, predicted_m_s = finished.summary.speed_m_s, finished.summary.predicted_speed_m_s
-    assert speed_m_s is not None
-    assert predicted_m_s is not None
-    assert 0.9 < speed_m_s / predicted_m_s < 1.03
+    eta, predicted = finished.summary.eta, finished.summary.eta_predicted
+    assert eta is not None
+    assert predicted is not None
+    assert 0.9 < eta / predicted < 1.03
     assert finished.outcome.alarms == 0

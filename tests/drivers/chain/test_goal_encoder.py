@@ -24,6 +24,7 @@ JOINTS = JointUnits(
     ONES > 0.0,
     ONES * UNITS.stall_current_a,
     np.full(3, UNITS.full_pwm, np.int32),
+    ONES < 0.0,
 )
 both_ways = pytest.mark.parametrize(
     "loop", [encode_goals, encode_goals.py_func], ids=["compiled", "interpreted"]
