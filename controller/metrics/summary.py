@@ -91,7 +91,7 @@ class RunSummary:
     """Speed of the centre of mass, along the path or along the axis of the gait
     (``controller.metrics.travel``)."""
     predicted_speed_m_s: float | None
-    """Of the links along themselves, while the pulse moves: ``eta_predicted`` times its speed."""
+    """Forward speed of the links along themselves, while the pulse moves; compare with ``eta``."""
     planned_speed_m_s: float | None
     pulse_m_s: float | None
     """Mean speed at which the shape travels along the body."""
