@@ -1,0 +1,1 @@
+"""Reference bytes of whole runs: ``python -m tests.reference``."""
