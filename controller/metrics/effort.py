@@ -18,7 +18,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.displacement import full_rate_span_s
 from snakewalk.controller.metrics.ground_contact import CLEAR_M
-from snakewalk.controller.metrics.travel import travel
+from snakewalk.controller.metrics.travel import Travel, travel
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
@@ -110,22 +110,24 @@ def effort(record: RunRecord) -> Effort:
     if steady.sum() < 2 or not np.isfinite(pose.links_m[steady]).all():
         return unknown
     start_s, stop_s = float(pose.time_s[steady][0]), float(pose.time_s[steady][-1])
-    electrical_j, _ = energy_track(record).between(start_s, stop_s)
+    energy = energy_track(record)
+    electrical_j, _ = energy.between(start_s, stop_s)
     span_s = stop_s - start_s
     moved_m = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
     return Effort(
         electrical_j / span_s,
-        *costs_of_transport(record),
+        *costs_of_transport(record, energy, travel(record)),
         float(moved_m[2]) / span_s,
         _slip(record, steady),
     )
 
 
-def costs_of_transport(record: RunRecord) -> tuple[float, float]:
-    """Return the electrical and mechanical cost of transport of a run, over its ``travel``."""
-    moved = travel(record)
+def costs_of_transport(
+    record: RunRecord, energy: EnergyTrack, moved: Travel
+) -> tuple[float, float]:
+    """Return the electrical and mechanical cost of transport of a run, over its travel."""
     carried_j = weight_n(record.header.robot) * moved.distance_m
-    electrical_j, mechanical_j = energy_track(record).between(moved.start_s, moved.end_s)
+    electrical_j, mechanical_j = energy.between(moved.start_s, moved.end_s)
     return cost_of_transport(electrical_j, carried_j), cost_of_transport(mechanical_j, carried_j)
 
 

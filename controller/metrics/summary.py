@@ -211,14 +211,14 @@ def _summary(record: RunRecord) -> RunSummary:
     off_path = path_error_m(record)
     moving = pose.pulse_m_s > 0.0
     chosen = moving if moving.any() else np.ones(len(moving), dtype=bool)
-    predicted = _mean(pose.predicted_speed_m_s[chosen])
-    pulse = _mean(pose.pulse_m_s[moving])
+    predicted, pulse = _mean(pose.predicted_speed_m_s[chosen]), _mean(pose.pulse_m_s[moving])
     tracking = tracking_error_rad(cycle)
     current = _peak(np.abs(cycle.current_a))
     use = wire_use(record)
     energy = energy_track(record)
     whole = energy.between(-np.inf, np.inf)
-    costs, along_links = costs_of_transport(record), _mean(pose.speed_m_s[chosen])
+    moved, along_links = travel(record), _mean(pose.speed_m_s[chosen])
+    costs = costs_of_transport(record, energy, moved)
     return RunSummary(
         run=header.run.name,
         motion=header.run.motion if header.run.gait is None else f"gait {header.run.gait.name}",
@@ -241,7 +241,7 @@ def _summary(record: RunRecord) -> RunSummary:
         travelled_m=_digits(travelled_m(pose)),
         path_error_mean_m=_digits(_mean(off_path)),
         path_error_max_m=_digits(_peak(off_path)),
-        speed_m_s=_digits(travel(record).speed_m_s),
+        speed_m_s=_digits(moved.speed_m_s),
         predicted_speed_m_s=_digits(predicted),
         planned_speed_m_s=_digits(header.plan.predicted_speed_m_s),
         pulse_m_s=_digits(pulse),
