@@ -39,7 +39,26 @@ def decoded(data: bytes, sender: str, arrival_s: float) -> ArrivedPose:
         return ArrivedPose(arrival_s, sender, fault)
 
 
-class UdpFeed:
+class PoseQueue:
+    """Poses that one thread receives and another takes."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._waiting: deque[ArrivedPose] = deque(maxlen=MOST_WAITING)
+
+    def put(self, data: bytes, sender: str) -> None:
+        """Keep the pose of a datagram that arrives now, or why it contains none."""
+        self._waiting.append(decoded(data, sender, self._clock.now_s()))
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived since the last call."""
+        found = []
+        while self._waiting:
+            found.append(self._waiting.popleft())
+        return found
+
+
+class UdpFeed(PoseQueue):
     """Receives datagrams in a thread of its own, which notes when each arrived.
 
     Raises:
@@ -48,8 +67,7 @@ class UdpFeed:
     """
 
     def __init__(self, host: str, port: int, clock: Clock) -> None:
-        self._clock = clock
-        self._waiting: deque[ArrivedPose] = deque(maxlen=MOST_WAITING)
+        super().__init__(clock)
         try:
             family = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0][0]
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
@@ -66,13 +84,6 @@ class UdpFeed:
         self._thread = threading.Thread(target=self._receive, daemon=True)
         self._thread.start()
 
-    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
-        """Return the poses that have arrived since the last call."""
-        found = []
-        while self._waiting:
-            found.append(self._waiting.popleft())
-        return found
-
     def close(self) -> None:
         """Stop receiving."""
         self._ended.set()
@@ -86,8 +97,7 @@ class UdpFeed:
                     data, address = self._socket.recvfrom(MOST_BYTES)
                 except ConnectionError:  # an answer to a datagram that was sent earlier
                     continue
-                sender = f"{address[0]}:{address[1]}"
-                self._waiting.append(decoded(data, sender, self._clock.now_s()))
+                self.put(data, f"{address[0]}:{address[1]}")
 
 
 class UdpSender:

@@ -7,8 +7,6 @@ A process of its own subscribes to the topic and passes each pose on in the form
 import os
 import re
 import threading
-from collections import deque
-from collections.abc import Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Final
@@ -20,8 +18,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.child_process import pipe, start
 from snakewalk.controller.console.command import plugin
-from snakewalk.controller.pose.sample import ArrivedPose
-from snakewalk.controller.pose.udp_feed import MOST_WAITING, decoded
+from snakewalk.controller.pose.udp_feed import PoseQueue
 from snakewalk.controller.ros.ros_options import READY, RosOptions
 from snakewalk.controller.run.external.external_source import ExternalSource
 from snakewalk.drivers.clock import Clock
@@ -41,12 +38,11 @@ class RosPose(ExternalSource):
     ) -> list[str]:
         """Return why the source cannot work in a run, one line per fault."""
         require_extra("pose: ROS needs", "rclpy")
-        faults = super().faults(run, robot, world, on_port=on_port)
-        try:
-            check_topic((run.pose or "").partition(":")[2])
-        except InputError as error:
-            faults += error.faults
-        return faults
+        return super().faults(run, robot, world, on_port=on_port)
+
+    def check_argument(self, argument: str) -> None:
+        """Check the name of the topic."""
+        check_topic(argument)
 
     def open_feed(self, argument: str, clock: Clock) -> "RosPoseFeed":
         """Subscribe to the topic.
@@ -71,7 +67,7 @@ def check_topic(topic: str) -> None:
         raise InputError(f"--pose ros:{topic}: expected ros:/TOPIC; for example ros:/tracker/pose")
 
 
-class RosPoseFeed:
+class RosPoseFeed(PoseQueue):
     """Receives the poses of a topic from the process that subscribes to it.
 
     Raises:
@@ -80,8 +76,8 @@ class RosPoseFeed:
     """
 
     def __init__(self, topic: str, clock: Clock) -> None:
-        self._topic, self._clock = topic, clock
-        self._waiting: deque[ArrivedPose] = deque(maxlen=MOST_WAITING)
+        super().__init__(clock)
+        self._topic = topic
         self._end, far = pipe()
         self._process = start(_serve, far, topic, daemon=True)
         far.close()
@@ -94,13 +90,6 @@ class RosPoseFeed:
             raise InputError(f"pose ros:{topic}: {said.decode()}")
         self._thread = threading.Thread(target=self._receive, daemon=True)
         self._thread.start()
-
-    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
-        """Return the poses that have arrived since the last call."""
-        found = []
-        while self._waiting:
-            found.append(self._waiting.popleft())
-        return found
 
     def close(self) -> None:
         """End the process."""
@@ -116,8 +105,7 @@ class RosPoseFeed:
     def _receive(self) -> None:
         with suppress(EOFError, OSError):
             while True:
-                data = self._end.recv_bytes()
-                self._waiting.append(decoded(data, self._topic, self._clock.now_s()))
+                self.put(self._end.recv_bytes(), self._topic)
 
 
 def _serve(line: Connection, topic: str) -> None:

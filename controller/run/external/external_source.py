@@ -1,5 +1,6 @@
 """External pose sources of a run: poses that arrive from another program."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import Protocol
@@ -31,12 +32,13 @@ class ClosingFeed(PoseFeed, Protocol):
         ...
 
 
-class ExternalSource:
+class ExternalSource(ABC):
     """Base of pose sources whose poses another program measures; a subclass opens the feed."""
 
     name: str
     """As ``--pose`` names it."""
 
+    @abstractmethod
     def open_feed(self, argument: str, clock: Clock) -> ClosingFeed:
         """Open the feed that the text after the colon means.
 
@@ -44,17 +46,33 @@ class ExternalSource:
             InputError: it cannot be opened.
 
         """
-        raise NotImplementedError
+
+    @abstractmethod
+    def check_argument(self, argument: str) -> None:
+        """Check the text after the colon; nothing is opened.
+
+        Raises:
+            InputError: it does not mean a feed.
+
+        """
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
-        """Return a fault where the servos are simulated in this process: no tracker sees them."""
-        if on_port:
-            return []
-        return [
-            f"pose: {self.name}: measures a robot on a port; add --port, or take pose simulator"
-        ]
+        """Return why the source cannot work in a run, one line per fault.
+
+        No tracker sees servos that are simulated in this process.
+        """
+        faults = []
+        if not on_port:
+            faults.append(
+                f"pose: {self.name}: measures a robot on a port; add --port, or take pose simulator"
+            )
+        try:
+            self.check_argument((run.pose or "").partition(":")[2])
+        except InputError as error:
+            faults += error.faults
+        return faults
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
         """Return that the source measures the pose, with the noise of the robot's [pose]."""
@@ -117,16 +135,9 @@ class UdpPose(ExternalSource):
 
     name = "udp"
 
-    def faults(
-        self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
-    ) -> list[str]:
-        """Return why the source cannot work in a run, one line per fault."""
-        faults = super().faults(run, robot, world, on_port=on_port)
-        try:
-            parse_address((run.pose or "").partition(":")[2])
-        except InputError as error:
-            faults += error.faults
-        return faults
+    def check_argument(self, argument: str) -> None:
+        """Check port and host."""
+        parse_address(argument)
 
     def open_feed(self, argument: str, clock: Clock) -> UdpFeed:
         """Bind the address.
