@@ -285,7 +285,7 @@ _TIMES: Final = ("time_s", "deadline_s", "arrival_s")
 
 
 def _earlier(table: Table, start_s: float) -> Table:
-    names = {field.name for field in fields(table)}
-    return replace(
-        table, **{name: getattr(table, name) - start_s for name in _TIMES if name in names}
-    )
+    known: Any = table
+    names = [name for name in _TIMES if hasattr(table, name)]
+    earlier: Table = replace(known, **{name: getattr(known, name) - start_s for name in names})
+    return earlier
