@@ -80,7 +80,9 @@ class RunSummary:
     waypoints_counted: int
     """Waypoints that the run itself counted."""
     waypoint_times_s: tuple[float, ...] | None
+    """Since torque on."""
     duration_s: float | None
+    """Time from torque on to torque off."""
     path_length_m: float | None
     paths_replanned: int
     """How often the path was replanned."""
@@ -192,9 +194,9 @@ def summary(record: RunRecord) -> RunSummary:
     """Return the numbers of a run, from its log alone.
 
     Where the pose is dead-reckoned, the numbers that need a measured pose are None and have a
-    counterpart ``dead_reckoned_*``.
+    counterpart ``dead_reckoned_*``. Times count from the moment torque was switched on.
     """
-    numbers = _summary(record)
+    numbers = _summary(record.from_torque_on())
     if numbers.is_measured:
         return numbers
     changes: dict[str, Any] = {
@@ -235,7 +237,7 @@ def _summary(record: RunRecord) -> RunSummary:
         waypoints_reached=len(times),
         waypoints_counted=int(pose.target.max(initial=0)),
         waypoint_times_s=tuple(known for t in times if (known := _digits(t)) is not None),
-        duration_s=_digits(record.end_s),
+        duration_s=_digits(record.duration_s),
         path_length_m=_digits(length_m(header.plan.path_m)),
         paths_replanned=len(record.paths) - 1,
         travelled_m=_digits(travelled_m(pose)),
