@@ -42,7 +42,7 @@ class _Edges(NamedTuple):
 
 
 def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats) -> Floats | None:
-    """(n, 2) corners of the cheapest safe way along cells, both ends included; None: there is none.
+    """(n, 2) corners of the cheapest safe way along cells, both ends included; None without a way.
 
     Two corners that follow each other are joined by a straight safe piece. An unsafe start is
     joined straight to the nearest safe node from which the end can be reached.

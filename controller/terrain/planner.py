@@ -40,7 +40,7 @@ class TerrainPlanner:
             ground: None for a flat floor.
             config: limits of safe ground.
             exact: search all safe ground where the graph's nodes find no way or no smooth one;
-                else such points are refused, which takes less time.
+                else such points are refused, which needs less time.
 
         """
         self._exact = exact

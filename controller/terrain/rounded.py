@@ -15,7 +15,7 @@ from snakewalk.controller.terrain.path import SplinePath
 
 _STEP_M: Final = 0.01
 _MOST_M: Final = 1.0
-"""Of a side that a bend uses (ours)."""
+"""Longest part of a side that a bend uses (ours)."""
 _HALVINGS: Final = 10
 
 
