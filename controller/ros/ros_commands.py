@@ -1,5 +1,6 @@
 """Commands of a ROS graph: messages that are checked and kept until the run asks for them."""
 
+import math
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -19,11 +20,13 @@ from snakewalk.controller.motion.command import (
     POINTS_MAX,
     TIMEOUT_S,
     Command,
+    GoTo,
     HoldStill,
     JointGoals,
     JointTrajectory,
     Refused,
     StartGait,
+    Velocity,
 )
 from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
 from snakewalk.controller.ros.ros_options import RosOptions
@@ -31,7 +34,7 @@ from snakewalk.controller.run.factory import gait_by_name, is_gait
 
 _PENDING_MAX: Final = 16
 """Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that
-newer ones of the same joints follow."""
+newer ones of the same joints follow, and velocities and goal poses that newer ones follow."""
 QUEUE: Final = QoSProfile(depth=10)
 
 
@@ -44,6 +47,8 @@ class CommandTopics:
         self._lock = threading.Lock()
         self.has_begun = False
         """Whether the run has begun; commands that come before are rejected."""
+        self.frame = ""
+        """Frame of the run's poses, in which goal poses are accepted."""
         if options.commands:
             for kind, topic, take in (
                 ("sensor_msgs/msg/JointState", "robot_joint_command", self.on_goals),
@@ -53,8 +58,11 @@ class CommandTopics:
                     self.on_trajectory,
                 ),
                 ("std_msgs/msg/String", "robot_gait", self.on_gait),
+                ("geometry_msgs/msg/Twist", "cmd_vel", self.on_velocity),
             ):
                 self._subscribe(kind, topic, take)
+        if options.goals:
+            self._subscribe("geometry_msgs/msg/PoseStamped", "goal_pose", self.on_goal_pose)
 
     def take(self) -> list[Command]:
         """Return the commands since the last call."""
@@ -156,6 +164,36 @@ class CommandTopics:
             command = Refused(error.faults[0])
         self._command(command, None, "gait")
 
+    def on_velocity(self, message: Any) -> None:
+        """Keep a velocity along the body and a rate of turn."""
+        linear, angular = message.linear, message.angular
+        others = {
+            "linear.y": linear.y,
+            "linear.z": linear.z,
+            "angular.x": angular.x,
+            "angular.y": angular.y,
+        }
+        wrong = [name for name, value in others.items() if value != 0.0]
+        command: Command = Velocity(linear.x, angular.z)
+        if wrong:
+            command = Refused(
+                f"velocity: {wrong[0]} is not 0; send linear.x and angular.z, and 0 elsewhere"
+            )
+        self._command(command, None, "velocity")
+
+    def on_goal_pose(self, message: Any) -> None:
+        """Keep the place of a goal pose; a walk has no heading at its end."""
+        header, at = message.header, message.pose.position
+        command: Command = GoTo(at.x, at.y)
+        if header.frame_id != self.frame:
+            command = Refused(
+                f"goal pose: frame {header.frame_id[:NAME_MAX]!r}; this run's poses have the "
+                f"frame {self.frame!r}: transform the goal"
+            )
+        elif not (math.isfinite(at.x) and math.isfinite(at.y)):
+            command = Refused("goal pose: x or y is not a number")
+        self._command(command, header.stamp, "goal pose")
+
     def _command(self, command: Command, stamp: Any, what: str) -> None:
         """Keep a command for the run; a stamp of 0 says nothing."""
         if not self.has_begun:
@@ -174,10 +212,16 @@ class CommandTopics:
                 )
         with self._lock:
             last = self.pending[-1] if self.pending else None
-            newer = isinstance(command, JointGoals) and isinstance(last, JointGoals)
-            if newer and last.joints == command.joints:  # type: ignore[union-attr]
+            if last is not None and _replaces(command, last):
                 self.pending.pop()
             self.pending.append(command)
+
+
+def _replaces(command: Command, last: Command) -> bool:
+    """Whether a command makes the one before it void."""
+    if isinstance(command, JointGoals) and isinstance(last, JointGoals):
+        return command.joints == last.joints
+    return isinstance(command, Velocity | GoTo) and type(command) is type(last)
 
 
 def _rows(values: list[Any]) -> Floats | None:

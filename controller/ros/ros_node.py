@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,19 +20,23 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.ros import RosConfig
 from snakewalk.controller.exchange.ros_messages import (
     DIAGNOSTICS,
     ERROR,
+    FRAMES,
     HEAD_POSE,
     IMU,
     JOINT_GOALS,
     JOINT_STATES,
+    ODOMETRY,
     OK,
     PATH,
     TYPES,
     WARNING,
     RosMessages,
     Row,
+    pose_frame,
 )
 from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_commands import QUEUE, CommandTopics, in_words, message_type
@@ -43,6 +48,7 @@ from snakewalk.controller.runlog.topics import (
     ConfigTable,
     CycleTable,
     EventTable,
+    PoseSourceTable,
     PoseTable,
     SlowTable,
 )
@@ -52,6 +58,7 @@ from snakewalk.drivers.safety.stop_button import PressedButton
 NAME: Final = "snakewalk"
 _CYCLE: Final = CycleTable.topic.name
 _SLOW: Final = SlowTable.topic.name
+_POSE_SOURCE: Final = PoseSourceTable.topic.name
 _WAIT_S: Final = 0.05
 _DIAGNOSTICS_S: Final = 1.0
 _OFFSET_SPAN_S: Final = 2.0
@@ -65,11 +72,13 @@ _TOPICS: Final = {
     JOINT_STATES: ("robot_joint_states", QUEUE),
     JOINT_GOALS: ("robot_joint_goals", QUEUE),
     HEAD_POSE: ("head_pose", QUEUE),
+    ODOMETRY: ("odom", QUEUE),
+    FRAMES: (FRAMES, QUEUE),
     IMU: ("imu", QUEUE),
     PATH: ("path", _LATCHED),
     DIAGNOSTICS: (DIAGNOSTICS, QUEUE),
 }
-"""Topic of a bag to name and quality of service of a node's; all nodes share diagnostics."""
+"""Topic of a bag to name and quality of service of a node's; all nodes share the absolute names."""
 
 
 def serve(line: socket.socket, options: RosOptions) -> None:
@@ -171,6 +180,7 @@ class RobotNode:
         self._publishers: dict[str, Any] = {}
         self._header: Header | None = None
         self._newest: dict[str, Mapping[str, Any]] = {}
+        self._tf = "none"
         self._button: PressedButton | None = None
         self._told_s = -_DIAGNOSTICS_S
         self._said: dict[str, tuple[int, str]] = {}
@@ -210,7 +220,13 @@ class RobotNode:
 
     def _begin(self, record: RunRecord) -> None:
         self._header = record.header
-        for topic in (JOINT_STATES, JOINT_GOALS, HEAD_POSE, DIAGNOSTICS):
+        self.commands.frame = pose_frame(record.header)
+        self._tf = (record.header.robot.ros or RosConfig()).tf
+        if self._tf != "none" and find_spec("tf2_msgs") is None:
+            self._tf = "none"
+            self._said["tf"] = WARNING, "tf2_msgs is not installed: /tf is not published"
+        frames = () if self._tf == "none" else (FRAMES,)
+        for topic in (JOINT_STATES, JOINT_GOALS, HEAD_POSE, ODOMETRY, *frames, DIAGNOSTICS):
             self._publisher(topic)  # others find them before the first cycle
         self._end.ask()
         if record.header.run.waypoints_m:
@@ -225,8 +241,21 @@ class RobotNode:
         record = self._record({topic: [row] for topic, row in rows.items()})
         self._publish(self._messages.joints(record))
         self._publish(self._messages.head_poses(record))
+        self._publish(self._messages.odometry(record, *self._deviations(rows.get(_POSE_SOURCE))))
+        if self._tf != "none" and len(record.pose.time_s):
+            self._publish(self._messages.transforms(record, links=self._tf == "links"))
         self._publish(self._messages.imu(record))
         self._said["cycle"] = OK, f"late by {1e3 * rows[_CYCLE]['lateness_s']:.1f} ms"
+
+    def _deviations(self, source: Mapping[str, Any] | None) -> tuple[float | None, float | None]:
+        """Return the standard deviations of position and heading of a cycle; None: unknown."""
+        assert self._header is not None
+        evidence = self._header.pose_evidence
+        if source is None:
+            return evidence.position_m, evidence.heading_rad
+        if source["fault"]:
+            return None, None
+        return source["position_sd_m"], source["heading_sd_rad"]
 
     def _record(self, rows: Mapping[str, list[Mapping[str, Any]]]) -> RunRecord:
         return record_of(rows, complete=False, note="", header=self._header)
