@@ -60,8 +60,8 @@ def run(
         bool,
         typer.Option(
             "--live",
-            help="waypoints are set in the page as it walks (--view); at the last one it holds, "
-            "and waits for more",
+            help="waypoints are set during the run, in the page (--view) or by ROS (--ros); at "
+            "the last one it holds, and waits for more",
         ),
     ] = False,
     observe: Observe = None,
