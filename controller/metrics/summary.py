@@ -19,7 +19,7 @@ from snakewalk.controller.metrics.path_error import (
 )
 from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
-from snakewalk.controller.metrics.travel import travel
+from snakewalk.controller.metrics.travel import Travel, travel
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Header, RunRecord
 
@@ -150,6 +150,10 @@ class RunSummary:
     """How the poses are known: ``measured``, ``estimated`` or ``dead-reckoned``."""
     pose_source: str
     """``simulator``, ``camera``, ``joints``, ``imu``, or the name of a plug-in."""
+    pose_position_sd_m: float | None
+    """Standard deviation of the head's position; None where the source does not state it."""
+    pose_heading_sd_rad: float | None
+    """The same of its heading."""
     pose_is_simulated: bool
     """Whether the simulator measured the poses, or moved the body that was measured."""
     port_is_pseudo_terminal: bool | None
@@ -165,6 +169,12 @@ class RunSummary:
     dead_reckoned_eta: float | None = None
     dead_reckoned_electrical_cost_of_transport: float | None = None
     dead_reckoned_mechanical_cost_of_transport: float | None = None
+
+    @property
+    def evidence(self) -> dict[str, object]:
+        """Kind, source and uncertainty of the pose, as results state them."""
+        keys = ("pose_evidence", "pose_source", "pose_position_sd_m", "pose_heading_sd_rad")
+        return {key: getattr(self, key) for key in keys}
 
     @property
     def is_measured(self) -> bool:
@@ -190,13 +200,15 @@ _OF_THE_POSE = (
 """Numbers that need a measured pose."""
 
 
-def summary(record: RunRecord) -> RunSummary:
+def summary(record: RunRecord, moved: Travel | None = None) -> RunSummary:
     """Return the numbers of a run, from its log alone.
+
+    ``moved`` is its travel, where it was computed before.
 
     Where the pose is dead-reckoned, the numbers that need a measured pose are None and have a
     counterpart ``dead_reckoned_*``. Times count from the moment torque was switched on.
     """
-    numbers = _summary(record.from_torque_on())
+    numbers = _summary(record, travel(record) if moved is None else moved)
     if numbers.is_measured:
         return numbers
     changes: dict[str, Any] = {
@@ -206,7 +218,7 @@ def summary(record: RunRecord) -> RunSummary:
     return replace(numbers, **changes)
 
 
-def _summary(record: RunRecord) -> RunSummary:
+def _summary(record: RunRecord, moved: Travel) -> RunSummary:
     header, cycle, pose, walk = record.header, record.cycle, record.pose, record.walk
     waypoints, times = len(header.plan.waypoints_m), waypoint_times_s(pose, header.plan)
     tripped = next((e.text for e in record.events if e.kind == "trip"), None)
@@ -219,7 +231,7 @@ def _summary(record: RunRecord) -> RunSummary:
     use = wire_use(record)
     energy = energy_track(record)
     whole = energy.between(-np.inf, np.inf)
-    moved, along_links = travel(record), _mean(pose.speed_m_s[chosen])
+    along_links = _mean(pose.speed_m_s[chosen])
     costs = costs_of_transport(record, energy, moved)
     return RunSummary(
         run=header.run.name,
@@ -236,7 +248,7 @@ def _summary(record: RunRecord) -> RunSummary:
         waypoints=waypoints,
         waypoints_reached=len(times),
         waypoints_counted=int(pose.target.max(initial=0)),
-        waypoint_times_s=tuple(known for t in times if (known := _digits(t)) is not None),
+        waypoint_times_s=tuple(float(f"{t - record.torque_on_s:.6g}") for t in times),
         duration_s=_digits(record.duration_s),
         path_length_m=_digits(length_m(header.plan.path_m)),
         paths_replanned=len(record.paths) - 1,
@@ -282,6 +294,8 @@ def _summary(record: RunRecord) -> RunSummary:
         battery=_battery(record),
         pose_evidence=str(header.pose_evidence.kind),
         pose_source=header.pose_evidence.source,
+        pose_position_sd_m=header.pose_evidence.position_m,
+        pose_heading_sd_rad=header.pose_evidence.heading_rad,
         pose_is_simulated=header.initial_pose is not None,
         port_is_pseudo_terminal=header.port_is_pseudo_terminal,
         assumptions=_assumptions(header),
