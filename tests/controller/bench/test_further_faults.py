@@ -1,4 +1,4 @@
-"""Faults beyond the first table of ``docs/reference/doctor-faults.md``, and sound buses that give no alarm.
+"""Further faults of ``docs/reference/doctor-faults.md``, and sound buses that give no alarm.
 
 The kinds are the rows of the second table of that page.
 """

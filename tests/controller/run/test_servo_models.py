@@ -37,7 +37,7 @@ time_limit_s = 8.0
 
 
 def _from_pages() -> dict[str, str]:
-    """Robot files as ``docs/configuration.md`` and ``docs/how-to/servos-of-other-kinds.md`` print them."""
+    """Robot files as ``configuration.md`` and ``how-to/servos-of-other-kinds.md`` print them."""
     found = {}
     for name, page in (("my-robot", "configuration"), ("my-xl430", "how-to/servos-of-other-kinds")):
         text = (_DOCS / f"{page}.md").read_text(encoding="utf-8")
