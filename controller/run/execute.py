@@ -16,8 +16,8 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.metrics.summary import RunSummary, summary
-from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.metrics.travel import Travel, travel
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (

@@ -219,6 +219,7 @@ def test_bad_options_are_told_before_any_work(
         capture_recording(options)
     assert not (tmp_path / "t.npz").exists()
 
+
 def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path) -> None:
     """Some frames of a colour film are exactly grey: they become two-dimensional arrays."""
     folder = tmp_path / "film"
