@@ -177,10 +177,10 @@ class BodyScene:
         length_m = self._robot.length_m
         at_m = centre_m + 0.15 * length_m * forward
         eye_m = centre_m + length_m * (-0.65 * forward + 0.35 * left + np.array([0.0, 0.0, 0.55]))
-        clients = [client.camera for client in self._server.get_clients().values()]
-        for camera in (self._server.initial_camera, *clients):
-            camera.position = tuple(eye_m)
-            camera.look_at = tuple(at_m)
+        first = self._server.initial_camera
+        first.position, first.look_at = tuple(eye_m), tuple(at_m)
+        for client in self._server.get_clients().values():
+            client.camera.position, client.camera.look_at = tuple(eye_m), tuple(at_m)
 
     def _links(
         self, name: str, colors: np.ndarray, radii_m: Floats, share: float
