@@ -11,6 +11,7 @@ from snakewalk.controller.metrics.effort import (
     energy_track,
 )
 from snakewalk.controller.metrics.ground_contact import lifted_by_current
+from snakewalk.controller.metrics.ground_slope import carrier_share
 from snakewalk.controller.metrics.path_error import (
     length_m,
     path_error_m,
@@ -140,6 +141,8 @@ class RunSummary:
     """Of the walk over the state library."""
     states_visited: int
     decisions_without_candidates: int
+    carrier_share: float | None
+    """Share of the decisions that ride on a wide wave, for steep ground; None if unknown."""
     state_library: dict[str, int]
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
@@ -289,6 +292,7 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         decisions=len(walk.time_s),
         states_visited=int(walk.visited.max(initial=0)),
         decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
+        carrier_share=_digits(carrier_share(record)),
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
         battery=_battery(record),

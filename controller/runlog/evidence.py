@@ -41,7 +41,7 @@ class PoseEvidence:
     def text(self) -> str:
         """The evidence for a reader: ``measured by simulator``."""
         by = "from" if self.kind is Kind.DEAD_RECKONED else "by"
-        off = "" if self.position_m is None else f", {100.0 * self.position_m:.1f} cm"
+        off = "" if not self.position_m else f", {100.0 * self.position_m:.1f} cm"
         return f"{self.kind} {by} {self.source}{off}"
 
     @property

@@ -389,6 +389,7 @@ class Drive:
                 heading_error_rad=d.heading_error_rad,
                 ramp_rad=d.ramp_rad,
                 candidates=d.candidates,
+                carrier_rad=d.carrier_rad,
             )
         if self._slip_monitor.update(path.pulse_m_s * period_s, self._displacement_m):
             self._alarms += 1
