@@ -39,7 +39,7 @@ _LOGGER: Final = logging.getLogger("snakewalk")
 _FLUSH_S: Final = 0.5
 _BATCH: Final = 32
 """Rows that are printed together (ours): about ten cycles. Between two cycles of a run on servos
-the processor's caches lose the code that prints. A row in a batch costs a third of the time."""
+the processor's caches forget the code that prints; in a batch a row costs a third of the time."""
 _CHUNK_BYTES: Final = 1 << 20
 
 
