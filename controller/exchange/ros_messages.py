@@ -304,8 +304,14 @@ class RosMessages:
 
     def _diagnostics(self, record: RunRecord) -> Iterator[Row]:
         for k, time_s in enumerate(record.slow.time_s.tolist()):
-            status = self.servos(record, k)
+            status = [self.pose_status(record.header), *self.servos(record, k)]
             yield self.diagnostics(time_s, status)
+
+    def pose_status(self, header: Header) -> Any:
+        """Return the status of the pose: how it is known, from which source, how accurately."""
+        evidence = header.pose_evidence
+        level = OK if evidence.is_measured else WARNING
+        return self.status("pose", level, evidence.text, header.robot.name, evidence.texts)
 
     def servos(self, record: RunRecord, k: int) -> list[Any]:
         """Return the status of every servo in a row of ``/slow``."""

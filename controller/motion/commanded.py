@@ -317,6 +317,6 @@ class Commanded:
         follow.left_s = None
 
     def _blend(self, source: MotionSource) -> Blend:
-        """Join a source to what the joints do now."""
+        """Join a source to the current motion of the joints."""
         now = self._mode.now()
         return Blend(now.angle_rad, now.speed_rad_s, source, Pace.limit(self._robot))

@@ -283,6 +283,7 @@ class RobotNode:
             self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, {})
             for name, (level, text) in self._said.items()
         ]
+        status.append(self._messages.pose_status(self._header))
         if _SLOW in self._newest:
             status += self._messages.servos(self._record({_SLOW: [self._newest[_SLOW]]}), 0)
         self._publisher(DIAGNOSTICS).publish(self._messages.diagnostics(run_s, status).message)

@@ -280,6 +280,9 @@ class WalkTable(Table):
     ramp_rad: Annotated[Floats, Column("bend added to cancel it")]
     candidates: Annotated[Ints, Column("states within the heading tolerance", "integer")]
     eta_q: Annotated[Floats, _optional("quasi-static gain of the state")]
+    carrier_rad: Annotated[
+        Floats, _optional("amplitude of the wide wave on which the state rides; 0: none")
+    ]
 
 
 @topic("/friction")

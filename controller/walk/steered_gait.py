@@ -124,6 +124,7 @@ class SteeredGait(OnCourse):
         course, centre_m = self.course, view.centre_m[:2]
         heading_rad = view.heading_rad
         course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self.cycles)
+        course.continue_planning()
         if course.complete:
             self._stop_profile.stop()
         else:
