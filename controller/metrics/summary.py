@@ -296,14 +296,21 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
         battery=_battery(record),
-        pose_evidence=str(header.pose_evidence.kind),
-        pose_source=header.pose_evidence.source,
-        pose_position_sd_m=header.pose_evidence.position_m,
-        pose_heading_sd_rad=header.pose_evidence.heading_rad,
-        pose_is_simulated=header.initial_pose is not None,
-        port_is_pseudo_terminal=header.port_is_pseudo_terminal,
-        assumptions=_assumptions(header),
+        **_evidence(header),
     )
+
+
+def _evidence(header: Header) -> dict[str, Any]:
+    """Return the fields of a summary about pose, port and assumptions."""
+    return {
+        "pose_evidence": str(header.pose_evidence.kind),
+        "pose_source": header.pose_evidence.source,
+        "pose_position_sd_m": header.pose_evidence.position_m,
+        "pose_heading_sd_rad": header.pose_evidence.heading_rad,
+        "pose_is_simulated": header.initial_pose is not None,
+        "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
+        "assumptions": _assumptions(header),
+    }
 
 
 def _assumptions(header: Header) -> dict[str, dict[str, object]]:

@@ -17,6 +17,7 @@ from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.metrics.travel import Travel, travel
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (
@@ -113,7 +114,7 @@ def execute(
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
-    waypoint_commands: Callable[[], Iterable[str]] | None = None,
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
@@ -163,7 +164,7 @@ class _Execution:
     shadow: bool
     confirm: Callable[[str], bool] | None
     stop_requested: Callable[[], str | None]
-    waypoint_commands: Callable[[], Iterable[str]] | None
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None
     on_progress: OnProgress
     on_event: OnEvent
 
@@ -317,7 +318,7 @@ def _stop_output(
 def _live(
     prepared: PreparedRun,
     source: MotionSource,
-    commands: Callable[[], Iterable[str]],
+    commands: Callable[[], Iterable[str | Refused]],
     on_event: OnEvent,
 ) -> LiveCourse:
     """Put a person in charge of the waypoints.

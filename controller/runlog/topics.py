@@ -234,7 +234,7 @@ class PoseTable(Table):
     target: Annotated[Ints, Column("index of the next waypoint", "integer", default=0)]
 
 
-@topic("/pose_source", is_optional=True, watched="")
+@topic("/pose_source", is_optional=True, watched="newest")
 class PoseSourceTable(Table):
     """State of an external pose source; times are those of the cycles."""
 

@@ -36,15 +36,20 @@ def policy_trials(
     ],
     world: Annotated[
         list[str] | None,
-        typer.Option(help="may be given again; default: flat", autocompletion=completion.WORLDS),
+        typer.Option(
+            help="shipped world, or a TOML file; may be repeated; default: flat",
+            autocompletion=completion.WORLDS,
+        ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 10,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per row")] = 10,
     first_seed: FirstSeed = 0,
-    seconds: Annotated[float, typer.Option(min=5.0, max=3600.0, help="of each run")] = 12.0,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    seconds: Annotated[
+        float, typer.Option(min=5.0, max=3600.0, help="duration of each run in seconds")
+    ] = 12.0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     as_json: Json = False,
 ) -> None:
-    """Compare policies with gaits: the same seeds move start, friction and supply of all."""
+    """Compare policies with gaits: each seed varies start, friction and supply equally for all."""
     require_extra("trials need", "mujoco")
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
     rows = list(dict.fromkeys(rows))  # what is given twice is run once

@@ -27,7 +27,8 @@ def view(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="LOG [LOG]", help="log.mcap of a run, or the .part of a killed one; or of two"
+            metavar="LOG [LOG]",
+            help="log.mcap of a run, or the .part of a killed one; or of two runs",
         ),
     ],
     view_at: ViewAt = VIEW_AT,
@@ -36,7 +37,7 @@ def view(
 
     Two logs are shown side by side, or over each other if they have the same ground.
 
-    A run is shown while it lasts by --view of run, gait run and play.
+    To watch a run, use --view of run, gait run and play.
     """
     host, port = host_and_port(view_at)
     if len(logs) > _MOST:
