@@ -45,6 +45,8 @@ class RecordingFacts:
     licence: str
     frames: int
     frames_left_out: int
+    frames_missing: int
+    """Frames between the first and the last for which the file has no row."""
     frames_bridged: int
     """Frames in which a missing keypoint was set on the curve through the others."""
     head_and_tail_swapped: int
@@ -67,6 +69,10 @@ class RecordingFacts:
     states_refused: dict[str, int]
     """Shapes refused, by reason, each counted for the first reason only."""
     pace: PaceFacts
+    every_nth_frame: int = 1
+    """Frames of the camera from one row of the file to the next."""
+    notes: tuple[str, ...] = ()
+    """Lines about parts that the reader left out or changed."""
 
     def to_dict(self) -> dict[str, object]:
         """Return all facts, those of the pace among the others, for JSON."""
@@ -111,6 +117,7 @@ def examine(
         licence=track.licence,
         frames=track.frames,
         frames_left_out=track.dropped,
+        frames_missing=track.absent,
         frames_bridged=track.bridged,
         head_and_tail_swapped=track.flips,
         rate_hz=round(track.rate_hz, 3),
@@ -129,6 +136,8 @@ def examine(
         states_kept=len(kept),
         states_refused=refused,
         pace=_pace(track, shapes, wave.frequency_hz, robot),
+        every_nth_frame=track.every,
+        notes=track.notes,
     )
     return ExaminedRecording(track, facts)
 

@@ -105,6 +105,7 @@ def _show(facts: "RecordingFacts") -> None:
     pace = facts.pace
     length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
     bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""
+    missing = f"{facts.frames_missing} missing in the file, " if facts.frames_missing else ""
     assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
     if facts.times_uneven:
         assumed = " (frames came at uneven times; bodies put between them)"
@@ -113,6 +114,7 @@ def _show(facts: "RecordingFacts") -> None:
     rows = {
         "source": "; ".join(dict.fromkeys((str(facts.source), str(facts.licence)))),
         "frames": f"{facts.frames}, {facts.frames_left_out} left out, "
+        f"{missing}"
         f"{bridged}"
         f"{facts.rate_hz:g} Hz{assumed}, {length}",
         "wave": f"{facts.waves_on_body} on the body, {facts.wave_hz} Hz, "
@@ -135,6 +137,10 @@ def _show(facts: "RecordingFacts") -> None:
         rows["warning"] = f"head and tail change places {facts.head_and_tail_swapped} times"
     elif facts.time_towards_head is not None and facts.time_towards_head > 0.5:
         rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
+    if facts.every_nth_frame > 1:
+        rows["rows"] = f"every {facts.every_nth_frame}th frame of the camera"
+    if facts.notes:
+        rows["changed by the reader"] = "\n".join(facts.notes)
     table = Table(title=facts.recording, title_justify="left", box=None, show_header=False)
     for key, text in rows.items():
         table.add_row(key, text)

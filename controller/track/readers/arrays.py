@@ -28,6 +28,7 @@ ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "lice
     "rate_assumed",
     "verdict",
     "time_s",
+    "notes",
 }
 """The arrays that are read of an .npz; others, such as the widths of a body, stay in the file."""
 
@@ -50,6 +51,7 @@ def save_track(path: Path, track: Track) -> None:
         licence=track.licence,
         rate_assumed=track.rate_assumed,
         verdict=np.array([str(one) for one in verdict]),
+        **({"notes": np.array(track.notes)} if track.notes else {}),
     )
 
 
@@ -146,6 +148,7 @@ def track_from_arrays(
             status=_status(held, len(points)),
             source=_text(held, "source", "not stated"),
             licence=_text(held, "licence", "not stated"),
+            notes=[str(one) for one in held.get("notes", np.array([])).reshape(-1)],
         )
     if "skeletons" in held:
         points = _floats(file, "skeletons", held["skeletons"])
