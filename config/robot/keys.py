@@ -53,9 +53,9 @@ class RobotKeys(Strict):
     link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="of each link")
     yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
     pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
-    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="what a plan may ask")
-    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="what a plan may ask")
-    torque_limit_n_m: float = Field(2.0, gt=0.0, description="what a plan may ask of a joint")
+    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="limit of a plan")
+    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="limit of a plan")
+    torque_limit_n_m: float = Field(2.0, gt=0.0, description="limit of a plan, at a joint")
     limbs: tuple[LimbsConfig, ...] = Field(
         (), description="pairs of legs, from the tail to the head: tables [[limbs]]"
     )
