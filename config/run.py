@@ -75,7 +75,7 @@ class WalkConfig(Strict):
     proposals: int = Field(
         120, ge=1, le=1000, description="first states in the order of W: the smoothest of them ..."
     )
-    candidates: int = Field(6, ge=1, le=50, description="... so many, are rolled out")
+    candidates: int = Field(6, ge=1, le=50, description="number of these states to simulate")
     climb_progress: float = Field(
         0.65, ge=0.0, le=1.0, description="under this predicted progress states ride on wide waves"
     )
@@ -103,8 +103,8 @@ class WalkConfig(Strict):
     )
     finds_friction: bool = Field(
         True,
-        description="rollouts and tries reckon with the friction that the motion so far tells of, "
-        "where the file's is out; false: always with the file's",
+        description="use the friction estimated during the run if the file's value is wrong; "
+        "false: always use the file's value",
     )
     pitch: PitchConfig = PitchConfig()
     fallback: bool = Field(
@@ -282,8 +282,8 @@ class RunConfig(Strict):
     )
     pose: PoseName | None = Field(
         None,
-        description="what measures the head; default: the simulator, on servos the robot's IMU, "
-        "or the joints",
+        description="source of the head's pose; default: the simulator, or on servos the "
+        "robot's IMU, else the joints",
     )
     deviation: DeviationConfig = Field(
         DeviationConfig(),
@@ -307,7 +307,7 @@ class RunConfig(Strict):
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
-            raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
+            raise ValueError("gait.ashore: needs waypoints; add waypoints_m or remove ashore")
         planned = self.motion == "repertoire" and not self.repertoire
         if (planned or self.motion in WALKS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")

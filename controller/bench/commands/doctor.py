@@ -32,7 +32,6 @@ from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.port_map import is_port_map, port_map_text
 
-
 DoctorPort = Annotated[
     str | None,
     typer.Option(

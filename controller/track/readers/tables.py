@@ -24,7 +24,7 @@ def load_csv(
         with file.open(newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if row]
     except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{file}: is no recording; known: {KNOWN}") from None
+        raise InputError(f"{file}: is not a recording; known: {KNOWN}") from None
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
     if is_deeplabcut(rows):
