@@ -65,12 +65,12 @@ class CameraConfig(Strict):
         "undone; default: none",
     )
     shade: float = Field(
-        0.5, ge=0.0, le=0.9, description="largest part of the floor's light that a shadow removes"
+        0.5, ge=0.0, le=0.9, description="largest share of the floor's light that a shadow removes"
     )
     learn_s: float = Field(
         60.0, ge=0.0, le=86_400.0,
-        description="time constant with which the floor around the body is learnt, so that objects "
-        "that stay become floor; 0: the floor of the picture",
+        description="time constant for learning the floor around the body, so that objects "
+                    "that stay there become floor; 0: the floor stays as in its picture",
     )  # fmt: skip
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"

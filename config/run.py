@@ -312,7 +312,7 @@ class RunConfig(Strict):
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
-            raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
+            raise ValueError("gait.ashore: needs waypoints; add waypoints_m or remove ashore")
         planned = self.motion == "repertoire" and not self.repertoire
         if (planned or self.motion in WALKS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")

@@ -194,10 +194,9 @@ class RobotConfig(JointValues):
         for model, facts in records.items():
             if facts.protocol == 1:
                 raise ValueError(
-                    f"servo: model {model} speaks Protocol 1.0, which has no group read and no "
-                    "watchdog that a run could rely on; a run needs a servo of Protocol 2.0, such "
-                    "as XL430-W250 (for programs of your own: snakewalk bus serve --servos "
-                    "1-4:AX-12A)"
+                    f"servo: model {model} speaks Protocol 1.0, which lacks group reads and a "
+                    "watchdog; choose a servo of Protocol 2.0, such as XL430-W250 (for your "
+                    "own programs: snakewalk bus serve --servos 1-4:AX-12A)"
                 )
             missing = facts.missing_for_a_run()
             if missing:

@@ -56,8 +56,8 @@ def wire(budget: WireBudget, rate_hz: float) -> Finding:
     """Whether the cycle fits the wire."""
     kind = "fast sync read" if budget.fast else "sync read"
     found = (
-        f"{budget.servos} servos, {budget.baud} baud, {kind}: {budget.cycle_s * 1e3:.2f} ms a "
-        f"cycle, at most {budget.limit_hz:.0f} Hz; {rate_hz:g} Hz take "
+        f"{budget.servos} servos, {budget.baud} baud, {kind}: {budget.cycle_s * 1e3:.2f} ms per "
+        f"cycle, at most {budget.limit_hz:.0f} Hz; {rate_hz:g} Hz use "
         f"{budget.share(rate_hz):.0%} of the wire"
     )
     if budget.share(rate_hz) > 1.0:

@@ -69,7 +69,7 @@ def check_print(out: Path) -> None:
 
     """
     if out.suffix.lower() not in (".pdf", ".png"):
-        raise InputError(f"{out}: what is printed ends in .pdf or .png")
+        raise InputError(f"{out}: the ending must be .pdf or .png")
 
 
 def write_print(out: Path, pages: list[Image]) -> None:

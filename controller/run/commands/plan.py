@@ -77,7 +77,9 @@ def plan(
     if with_ is not None:
         planner = require("planner", with_, "--with")
         if motion is not None or track is not None or seed is not None or set_:
-            raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
+            raise InputError(
+                "--with repertoire: does not use --motion, --track, --seed or --set; leave them out"
+            )
         planner.load()(
             run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,

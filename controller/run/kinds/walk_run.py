@@ -286,9 +286,9 @@ class WalkRun(PathRun):
         pulse_m_s = behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * self.robot.length_m
         if self.path.length_m > pulse_m_s * self.run.time_limit_s:
             lines.append(
-                f"a path of {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s takes "
-                f"{self.path.length_m / pulse_m_s:.0f} s at least, but time_limit_s is "
-                f"{self.run.time_limit_s:g}: it will not be walked to its end"
+                f"path: {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s need at "
+                f"least {self.path.length_m / pulse_m_s:.0f} s, but time_limit_s is "
+                f"{self.run.time_limit_s:g}; the run will not reach its end"
             )
         if self.run.mapping is not None:
             lines.append(
