@@ -8,7 +8,6 @@ import pytest
 pytest.importorskip("cv2")
 
 from pydantic import ValidationError
-from tests.controller.cameras.tag_scene import ASLANT, Scene, error, joints, on_slope, tagged
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
@@ -24,6 +23,7 @@ from snakewalk.controller.pose.dead_reckoning import DeadReckoning
 from snakewalk.controller.pose.external_pose import ExternalPose
 from snakewalk.controller.pose.sample import PoseSample, UnusablePoseError, turned
 from snakewalk.drivers.types import JointState
+from tests.controller.cameras.tag_scene import ASLANT, Scene, error, joints, on_slope, tagged
 
 SLOPES = [(0.0, 0.0, 0.0), (4.0, -12.0, 20.0), (-15.0, 8.0, -60.0), (20.0, 0.0, 90.0)]
 
