@@ -14,7 +14,7 @@ Place = tuple[float, float]
 
 
 class CameraConfig(Strict):
-    """A camera that looks down on a level floor (docs/overhead-camera.md)."""
+    """A camera above known ground, or one that sees tags (docs/overhead-camera.md)."""
 
     width_px: int = Field(640, ge=64, le=4096)
     height_px: int = Field(480, ge=64, le=4096)
