@@ -10,7 +10,7 @@ PLUGINS = (
     ("command", "init", "Write run.toml, robot.toml and world.toml to change, with their schemas for editors.", "snakewalk.controller.run.commands.init:init", "The job"),
     ("command", "list", "List what is shipped and installed: runs, robots, worlds, recordings, policies, plug-ins.", "snakewalk.controller.run.commands.list:list_", "The job"),
     ("command", "plan", "Judge a run on paper: library, path and joint limits, with no servo and no simulator.", "snakewalk.controller.run.commands.plan:plan", "The job"),
-    ("command", "play", "Play a recording on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.play:play", "Motion"),
+    ("command", "play", "Play a recording or joint angles on servos or in the simulator; leaves a log and a film.", "snakewalk.controller.run.commands.play:play", "Motion"),
     ("command", "pose check", "Show position, axes, rate, delay and noise of an external pose; 1 if something is wrong.", "snakewalk.controller.run.commands.pose_check:check", ""),
     ("command", "run", "Run a job on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.run:run", "The job"),
     ("command", "schema", "Print the JSON Schema of a TOML file, with which editors complete and check it.", "snakewalk.controller.run.commands.schema:schema", "The job"),
