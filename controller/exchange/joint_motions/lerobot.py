@@ -1,6 +1,7 @@
 """Joint angles of an episode of a LeRobot dataset: a folder with ``meta/info.json``.
 
-Needs pyarrow. Versions 2.0 and 2.1 have one Parquet file for each episode, version 3.0 several episodes in one.
+Needs pyarrow. Versions 2.0 and 2.1 have one Parquet file for each episode; version 3.0 has several
+episodes in one file.
 """
 
 from pathlib import Path
