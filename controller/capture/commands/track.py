@@ -31,10 +31,10 @@ from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
 )
-from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.generated import EMBEDDED
 from snakewalk.controller.track.readers.keypoints import ALL, choice_of
 from snakewalk.controller.track.readers.load import check_rate
+from snakewalk.controller.track.readers.writers import SUFFIXES, write_track
 
 
 @command(
@@ -61,7 +61,9 @@ def track(
     plane: Plane = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="write the chosen frames as a new track (.npz)"),
+        typer.Option(
+            "-o", "--output", help="write the chosen animal as a track (.npz, .csv or .wcon)"
+        ),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")
@@ -73,8 +75,10 @@ def track(
     check_picture(picture)
 
     names = recordings or list(EMBEDDED)
-    if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):
-        raise InputError(f"{output}: one recording makes one .npz; {len(names)} are named")
+    if output is not None and output.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{output}: a track is written as one of {', '.join(SUFFIXES)}")
+    if output is not None and len(names) > 1:
+        raise InputError(f"{output}: one recording makes one file; {len(names)} are named")
     check_rate(rate, names)
     choice = choice_of(individual, keypoints, plane)
     found = [
@@ -92,7 +96,7 @@ def track(
         draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
     if output is not None:
         with atomic_write(output) as part:
-            save_track(part, found[0].track)
+            write_track(part, found[0].track, output.suffix)
     if as_json:
         print(json.dumps([one.facts.to_dict() for one in found]))
         return

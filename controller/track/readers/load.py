@@ -9,6 +9,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
+from snakewalk.controller.track.readers.bvh import load_bvh
 from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, format_of
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded, generate
 from snakewalk.controller.track.readers.keypoints import ALL, Choice, Keypoints
@@ -158,6 +159,8 @@ def _loaded(
             return load_csv(file, rate_hz, least_score, choice)
         case "qtm":
             return load_qtm(file, rate_hz, choice)
+        case "bvh":
+            return load_bvh(file, rate_hz, choice)
         case "trc":
             return load_trc(file, rate_hz, choice)
         case "c3d":

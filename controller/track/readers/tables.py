@@ -15,7 +15,11 @@ from snakewalk.controller.track.readers.markers import MISSING
 from snakewalk.controller.track.readers.sleap import load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
-_MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
+_MIDLINE: dict[tuple[str, str], float | None] = {
+    **{("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0},
+    ("x_lengths", "y_lengths"): None,
+}
+"""Columns of places, and metres in their unit; None: body lengths, without a scale."""
 
 
 def load_csv(
@@ -68,7 +72,7 @@ def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     return table
 
 
-def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -> Track:
+def _midline(file: Path, table: Floats, scale_m: float | None, rate_hz: float | None) -> Track:
     """Rows of t (s), frame, point, x, y; point 1 is the head."""
     if not np.isfinite(table[:, :3]).all():
         lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())
