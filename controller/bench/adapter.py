@@ -48,7 +48,7 @@ def latency_timer(timer_ms: int | None, device: str) -> Finding:
         "fail",
         f"{timer_ms} ms: every answer may come that much later",
         f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{tty}/latency_timer "
-        "(and a udev rule, so that it stays: docs/driver.md)",
+        "(and a udev rule, so that it stays: docs/how-to/examine-a-bus.md)",
     )
 
 

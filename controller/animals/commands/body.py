@@ -233,6 +233,7 @@ class _Made:
                 "frames": len(motion.time_s),
                 "duration_s": round(float(motion.time_s[-1]), 3),
                 "bones": len(motion.bone_m),
+                **motion.pose,
             }
         if self.picture is not None:
             _plots().draw_skin(self.picture, skin, motion, body.texture)

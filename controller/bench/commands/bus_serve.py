@@ -216,7 +216,7 @@ def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
     if output_flushes:
         LOGGER.warning(
             "a client flushed its output at least %d times: bytes that it sent less than 5 ms "
-            "before may be lost, which no UART does (docs/bus.md)",
+            "before may be lost, which no UART does (docs/how-to/serve-a-bus.md)",
             output_flushes,
         )
 

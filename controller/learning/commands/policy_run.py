@@ -63,8 +63,6 @@ def run_policy(
         "tripped": finished.outcome.tripped,
         "slowed_to": round(finished.outcome.least_rate, 3),
         **summarized(finished.summary, "travelled_m"),
-        "pose_evidence": finished.summary.pose_evidence,
-        "pose_source": finished.summary.pose_source,
         "electrical_energy_j": finished.summary.electrical_energy_j,
         "peak_current_a": finished.summary.peak_current_a,
     }

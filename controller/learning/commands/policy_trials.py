@@ -78,8 +78,9 @@ def policy_trials(
         "J/m",
         "course\nrad",
         "trips",
+        "pose",
     ):
-        grid.add_column(title, justify="left" if title in {"motion", "world"} else "right")
+        grid.add_column(title, justify="left" if title in {"motion", "world", "pose"} else "right")
     for row in table:
         grid.add_row(*["-" if value is None else str(value) for value in asdict(row).values()])
     console.print(grid)
@@ -98,13 +99,17 @@ class _Row:
     course_rad: float | None
     """Root of the mean square: how far off x they went."""
     trips: int
+    pose: str
+    """Evidence of the poses: ``measured (simulator)``."""
 
 
 def _row(motion: str, world: str, found: list[tuple[PolicyTrial, PolicyTrialResult]]) -> _Row:
     whole = [result for _, result in found if result.tripped is None]
     speeds = [result.speed_m_s for result in whole]
+    poses = {f"{result.pose_evidence} ({result.pose_source})": None for _, result in found}
+    pose = ", ".join(poses)
     if not whole:
-        return _Row(motion, world, None, None, None, None, None, len(found))
+        return _Row(motion, world, None, None, None, None, None, len(found), pose)
     return _Row(
         Path(motion).stem,
         world,
@@ -114,4 +119,5 @@ def _row(motion: str, world: str, found: list[tuple[PolicyTrial, PolicyTrialResu
         round(fmean(result.energy_j_m for result in whole), 2),
         round(fmean(result.course_rad**2 for result in whole) ** 0.5, 3),
         len(found) - len(whole),
+        pose,
     )

@@ -60,8 +60,8 @@ def run(
         bool,
         typer.Option(
             "--live",
-            help="set waypoints in the page during the walk (--view); at the last one the robot "
-            "waits",
+            help="set waypoints in the page (--view) or by ROS (--ros) during the walk; at the "
+            "last one the robot waits",
         ),
     ] = False,
     observe: Observe = None,

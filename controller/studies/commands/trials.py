@@ -53,10 +53,11 @@ _HEADS = {
     "cost_of_transport": "cost",
     "in_air": "in\nair",
     "roll_max_deg": "roll\ndeg",
+    "pose": "pose",
     "why": "why",
 }
 """Columns of the table: the units stand under the names, so that the table stays narrow."""
-_TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
+_TEXT = {"run", "robot", "world", "motion", "compliance", "pose", "why"}
 
 
 Over = Annotated[
@@ -259,6 +260,9 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
     shown = [key for key in _HEADS if any(row[key] not in {"", None} for row in rows)]
     if len({row["relief"] for row in rows}) == 1:
         shown.remove("relief")
+    poses = {row["pose"] for row in rows}
+    if len(poses) == 1 and "pose" in shown:
+        shown.remove("pose")
     grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for key in varied:
         grid.add_column("\n".join(key.split(".")[-2:]), justify="right", no_wrap=True)
@@ -271,3 +275,5 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
         values = [row["keys"][key] for key in varied] + [row[key] for key in shown]
         grid.add_row(*["" if value is None else str(value) for value in values])
     console.print(grid)
+    if "pose" not in shown and poses != {""}:
+        console.print(f"pose: {poses.pop()}")

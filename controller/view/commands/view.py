@@ -44,7 +44,7 @@ def view(
         raise InputError(f"{len(logs)} logs: the page shows one or two; more: snakewalk compare")
     records = {}
     for log, name in zip(logs, log_names(logs), strict=True):
-        records[name] = read_log(log)
+        records[name] = read_log(log).from_torque_on()
         if records[name].note:
             LOGGER.warning("%s: %s", log, records[name].note)
     page = LogPage(records, host, port)

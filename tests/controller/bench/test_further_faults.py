@@ -1,4 +1,4 @@
-"""Faults beyond the first table of ``docs/driver.md``, and sound buses that give no alarm.
+"""Further faults of ``docs/reference/doctor-faults.md``, and sound buses that give no alarm.
 
 The kinds are the rows of the second table of that page.
 """
@@ -233,7 +233,7 @@ FURTHER = [
         {"servos": 6, "start_rad": [0.0] * 6},
     ),
     Kind(
-        "a device that is no servo",
+        "a device other than a servo",
         registers(("ID", 4, 9), ("Model Number", 4, 9999)),
         "servo IDs",
         "ID 9 is model number 9999, not a known servo model",
