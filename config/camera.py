@@ -113,7 +113,7 @@ class CameraConfig(Strict):
 
     @property
     def marker_places_m(self) -> dict[int, Place]:
-        """``markers_m`` by number; empty where there are none."""
+        """``markers_m`` by number; empty without markers."""
         return {int(name): place for name, place in (self.markers_m or {}).items()}
 
 
