@@ -1,7 +1,7 @@
-"""What other programs have left in the servos' registers, against what a run expects.
+"""Settings that other programs left in the servos' registers, against those that a run expects.
 
-A value that a factory or a run sets is no finding. Most others a run sets by itself, and says so;
-the doctor names them for whoever uses the bus with another program.
+A value that a factory or a run sets gives no finding. A run sets most others by itself and reports
+it; the doctor names them for users of other programs.
 """
 
 import math
@@ -270,7 +270,7 @@ class _Checks:
         verb: str = "have",
         remedy: str = _BY_A_RUN,
     ) -> Finding | None:
-        """Finding on the servos for which ``is_bad``; None if there are none."""
+        """Finding on the servos for which ``is_bad``; None if all are good."""
         bad = [servo.servo_id for servo in self._servos if is_bad(servo)]
         if not bad:
             return None
