@@ -66,7 +66,9 @@ def code_of(commit: str, folder: Path) -> Path:
     return folder
 
 
-def started(code: Path, *words: str, **kept: int | None) -> subprocess.Popen[str]:
+def started(
+    code: Path, *words: str, stdout: int = subprocess.PIPE, stderr: int | None = None
+) -> subprocess.Popen[str]:
     """Start ``snakewalk`` from a folder of code."""
     found = ENTRY.search((code / "pyproject.toml").read_text(encoding="utf-8"))
     assert found is not None
@@ -75,14 +77,15 @@ def started(code: Path, *words: str, **kept: int | None) -> subprocess.Popen[str
         [sys.executable, "-u", "-c", program, *words],
         cwd=code,
         text=True,
-        **kept,  # type: ignore[call-overload]
+        stdout=stdout,
+        stderr=stderr,
     )
 
 
 @contextmanager
 def served() -> Iterator[str]:
     """Serve 16 simulated servos by another process; yields their port."""
-    with started(ROOT, "bus", "serve", "--servos", "1-16", stdout=subprocess.PIPE) as bus:
+    with started(ROOT, "bus", "serve", "--servos", "1-16") as bus:
         assert bus.stdout is not None
         yield next(found[1] for line in bus.stdout if (found := re.match(r"port (\S+)", line)))
         bus.kill()
@@ -109,8 +112,7 @@ def cost(code: Path, motion: str, seconds: float) -> Cost:
         words += ["--seconds", str(length_s)] if motion == "gait" else []
         for each in (*PATIENT, *([] if motion == "gait" else [f"run.time_limit_s={length_s}"])):
             words += ["--set", each]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-        with started(code, *words, **quiet) as run:
+        with started(code, *words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
             part = out / "log.mcap.part"
             end_s = time.monotonic() + START_S
             while not (part.exists() and part.stat().st_size > 100_000):

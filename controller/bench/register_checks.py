@@ -107,11 +107,7 @@ class _Checks:
             self._pose(),
             self._exchanged(),
             self._secondary(),
-            self._weak(
-                *("current limit", "fail", "Current Limit"),
-                "a Current Limit(38) below the robot's current limit",
-                "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
-            ),
+            self._current_limit(),
             self._bad(
                 "status return level",
                 "warn",
@@ -325,6 +321,13 @@ class _Checks:
             return None
         remedy = "a run sets Secondary ID(12) to 255; until then it moves with the other's goals"
         return Finding("secondary ID", "fail", "; ".join(shadows), remedy)
+
+    def _current_limit(self) -> Finding | None:
+        return self._weak(
+            *("current limit", "fail", "Current Limit"),
+            "a Current Limit(38) below the robot's current limit",
+            "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+        )
 
     def _weak(
         self, check: str, grade: Grade, register: str, what: str, remedy: str = _BY_A_RUN

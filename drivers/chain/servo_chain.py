@@ -411,15 +411,15 @@ class ServoChain:
         """
         if not self._armed or self._readings.alert:
             return False
+        asked = None
         try:
             asked = check(self._reads - 1, has_time=has_time)
-            if asked is not None:
-                self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
             self._take(self._cycle.read(), again=True)
             if not self._readings.alert:
                 raise
-            return False
+        if asked is not None:
+            self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         return asked is not None
 
     def write(self, command: JointCommand) -> None:
