@@ -65,12 +65,12 @@ class CameraConfig(Strict):
         "undone; default: none",
     )
     shade: float = Field(
-        0.5, ge=0.0, le=0.9, description="part of the floor's light that a shadow may take away"
+        0.5, ge=0.0, le=0.9, description="largest share of the floor's light that a shadow removes"
     )
     learn_s: float = Field(
         60.0, ge=0.0, le=86_400.0,
-        description="time constant with which the floor beside the body is learnt, so that what "
-        "stays there becomes floor; 0: it stays as it was pictured",
+        description="time constant for learning the floor around the body, so that objects "
+                    "that stay there become floor; 0: the floor stays as in its picture",
     )  # fmt: skip
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"
@@ -113,7 +113,7 @@ class CameraConfig(Strict):
 
     @property
     def marker_places_m(self) -> dict[int, Place]:
-        """``markers_m`` by number; empty where there are none."""
+        """``markers_m`` by number; empty without markers."""
         return {int(name): place for name, place in (self.markers_m or {}).items()}
 
 

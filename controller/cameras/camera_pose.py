@@ -1,7 +1,7 @@
 """The head's pose from an overhead camera, carried from frame to frame by dead reckoning.
 
-A frame shows where the body was when it was taken; the joints' motion since then is added
-by dead reckoning. So the pose is a frame that drifts, placed anew in the world at each image.
+A frame shows where the body was when it was taken; the joints' motion since then is added by dead
+reckoning. So the pose is a frame that drifts, and each image sets its place in the world again.
 """
 
 from collections import deque
@@ -42,7 +42,7 @@ class Camera(Protocol):
     """Where frames come from, as detections."""
 
     def first(self) -> LineDetection:
-        """Take a frame now and wait for its detection; the body lies still."""
+        """Capture a frame and wait for its detection; the body lies still."""
         ...
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> Sequence[LineDetection | TrackedPose]:
@@ -90,10 +90,10 @@ class CameraPose:
         self.frames = 0
         """Frames taken in so far."""
         self.used = 0
-        """Of these."""
+        """Number of these that were used."""
 
     def __call__(self, state: JointState) -> BodyPose:
-        """Advance to the state's time, and take in the frames that have arrived."""
+        """Advance to the state's time, and process the frames that have arrived."""
         odometry = self._reckoning(state)
         place = np.array([*odometry.head_in_world_m[:2], odometry.heading_rad])
         self._history.append(_Moment(state.time_s, place, np.array(state.position_rad)))
@@ -146,7 +146,7 @@ class CameraPose:
         then = self._at(detection.time_s)
         fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
         if fit.error_m > MISFIT * self._robot.mean_link_length_m:
-            self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
+            self._reason = f"the image lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
         self._place(detection.time_s, fit.head_m, fit.heading_rad)
 

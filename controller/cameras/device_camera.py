@@ -1,6 +1,6 @@
-"""A real overhead camera: a thread that takes frames, looks at them, and keeps what it saw.
+"""A real overhead camera: a thread captures frames, processes them, and keeps the results.
 
-Looking takes longer than a cycle of the loop may, so it is done beside it.
+Processing is longer than a cycle of the loop may be, so it runs in parallel.
 """
 
 import queue
@@ -40,11 +40,11 @@ from snakewalk.drivers.clock import Clock
 PATIENCE_S = 5.0
 """How long the first frame is waited for."""
 ANSWER_S = 0.1
-"""How long the loop may take to say where the body is believed to be."""
+"""Longest time until the loop states the expected place of the body."""
 
 
 class DeviceCamera:
-    """What OpenCV opens under ``camera.device``; ``close`` it.
+    """The camera that OpenCV opens under ``camera.device``; ``close`` it.
 
     A frame is dated ``latency_s`` before it has been handed over.
 
@@ -61,7 +61,7 @@ class DeviceCamera:
         on_picture: OnPicture = lambda picture, time_s: None,
         ground: HeightField | None = None,
     ) -> None:
-        """Open it; ``on_picture`` is called from the thread that takes the frames."""
+        """Open it; ``on_picture`` is called from the thread that captures the frames."""
         camera = run.camera
         self._clock, self._on_picture = clock, on_picture
         self.detector = overhead_detector(run, robot, ground)
@@ -80,7 +80,7 @@ class DeviceCamera:
         self._thread.start()
         try:
             self.start = self.first()
-            """What the camera saw first."""
+            """First detection of the camera."""
             require_whole_body(self.start, self._name)
         except InputError:
             self.close()
@@ -198,7 +198,7 @@ def open_device(camera: CameraConfig) -> cv2.VideoCapture:
     """Open the camera in the wanted size and rate.
 
     Raises:
-        InputError: there is none.
+        InputError: the camera does not exist.
 
     """
     name = camera.device or ""

@@ -103,7 +103,7 @@ class RenderedCamera:
         return self._detect(self._clock.now_s())
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
-        """Take a frame if one is due; return those that have arrived."""
+        """Capture a frame if one is due; return those that have arrived."""
         if now_s >= self._next_s - 1e-9:
             self._coming.append(self._track(now_s, prior_at(now_s)))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)

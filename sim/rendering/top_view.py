@@ -1,4 +1,4 @@
-"""The view from above: the picture that a camera over the simulated robot takes."""
+"""The view from above: the picture of a camera over the simulated robot."""
 
 import math
 from collections.abc import Sequence
