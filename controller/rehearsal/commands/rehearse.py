@@ -109,7 +109,7 @@ def _results(path: Path) -> dict[tuple[str, int, bool, str], dict[str, Any]]:
             found[case_of(row).key] = row
         except (ValueError, KeyError, TypeError):
             raise InputError(
-                f"{path}: line {number} is no rehearsal; remove it, or choose another file"
+                f"{path}: line {number} is not a rehearsal; remove it, or choose another file"
             ) from None
     return found
 

@@ -181,7 +181,7 @@ def test_results_are_continued(
         assert len(done) == total
     assert len(out.read_text().splitlines()) == 3
     out.write_text(out.read_text() + "{}\n")
-    with pytest.raises(InputError, match="line 4 is no rehearsal"):
+    with pytest.raises(InputError, match="line 4 is not a rehearsal"):
         rehearse_command.rehearse_runs([str(run_file)], seeds=3, out=out)
 
 
