@@ -54,7 +54,7 @@ def why_no_file(path: Path, missing: str = "no such file") -> str:
     if path.is_dir():
         return f"{path}: is a folder"
     if path.exists():
-        return f"{path}: is no file but a pipe or a device: put what it gives into a file"
+        return f"{path}: is a pipe or a device; copy its contents into a file"
     return f"{path}: {missing}"
 
 
@@ -114,7 +114,10 @@ def check_matrices(file: Path) -> None:
         depth += -1 if mark in _ENDS else 1
         deepest = max(deepest, depth)
     if deepest > _MOST_NESTED:
-        raise InputError(f"{file}: is no file of a calibration: nested {deepest} deep")
+        raise InputError(
+            f"{file}: is not a calibration file: its values are nested {deepest} "
+            "deep; choose another file"
+        )
     matrices = [
         [int(side[:9]) for side in said.replace(",", " ").split()] for said in _SIDES.findall(text)
     ]
@@ -122,8 +125,8 @@ def check_matrices(file: Path) -> None:
         len(sides) > 2 or max(sides, default=0) > _MOST_SIDE for sides in matrices
     ):
         raise InputError(
-            f"{file}: is no file of a calibration: its matrices have {_MOST_SIDE} rows and columns "
-            "at most"
+            f"{file}: is not a calibration file: its matrices have more than {_MOST_SIDE} rows "
+            "or columns; choose another file"
         )
 
 

@@ -95,7 +95,9 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
             if table.get(name) is None:  # a table left out, or an unknown one: the schema says
                 table[name] = {}
             if not isinstance(table[name], dict):
-                raise ConfigError(f"{source}: {key}: {name} is no table of it")
+                raise ConfigError(
+                    f"{source}: {key}: {name} is not a table; remove the key or correct it"
+                )
             table = table[name]
         table[last] = value
     if "servo" in data:
@@ -159,7 +161,10 @@ def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
             ground = world.ground.model_copy(update={"source": str(source)})
             return world.model_copy(update={"ground": ground})
         if named.endswith(".npz") and not Path(named).is_file():
-            raise ConfigError(f"{path}: ground.source: {named}: no such file beside it, nor here")
+            raise ConfigError(
+                f"{path}: ground.source: {named}: no such file in the folder of "
+                f"{path} or in the working folder; correct the path"
+            )
     return world
 
 

@@ -78,7 +78,10 @@ def _plain(value: Any) -> Any:
     """
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no value of a configuration")
+    raise TypeError(
+        f"{type(value).__name__} cannot be a value of a configuration; use a "
+        "number, text, list or table"
+    )
 
 
 def _check_keys(text: str) -> None:
@@ -185,7 +188,7 @@ def _line(
         "float_type": "must be a number",
         "bool_type": "must be true or false",
         "finite_number": "must be a finite number",
-        "union_tag_invalid": f"kind {tag!r} is none of {known}",
+        "union_tag_invalid": f"kind {tag!r} is unknown; use one of {known}",
         "union_tag_not_found": "needs a key kind, which says what it is",
         "literal_error": f"must be {context.get('expected')}",
         "greater_than": f"must be over {bounds.get('gt', 0):g}",

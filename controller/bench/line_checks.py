@@ -103,12 +103,12 @@ def _usual_response(late_s: Sequence[float], latency_s: float) -> Finding:
     usual_ms = float(np.quantile(late_s, 0.25)) * 1e3
     found = f"replies come {usual_ms:.1f} ms later than the wire needs"
     if usual_ms * 1e-3 > latency_s:
-        found += f", the driver waits {latency_s * 1e3:.0f} ms: a run takes all of them for lost"
+        found += f", the driver waits {latency_s * 1e3:.0f} ms: a run loses all of them"
         remedy = "lower the adapter's latency timer to 1 ms, or connect it without a hub or server"
         return Finding("response time", "fail", found, remedy)
     if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
         return Finding("response time", "ok", found)
-    found += ": each cycle of a run takes that much longer"
+    found += ": each cycle of a run is longer by that time"
     remedy = (
         "the adapter's latency timer, a USB hub, a serial server in between; or a busy computer"
     )
@@ -129,7 +129,7 @@ def _slow_servos(probes: Sequence[Probe]) -> Finding | None:
     if not slow:
         return None
     found = ", ".join(f"servo {i} by {late_s * 1e3:.1f} ms" for i, late_s in slow.items())
-    remedy = "update its firmware, exchange it: each cycle of a run takes that much longer"
+    remedy = "update its firmware or exchange it: each cycle of a run is longer by that time"
     return Finding("response time", "warn", f"slower than the others: {found}", remedy)
 
 

@@ -170,8 +170,8 @@ def firmware(servos: Sequence[ServoReport]) -> Finding:
         return Finding(
             "firmware",
             "warn",
-            f"{_subject(old, 'have')} no fast sync read (version {shown}): plain reads are used, "
-            "which take longer",
+            f"{_subject(old, 'have')} no fast sync read (version {shown}): the driver uses "
+            "plain reads, which are slower",
             "update it with DYNAMIXEL Wizard 2.0",
         )
     if len(versions) > 1:

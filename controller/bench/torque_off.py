@@ -57,7 +57,7 @@ def torque_off(
                 port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
         # on a bad line a request gets lost: the likely rates are asked twice
         for rate in (*rates, *(rate for rate in rates if rate in _LIKELY)):
-            on_progress(f"torque off is sent; who answers at {rate} baud?")
+            on_progress(f"torque off is sent; waiting for replies at {rate} baud")
             found = scan(port, [rate], patient=False).servos
             if found:
                 port.setBaudRate(rate)
@@ -66,14 +66,14 @@ def torque_off(
                     for servo in found
                     if (fault := _confirm(port, servo.servo_id, servo.model)) is not None
                 ]
-                text = f"torque is off: {len(found) - len(failed)} servos confirm it, {rate} baud"
+                text = f"{len(found) - len(failed)} servos confirm it at {rate} baud"
                 return StopOutcome(
                     device, "torque off", "; ".join([text, *failed]), not failed, ports=(device,)
                 )
     return StopOutcome(
         device,
         "torque off",
-        f"torque off was sent at {sent} baud rates, and nobody answers: is the power on?",
+        f"sent at {sent} baud rates, but no servo replies; check the power",
         False,
         ports=(device,),
     )

@@ -35,7 +35,9 @@ def read_pattern(text: str) -> BoardPattern:
     try:
         return BoardPattern(text)
     except ValueError:
-        raise InputError(f"--pattern {text}: is none of {', '.join(BoardPattern)}") from None
+        raise InputError(
+            f"--pattern {text}: is unknown; use one of {', '.join(BoardPattern)}"
+        ) from None
 
 
 @dataclass(frozen=True)

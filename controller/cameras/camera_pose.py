@@ -140,7 +140,7 @@ class CameraPose:
         then = self._at(detection.time_s)
         fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
         if fit.error_m > MISFIT * self._robot.mean_link_length_m:
-            self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
+            self._reason = f"the image lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
         self._place(detection.time_s, fit.head_m, fit.heading_rad)
 

@@ -35,8 +35,8 @@ class OverheadCameraPose:
             )
         if run.motion == "gait" and robot.pitch_joints:
             faults.append(
-                f"pose: the overhead camera takes the body to lie flat; a gait of {robot.name} "
-                "lifts or rolls it"
+                "pose: the overhead camera assumes that the body lies flat, and gaits of "
+                f"{robot.name} lift or roll it; choose another pose source"
             )
         if run.camera.height_m <= 4.0 * robot.body_radius_m:
             faults.append("camera: height_m: the lens must be well above the robot")

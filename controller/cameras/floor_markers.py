@@ -77,8 +77,8 @@ class Bump:
         """What happened, in a sentence."""
         if not self.undone:
             return (
-                f"the floor's markers lie about {self.away_px:.1f} px from where they were, each "
-                "in its own way: camera or markers were moved; set the camera up anew"
+                f"floor markers: lie about {self.away_px:.1f} px from their places, each in "
+                "another direction, so camera or markers moved; set the camera up again"
             )
         said = []
         if self.away_px >= 0.05 or abs(self.turn_rad) > 1e-3:

@@ -75,7 +75,9 @@ class Lens:
             held = [store.getNode(name).mat() for name in names]
             store.release()
         except (cv2.error, SystemError) as error:
-            raise InputError(f"{file}: is no file of OpenCV's FileStorage: {error}") from None
+            raise InputError(
+                f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
+            ) from None
         faults = [
             f"{file}: holds no {name}" for name, value in zip(names, held, strict=True)
             if value is None

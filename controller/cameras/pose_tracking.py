@@ -283,11 +283,11 @@ def _fault(
     if share < _LEAST_SEEN or least < _LEAST_HALF:
         return f"{100.0 * share:.0f} % of the body is seen where it must be"
     if error_m > _OFF * robot.body_radius_m:
-        return f"what is seen lies {error_m * 1e3:.0f} mm off the measured joints"
+        return f"the image lies {error_m * 1e3:.0f} mm off the measured joints"
     if not ends.any():
         return "neither tip of the body is seen"
     if float(np.abs(along[ends]).max()) > _TIP_OFF * robot.body_radius_m:
         return "a tip of the body is not where it must be"
     if float(np.hypot(*shift)) > 1.4 * REACH_M:
-        return "what is seen lies too far from where the body must be"
+        return "the image lies too far from the possible places of the body"
     return ""

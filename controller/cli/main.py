@@ -60,7 +60,7 @@ def main() -> None:
         app(prog_name="snakewalk")
     except PortError as error:
         began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
-        _end(1 if began else 2, _with_notes("; ".join(error.faults), error))
+        _end(1 if began else 2, "; ".join(error.faults), *getattr(error, "__notes__", []))
     except InputError as error:
         _end(2, *error.faults)
     except DriverError as error:

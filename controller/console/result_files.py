@@ -30,9 +30,10 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
 
     """
     files = [path for path in paths if path is not None]
-    faults = [f"{path}: exists; --force overwrites it" for path in files if path.exists()]
-    if force:
-        faults = [f"{path}: is a folder" for path in files if path.is_dir()]
+    faults = [f"{path}: is a folder; name a file" for path in files if path.is_dir()]
+    if not force:
+        exist = [path for path in files if path.exists() and not path.is_dir()]
+        faults += [f"{path}: exists; --force overwrites it" for path in exist]
     for folder in dict.fromkeys(path.parent for path in files):
         fault = _folder_fault(folder)
         faults += [] if fault is None else [fault]

@@ -113,8 +113,8 @@ def prepare_walk(
         )
     if not isinstance(found, WalkRun):
         raise InputError(
-            f"run {found.run.name}: motion {found.run.motion} is no walk; run it by: snakewalk "
-            f"run {name}"
+            f"run {found.run.name}: motion {found.run.motion} is not a walk; run it by: "
+            f"snakewalk run {name}"
         )
     return found
 
@@ -202,8 +202,8 @@ def _refuse_one_joint(robot: RobotConfig) -> None:
     """
     if len(robot.yaw_joints) == 1:
         raise InputError(
-            f"robot {robot.name}: has one yaw joint, which only bends to and fro; a walk takes two "
-            "at least, and more to steer"
+            f"robot {robot.name}: has one yaw joint, but a walk needs two, and more for "
+            "steering; choose another robot"
         )
 
 

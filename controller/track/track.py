@@ -245,8 +245,8 @@ def frame_numbers(name: str, values: Floats) -> Ints:
     odd = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
     if odd.any():
         raise InputError(
-            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are no whole numbers, such "
-            f"as {values[odd][0]:g}"
+            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are not whole numbers, "
+            f"such as {values[odd][0]:g}"
         )
     return values.astype(np.int64)
 

@@ -38,7 +38,9 @@ def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: is no exchange of bus serve --record") from None
+        raise InputError(
+            f"{path}: is not an exchange of bus serve --record; choose another file"
+        ) from None
     for number, line in enumerate(text.splitlines(), 1):
         try:
             entry = parse_json(line)

@@ -99,10 +99,10 @@ def segment_motion(
     if not found:
         closest = float(np.nanmin(np.abs(postures.angles_rad - reference).max(axis=1)))
         raise InputError(
-            f"{postures.name}: the basic posture is passed {len(runs)} times, so there is no "
-            f"segment; all angles come within {np.degrees(closest):.1f} degrees of it, asked are "
-            f"{np.degrees(how.within_rad):.1f}: say --within, or --reference commonest for an "
-            "animal that is never straight"
+            f"{postures.name}: the basic posture occurs {len(runs)} times, which "
+            f"gives no segment; the closest frame differs by {np.degrees(closest):.1f} degrees, "
+            f"the limit is {np.degrees(how.within_rad):.1f}; raise --within, or use "
+            "--reference commonest"
         )
     return merge(found, how.merge_rad)
 

@@ -79,9 +79,9 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
     detector = make_detector(some, empty)
     if empty is None and whole_share(detector, some) < _LEAST_WHOLE:
         raise InputError(
-            f"{path}: no ground was found on which a fish is seen whole in half of the frames; if "
-            "it holds station over a pattern, give --background (of the side --side-background), a "
-            "picture of the empty scene"
+            f"{path}: fewer than half of the frames show a complete fish on an empty ground; if "
+            "it stays at one place, give a picture of the empty scene with --background (for "
+            "the side view --side-background)"
         )
     return FishFilm(footage, detector, some[0].shape)
 

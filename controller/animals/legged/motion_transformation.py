@@ -72,9 +72,9 @@ class PathNormals:
         if inside.any():
             worst = int(np.argmax(np.where(inside, beside * curvature, 0.0)))
             raise InputError(
-                f"the path bends by a radius of {1.0 / abs(curvature.ravel()[worst]):.3f} m after "
-                f"{on.ravel()[worst]:.2f} m, and a foot stands {abs(beside.ravel()[worst]):.3f} m "
-                "beside it: take a smaller animal (length_m), or move the waypoints"
+                f"path: its radius is {1.0 / abs(curvature.ravel()[worst]):.3f} m after "
+                f"{on.ravel()[worst]:.2f} m, and a foot is {abs(beside.ravel()[worst]):.3f} m "
+                "to the side; choose a smaller animal (length_m), or move the waypoints"
             )
         left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
         plan = self._curve(on) + (s - on)[..., None] * forward + beside[..., None] * left

@@ -68,7 +68,7 @@ def ellipses(model: BodyModel, lift: Floats | None = None, curves: int = CURVES)
     """
     if curves < 2 * _TIP + 2:
         raise InputError(
-            f"curves: a body with round tips takes {2 * _TIP + 2} or more, not {curves}"
+            f"curves: a body with round tips needs {2 * _TIP + 2} or more, not {curves}"
         )
     head, tail = tips(model)
     quarter = 1.0 - np.cos(np.linspace(0.0, 0.5 * np.pi, _TIP))
@@ -111,7 +111,7 @@ def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
 
     """
     if curves < 4:
-        raise InputError(f"curves: a skin takes 4 or more, not {curves}")
+        raise InputError(f"curves: a skin needs 4 or more, not {curves}")
     x = np.asarray(solid.vertices, dtype=float)[:, 0]
     length = float(np.ptp(x))
     trial = np.linspace(_FIRST, 1.0 - _FIRST, _TRIALS)

@@ -45,12 +45,12 @@ class Tube:
             raise InputError(f"a skin is of order 1 (creased), 2 or 3, not {order}")
         if len(curves_m) < 4 or len(stations) != len(curves_m) or np.any(np.diff(stations) <= 0.0):
             raise InputError(
-                f"a skin takes 4 curves or more at rising stations, not {len(curves_m)}"
+                f"curves: a skin needs 4 or more at increasing stations, not {len(curves_m)}"
             )
         # over the skin, not along the body, where the radius of a round tip rises without bound
         span = np.linalg.norm(np.diff(curves_m, axis=0), axis=-1).mean(axis=1)
         if not span.all():
-            raise InputError("a skin takes curves that differ: two lie on each other")
+            raise InputError("curves: two of the skin coincide; leave one out")
         way = np.concatenate([[0.0], np.cumsum(span)])
         given = [CubicSpline(way, curves_m)(way, k) for k in range(order)]
         given[0] = np.asarray(curves_m, dtype=float)

@@ -76,18 +76,25 @@ class PdeSurface:
         curves = np.asarray(curves_m, dtype=float)
         if curves.ndim != 3 or curves.shape[0] % 2 or not curves.size or curves.shape[2] != 3:
             raise InputError(
-                f"a PDE surface takes curves of shape (2 N, points, 3), not {curves.shape}"
+                "curves: a PDE surface needs an array of shape (2 N, points, 3), not "
+                f"{curves.shape}"
             )
         number, count = curves.shape[:2]
         places = np.linspace(0.0, 1.0, number) if at is None else np.array(at, dtype=float)
         kinds = [0] * number if slopes is None else [int(kind) for kind in slopes]
         if len(places) != number or len(kinds) != number:
-            raise InputError(f"a PDE surface takes a place and a kind for each of {number} curves")
+            raise InputError(
+                f"curves: a PDE surface needs a place and a kind for each of {number} curves"
+            )
         rising = list(zip(places, kinds, strict=True))
         if rising != sorted(set(rising)) or min(kinds) < 0 or max(kinds) >= number:
-            raise InputError("a PDE surface takes rising places, and at one place rising slopes")
+            raise InputError(
+                "curves: a PDE surface needs increasing places, and increasing slopes at one place"
+            )
         if not np.isfinite(curves).all() or spread <= 0.0 or kinds.count(0) == 0:
-            raise InputError("a PDE surface takes finite points, a > 0 and one place at least")
+            raise InputError(
+                "curves: a PDE surface needs finite points, a > 0 and at least one place"
+            )
         size = np.ptp(curves, axis=1).max(axis=1)
         again = np.abs(curves[:, -1] - curves[:, 0]).max(axis=1) <= 1e-9 * size
         if (again & (size > 0.0) & (np.array(kinds) == 0)).any():

@@ -78,7 +78,7 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
     axes.set_ylim(-1.25, 1.25)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_title("what may follow what (dark: used)")
+    axes.set_title("possible successors (dark: used)")
 
 
 def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:

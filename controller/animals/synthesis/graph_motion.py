@@ -39,7 +39,9 @@ def handed_down(wanted_rad: Floats, before_rad: Floats, m: Floats) -> Floats:
 
     """
     if m[0] != 1.0:
-        raise ValueError(f"m is {m[0]:g} at the head: there is nothing ahead of it to take from")
+        raise ValueError(
+            f"m: is {m[0]:g} at the head, which has no body ahead of it; set its first value to 1"
+        )
     ahead = np.concatenate([wanted_rad[:1], before_rad[:-1]])
     return np.asarray(m * wanted_rad + (1.0 - m) * ahead)
 

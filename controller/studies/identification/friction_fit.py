@@ -95,8 +95,8 @@ class FrictionLog:
         if not measured:
             way = told or "the IMU or the joints"
             raise InputError(
-                f"the pose of this run was estimated by {way}, which takes friction as known; "
-                "friction needs a pose measured by a camera (or a simulated run)"
+                f"the pose of this run was estimated by {way}, which assumes the friction; use "
+                "a run with a pose measured by a camera, or a simulated run"
             )
         goals, answered = goals_of(record, world)
         cycle = record.cycle
@@ -114,8 +114,8 @@ class FrictionLog:
         motion = _motion(goals, at)
         if np.hypot(motion[:, 0], motion[:, 1]).max() < MOVED_M:
             raise InputError(
-                f"the body goes less than {1e3 * MOVED_M:g} mm in any second of the log: that "
-                "tells no friction; take a log of a run that goes somewhere"
+                f"the body moves less than {1e3 * MOVED_M:g} mm in each second of the log, too "
+                "little to identify friction; use the log of a run that travels"
             )
         return FrictionLog(goals, answered, motion)
 
@@ -151,14 +151,14 @@ class FrictionLog:
         joints = list(robot.pitch_joints)
         if not joints:
             raise InputError(
-                f"robot {robot.name} has no pitch joints: on a level floor its weight and the "
-                "friction act together only, so no run of it tells its mass; weigh it"
+                f"robot {robot.name}: has no pitch joints, so runs on a level floor depend on "
+                "the product of weight and friction only; weigh the robot"
             )
         if np.ptp(self.answers[1][:, joints], axis=0).max() < _LIFTED_RAD:
             raise InputError(
-                f"the pitch joints turn less than {_LIFTED_RAD:g} rad: nothing is lifted, which "
-                "tells no mass; take a log of a gait that lifts the body (snakewalk gait run "
-                f"sidewinding --robot {robot.name}, or rectilinear)"
+                f"the pitch joints turn less than {_LIFTED_RAD:g} rad and lift nothing, so the "
+                "mass cannot be identified; use the log of a gait that lifts the body "
+                f"(snakewalk gait run sidewinding --robot {robot.name}, or rectilinear)"
             )
 
     def with_friction(self, friction: FrictionConfig) -> Goals:
@@ -219,7 +219,7 @@ class FrictionFit:
         """Lines for the head of a world's file."""
         lines = [f"Friction found by `snakewalk identify` from {', '.join(map(str, paths))}:"]
         for name, one in self.found.items():
-            note = "" if one.determined else "; these logs do not tell it"
+            note = "" if one.determined else "; not identified from these logs"
             lines.append(
                 f"{name.replace('_', ' ')} {one.value:.4g}, 95 % of {one.low:.4g} to "
                 f"{one.high:.4g}{note}"

@@ -118,11 +118,11 @@ def _columns(file: Path, stored: Any, count: int) -> list[Column]:
         names = [tuple(map(str, name)) for name in axes[0][1]]
     except (pickle.UnpicklingError, ValueError, TypeError, LookupError, EOFError, AttributeError):
         raise InputError(
-            f"{file}: the names of its columns cannot be read; take DeepLabCut's CSV instead"
+            f"{file}: the names of its columns cannot be read; use DeepLabCut's CSV instead"
         ) from None
     if len(names) != count or any(len(name) not in (3, 4) for name in names):
         raise InputError(
-            f"{file}: names of {len(names)} columns for {count} columns; take the CSV instead"
+            f"{file}: has {len(names)} column names for {count} columns; use the CSV instead"
         )
     return [("" if len(name) == 3 else name[1], name[-2], name[-1]) for name in names]
 

@@ -30,7 +30,7 @@ def load_csv(
         with file.open(newline="", encoding="utf-8-sig") as stream:
             every = list(csv.reader(stream))
     except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{file}: is no recording; known: {KNOWN}") from None
+        raise InputError(f"{file}: is not a recording; known: {KNOWN}") from None
     if is_vicon(every):
         return load_vicon(file, every, rate_hz, choice)
     rows = [row for row in every if row]
