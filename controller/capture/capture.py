@@ -236,7 +236,10 @@ def load_capture(path: Path) -> CaptureFile:
         and {"name", "source", "licence", "head_by"} <= held.keys()
     )
     if not whole:
-        raise InputError(f"{path}: is no track that `capture` wrote: it lacks data of the frames")
+        raise InputError(
+            f"{path}: is not a track that `capture` wrote: data of its frames are "
+            "missing; choose another file"
+        )
     scale, rate_hz = float(held["m_per_px"]), float(held["rate_hz"])
     even_s = np.arange(frames) / rate_hz  # files of before held no times
     time_s = np.asarray(held.get("time_s", even_s), dtype=float)
@@ -344,7 +347,7 @@ def _fault(checked: list[Skeleton]) -> str:
         FrameStatus.SEVERAL: "several animals: cut the film so that one is in view",
         FrameStatus.EMPTY: "the found lines lie on empty ground; give --background",
         FrameStatus.CUT: "the body is cut by the edge of the image",
-        FrameStatus.BLOB: "what stands out is not a long body; give --background",
+        FrameStatus.BLOB: "the silhouette is not a long body; give --background",
     }.get(worst, f"the body is never seen whole: {worst}")
     return f"{advice} ({reasons.count(worst)} of {len(checked)} frames)"
 

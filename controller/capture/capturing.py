@@ -120,14 +120,14 @@ def correct_recording(options: CaptureOptions) -> CorrectionFacts:
 
     """
     if options.corrections is None:
-        raise ValueError("there are no corrections")
+        raise ValueError("--corrections: needs a file of corrections")
     plain = CaptureOptions(
         options.recording, options.output, corrections=options.corrections, force=options.force
     )
     if options != plain:
         raise InputError(
-            "--corrections takes the TRACK.npz of an earlier capture, -o and --force; the other "
-            "options belong to a film"
+            "--corrections: works with TRACK.npz of an earlier capture, -o and --force only; "
+            "leave the other options out"
         )
     if options.output.suffix.lower() != ".npz":
         raise InputError(f"{options.output}: a track is an .npz")

@@ -48,7 +48,7 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class BodyDetector:
-    """Background and contrast of a scene; ``detect`` takes any frame, in any order."""
+    """Background and contrast of a scene; ``detect`` accepts any frame, in any order."""
 
     background: DeepImage | None
     """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
@@ -56,8 +56,8 @@ class BodyDetector:
     background_source: str
     """Where the background is from, in words."""
     surroundings_px: int = 0
-    """Where there is no background: side of the square whose ground a place is compared with; 0: a
-    smooth surface is fitted to the frame."""
+    """Without a background: side of the square whose ground a place is compared with; 0: a smooth
+    surface is fitted to the frame."""
     inside: Bools | None = None
     """(H, W) where the animal may be; a body that reaches beyond is cut. None: everywhere."""
     threshold: float | None = None
@@ -125,11 +125,11 @@ def make_detector(
 ) -> BodyDetector:
     """Learn a scene from a few frames spread over the recording.
 
-    Without a background the median of the frames is taken. Where the animal hardly moves, or the
-    camera goes with it, the median shows the animal itself; then another ground is taken if more
-    frames agree on the body's length and are explained by it: the median of frames in which the
-    animal is painted out, a brighter or darker quantile of each pixel's values, or what is found in
-    each frame alone, a smooth surface or the surroundings of each place.
+    Without a background the median of the frames is taken. If the animal hardly moves, or the
+    camera follows it, the median shows the animal itself. Then another ground is used if more
+    frames agree on the body's length and are explained by it. It is the median of frames in which
+    the animal is painted out, a brighter or darker quantile of each pixel's values, or the ground
+    found in each frame alone: a smooth surface or the surroundings of each place.
 
     Args:
         frames: (H, W) or (H, W, 3), 8 bit.
@@ -197,9 +197,10 @@ class _Candidate:
 
     detector: BodyDetector
     share: float
-    """Of the frames: they show a whole body of the usual length, which explains the picture."""
+    """Share of the frames that show a complete body of the usual length, which explains the
+    picture."""
     length_px: float
-    """Usual length; 0 where there is none."""
+    """Usual length; 0 if it is unknown."""
     width_px: float
     contrast: float
     """At the boundaries of these bodies, grey levels."""
@@ -226,7 +227,8 @@ def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
 def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
     """The first with about the highest share; half of a body in all frames counts as half.
 
-    A part of the body stands out as much as all of it; what is longer and much fainter is a stain.
+    A part of the body has the same contrast as all of it; a longer and much fainter object is a
+    stain.
     """
     sure = [one for one in candidates if one.share >= _SURE]
     strongest = max((one.contrast for one in sure), default=0.0)

@@ -18,7 +18,7 @@ class FrameStatus(StrEnum):
     LOOP = "touches itself: the silhouette has a hole"
     BRANCH = "touches itself: the medial axis branches"
     SHORT = "touches itself: much shorter or thicker than in the other frames"
-    COIL_TWO_WAYS = "touches itself: what comes before and what comes after solve it in two ways"
+    COIL_TWO_WAYS = "touches itself: the frames before and after it give two different solutions"
     COIL_UNLIKE = "touches itself: the film's body does not explain the picture"
     COIL_ALONE = "touches itself: no good frame on one of both sides"
     LARGER = "touches something: longer or larger than in the other frames"

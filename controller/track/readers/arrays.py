@@ -29,6 +29,7 @@ ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "lice
     "rate_assumed",
     "verdict",
     "time_s",
+    "notes",
     "places_recorded",
     "head_sure",
 }
@@ -53,6 +54,7 @@ def save_track(path: Path, track: Track) -> None:
         licence=track.licence,
         rate_assumed=track.rate_assumed,
         verdict=np.array([str(one) for one in verdict]),
+        **({"notes": np.array(track.notes)} if track.notes else {}),
         places_recorded=track.places_recorded,
         head_sure=np.nan if track.head_sure is None else track.head_sure,
     )
@@ -151,6 +153,7 @@ def track_from_arrays(
             status=_status(held, len(points)),
             source=_text(held, "source", "not stated"),
             licence=_text(held, "licence", "not stated"),
+            notes=[str(one) for one in held.get("notes", np.array([])).reshape(-1)],
         )
         sure = _scalar(file, "head_sure", held.get("head_sure", np.array(np.nan)))
         return replace(

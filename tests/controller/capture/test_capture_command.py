@@ -206,7 +206,7 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
         ({"head": "200,10"}, "outside the images, which have 200 x 160 pixels"),
         ({"head": "10,-1"}, "outside the images"),
         ({"head": "5,5", "roi": "40,30,120,100"}, "outside --roi and --mask"),
-        ({"background": "junk.png"}, "is no image"),
+        ({"background": "junk.png"}, "is not a readable image"),
     ],
 )
 def test_bad_options_are_told_before_any_work(
