@@ -34,6 +34,7 @@ MODULES = tuple(
         "support",
         "gym_steps",
         "startup",
+        "replanning",
         "busy_calibrations",
         "light_install",
     )

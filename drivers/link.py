@@ -23,6 +23,8 @@ class LoadEstimate(Protocol):
     """Drawn by the chain now."""
     charge_ah: float
     """Drawn since the start."""
+    hottest_c: float
+    """Temperature of the hottest winding; -inf before one is known."""
 
     def winding_c(self, state: JointState) -> Floats:
         """(J,) temperatures of the windings."""

@@ -267,8 +267,9 @@ class RobotConfig(JointValues):
         data: dict[str, Any] = handler(self)
         if not self.described_models:
             data.pop("described_models", None)
-        if self.pose is None:
-            data.pop("pose", None)
+        for key in ("pose", "ros"):
+            if data[key] is None:
+                data.pop(key)
         return data
 
     if not TYPE_CHECKING:

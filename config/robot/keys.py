@@ -19,6 +19,7 @@ from snakewalk.config.robot.links import BellyConfig, LinkConfig
 from snakewalk.config.robot.ports import PortConfig
 from snakewalk.config.robot.power import PowerConfig
 from snakewalk.config.robot.servo import ServoConfig
+from snakewalk.config.ros import RosConfig
 from snakewalk.config.servo_model import ServoModel
 
 
@@ -71,6 +72,11 @@ class RobotKeys(Strict):
         None,
         description="a table [pose]: the tracked body of an external pose source; default: the "
         "head link's centre in the world of the run",
+    )
+    ros: RosConfig | None = Field(
+        None,
+        description="a table [ros]: frames that the ROS node publishes; default: the defaults of "
+        "that table",
     )
     power: PowerConfig | None = Field(
         None, description="a table [power]; default: the cables between servos take nothing"

@@ -153,7 +153,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     console = stderr_console()
     with console.status("learning the background ..."):
         whole = footage.spread(_SAMPLE)
-        if (options.roi or options.mask) and len({frame.shape for frame in whole}) > 1:
+        if (options.roi or options.mask) and len({frame.shape[:2] for frame in whole}) > 1:
             raise InputError(
                 f"{options.recording}: --roi and --mask need images of one size; these differ"
             )
@@ -182,7 +182,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     scale = 1.0
     if options.review is not None:
         scale = picture_scale(some[::3], footage.count, str(options.recording))
-    fixed = not options.cropped and len({frame.shape for frame in whole}) == 1
+    fixed = not options.cropped and len({frame.shape[:2] for frame in whole}) == 1
     stated_s: list[float] = []
 
     def cut_frames() -> Iterator[DeepImage]:

@@ -13,6 +13,8 @@ from snakewalk.drivers.clock import WallClock
 T = TypeVar("T")
 EVERY = 10
 """Cycles of a run between two updates."""
+REFRESH_HZ = 4.0
+"""Rate at which a terminal shows the bar (ours): drawing it takes as much CPU time as a cycle."""
 
 
 class ProgressBar:
@@ -21,14 +23,17 @@ class ProgressBar:
     def __init__(
         self, description: str, total: float | None = None, *, transient: bool = False
     ) -> None:
+        console = stderr_console()
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),  # a file may be named [red]
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("{task.fields[note]}", markup=False),
             TimeElapsedColumn(),
-            console=stderr_console(),
+            console=console,
             transient=transient,
+            auto_refresh=console.is_terminal,  # elsewhere only the last state is printed
+            refresh_per_second=REFRESH_HZ,
         )
         self._task = self._progress.add_task(description, total=total, note="")
 

@@ -100,6 +100,8 @@ class Gait(ABC):
     """Register 84 of every servo where the robot's own would squeeze too hard."""
     steered_by: ClassVar[str | None] = None
     """Its parameter, positive to the left, that steers it along waypoints; None: none does."""
+    follows_velocity: ClassVar[bool] = False
+    """Whether its rate and its ``turn_rad`` set how fast the body goes along itself and turns."""
     aim: ClassVar[Aim] = "advance"
     """The purpose that its speed is measured by."""
     model: ClassVar[type[GaitParameters]] = GaitParameters

@@ -54,6 +54,9 @@ class PolicyTrialResult:
     tripped: str | None
     slowed_to: float
     """Lowest rate of derating."""
+    pose_evidence: str
+    """How the poses are known that the numbers follow from."""
+    pose_source: str
 
 
 def policy_trials(
@@ -103,8 +106,9 @@ def _is_set(motion: str) -> bool:
 def _result(finished: Finished, seconds: float) -> PolicyTrialResult:
     record, source, outcome = finished.record, finished.source, finished.outcome
     assert isinstance(source, GaitMotion | PolicyMotion)
+    pose_of = (finished.summary.pose_evidence, finished.summary.pose_source)
     if outcome.tripped is not None:
-        return PolicyTrialResult(*(math.nan,) * 4, outcome.tripped, outcome.least_rate)
+        return PolicyTrialResult(*(math.nan,) * 4, outcome.tripped, outcome.least_rate, *pose_of)
     pose = record.pose
     ends_s = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), seconds)
     first, last = np.searchsorted(pose.time_s, ends_s)
@@ -121,4 +125,5 @@ def _result(finished: Finished, seconds: float) -> PolicyTrialResult:
         float(np.arctan2(way_m[1], way_m[0])),
         None,
         outcome.least_rate,
+        *pose_of,
     )

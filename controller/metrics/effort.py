@@ -99,8 +99,11 @@ class Effort:
     """Distance that touching links slide sideways, over that of the centre; flat floors only."""
 
 
-def effort(record: RunRecord) -> Effort:
-    """Return the effort of a gait run while it runs at full rate; NaN for other runs."""
+def effort(record: RunRecord, moved: Travel | None = None) -> Effort:
+    """Return the effort of a gait run while it runs at full rate; NaN for other runs.
+
+    ``moved`` is its travel, where it was computed before.
+    """
     pose, gait = record.pose, record.header.run.gait
     unknown = Effort(*(float("nan"),) * 5)
     if gait is None or len(pose.time_s) == 0:
@@ -116,7 +119,7 @@ def effort(record: RunRecord) -> Effort:
     moved_m = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
     return Effort(
         electrical_j / span_s,
-        *costs_of_transport(record, energy, travel(record)),
+        *costs_of_transport(record, energy, travel(record) if moved is None else moved),
         float(moved_m[2]) / span_s,
         _slip(record, steady),
     )

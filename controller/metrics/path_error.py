@@ -3,7 +3,7 @@
 from typing import Final
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy  # its modules load when they are first used: signal takes 23 MB
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
@@ -107,7 +107,9 @@ def smooth_track_m(pose: PoseTable) -> Floats:
     smooth = centre_m.copy()
     for axis in range(3):
         even_m = np.interp(even_s, time_s[known], centre_m[known, axis])
-        smooth[known, axis] = np.interp(time_s[known], even_s, savgol_filter(even_m, window, 2))
+        smooth[known, axis] = np.interp(
+            time_s[known], even_s, scipy.signal.savgol_filter(even_m, window, 2)
+        )
     return smooth
 
 

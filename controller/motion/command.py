@@ -43,6 +43,21 @@ class StartGait(NamedTuple):
     gait: Gait
 
 
+class Velocity(NamedTuple):
+    """Go along the body and turn; a command that nobody renews ends in rest."""
+
+    forward_m_s: float
+    turn_rad_s: float
+    """Positive to the left."""
+
+
+class GoTo(NamedTuple):
+    """Go to a point of the ground; waypoints that are left are left out."""
+
+    x_m: float
+    y_m: float
+
+
 class HoldStill(NamedTuple):
     """Come to rest where the joints are."""
 
@@ -53,4 +68,4 @@ class Refused(NamedTuple):
     why: str
 
 
-Command = JointGoals | JointTrajectory | StartGait | HoldStill | Refused
+Command = JointGoals | JointTrajectory | StartGait | Velocity | GoTo | HoldStill | Refused

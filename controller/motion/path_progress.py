@@ -22,6 +22,8 @@ class Decision:
     """Shapes within the heading tolerance; 0 means that the nearest few were taken instead."""
     visited: int
     """Distinct states visited so far."""
+    carrier_rad: float = 0.0
+    """Amplitude of the wide wave on which the shape rides; 0 if there is none."""
 
 
 @runtime_checkable

@@ -16,6 +16,8 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.metrics.travel import Travel, travel
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (
@@ -97,6 +99,8 @@ class Finished:
     """What mapped the ground on the way, and how well, where something did."""
     source: MotionSource
     """The motion that ran, at its end."""
+    travel: Travel
+    """Travel of the centre of mass, of which the summary has the speed."""
 
 
 def execute(
@@ -110,7 +114,7 @@ def execute(
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
-    waypoint_commands: Callable[[], Iterable[str]] | None = None,
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
@@ -160,7 +164,7 @@ class _Execution:
     shadow: bool
     confirm: Callable[[str], bool] | None
     stop_requested: Callable[[], str | None]
-    waypoint_commands: Callable[[], Iterable[str]] | None
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None
     on_progress: OnProgress
     on_event: OnEvent
 
@@ -208,8 +212,8 @@ class _Execution:
             )
             outcome, pose, mapped, source = self._loop(robot, backend, log, button, initial_pose)
         LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
-        record, numbers = _read_back(log_path)
-        return Finished(outcome, log_path, record, numbers, pose, mapped, source)
+        record, numbers, moved = _read_back(log_path)
+        return Finished(outcome, log_path, record, numbers, pose, mapped, source, moved)
 
     def _backend(self, robot: RobotConfig, initial_pose: InitialPose | None) -> Backend:
         prepared, port = self.prepared, self.port
@@ -314,7 +318,7 @@ def _stop_output(
 def _live(
     prepared: PreparedRun,
     source: MotionSource,
-    commands: Callable[[], Iterable[str]],
+    commands: Callable[[], Iterable[str | Refused]],
     on_event: OnEvent,
 ) -> LiveCourse:
     """Put a person in charge of the waypoints.
@@ -380,11 +384,12 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
         raise
 
 
-def _read_back(log: Path) -> tuple[RunRecord, RunSummary]:
+def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
     """Read the log of a run that is over, and write its summary beside it."""
     try:
         record = read_log(log)
-        return record, write_summary(summary(record), log.parent)
+        moved = travel(record)
+        return record, write_summary(summary(record, moved), log.parent), moved
     except KeyboardInterrupt as stop:
         stop.add_note(f"the run is whole: {log}; its page: snakewalk report {log}")
         raise

@@ -109,7 +109,7 @@ def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
         and not prepared.config.then
         and prepared.config.by == "blend"
     ):
-        displacement = gait_displacement(finished.record)
+        displacement = finished.travel.gait or gait_displacement(finished.record)
         result |= {
             "frequency_hz": round(displacement.frequency_hz, 3),
             "cycles": displacement.cycles,

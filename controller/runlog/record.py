@@ -1,8 +1,8 @@
 """A run as its log describes it: one table for each topic, rows in order of time."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, NamedTuple, Self
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -242,3 +242,50 @@ class RunRecord:
         ends = [t.time_s[-1] for t in (self.cycle, self.pose, self.walk) if len(t.time_s)]
         ends += [e.time_s for e in self.events[-1:]]
         return float(max(ends, default=0.0))
+
+    @property
+    def torque_on_s(self) -> float:
+        """Time at which torque was switched on; 0 if it was not."""
+        return next((event.time_s for event in self.events if event.kind == "start"), 0.0)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from torque on to torque off, or to the last row of a log that breaks off."""
+        stops = [event.time_s for event in self.events if event.kind == "stop"]
+        return (stops[-1] if stops else self.end_s) - self.torque_on_s
+
+    def from_torque_on(self) -> Self:
+        """Return the record with times that count from the moment torque was switched on.
+
+        The times of a log count from the moment the connection was opened.
+        """
+        start_s = self.torque_on_s
+        if start_s == 0.0:
+            return self
+        moved: dict[str, Any] = {}
+        for field in fields(self):
+            table = getattr(self, field.name)
+            if isinstance(table, Table):
+                moved[field.name] = _earlier(table, start_s)
+        plan = self.header.plan
+        if plan.set_s is not None:
+            plan = replace(plan, set_s=plan.set_s - start_s)
+        return replace(
+            self,
+            **moved,
+            header=replace(self.header, plan=plan),
+            paths=tuple((time_s - start_s, points_m) for time_s, points_m in self.paths),
+            waypoints=tuple((time_s - start_s, points_m) for time_s, points_m in self.waypoints),
+            events=tuple(replace(event, time_s=event.time_s - start_s) for event in self.events),
+        )
+
+
+_TIMES: Final = ("time_s", "deadline_s", "arrival_s")
+"""Fields of tables that are points in time."""
+
+
+def _earlier(table: Table, start_s: float) -> Table:
+    known: Any = table
+    names = [name for name in _TIMES if hasattr(table, name)]
+    earlier: Table = replace(known, **{name: getattr(known, name) - start_s for name in names})
+    return earlier

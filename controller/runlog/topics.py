@@ -234,7 +234,7 @@ class PoseTable(Table):
     target: Annotated[Ints, Column("index of the next waypoint", "integer", default=0)]
 
 
-@topic("/pose_source", is_optional=True, watched="")
+@topic("/pose_source", is_optional=True, watched="newest")
 class PoseSourceTable(Table):
     """State of an external pose source; times are those of the cycles."""
 
@@ -280,6 +280,9 @@ class WalkTable(Table):
     ramp_rad: Annotated[Floats, Column("bend added to cancel it")]
     candidates: Annotated[Ints, Column("states within the heading tolerance", "integer")]
     eta_q: Annotated[Floats, _optional("quasi-static gain of the state")]
+    carrier_rad: Annotated[
+        Floats, _optional("amplitude of the wide wave on which the state rides; 0: none")
+    ]
 
 
 @topic("/friction")

@@ -227,12 +227,12 @@ class Derating:
     def _allowed_by_load(self, load: LoadEstimate, state: JointState) -> Allowed:
         """Return the rate that the supply's fuse and the windings allow."""
         fuse_a, limit_c = self._fuse_a, self._safety.winding_limit_c
-        windings_c = load.winding_c(state)
         if (
             load.current_a <= CURRENT_START * fuse_a
-            and not (windings_c > limit_c - WINDING_BAND_C).any()
+            and not load.hottest_c > limit_c - WINDING_BAND_C
         ):
             return UNLIMITED
+        windings_c = load.winding_c(state)
         rates = _falling(windings_c, limit_c - WINDING_BAND_C, limit_c - WINDING_EDGE_C)
         joint = int(np.argmin(rates))
         by_fuse = 1.0

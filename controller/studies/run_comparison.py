@@ -24,6 +24,8 @@ class ComparedRun:
     summary: RunSummary
     settings: Mapping[str, Any]
     """Values of run, robot and world by dotted key, with the bus and the software."""
+    pose: str
+    """Evidence of its poses: ``measured by simulator``."""
     waypoints_m: Floats
     """(w, 2)"""
     waypoint_radius_m: float
@@ -61,6 +63,7 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
         name=name,
         summary=summary(record),
         settings=settings,
+        pose=header.pose_evidence.text,
         waypoints_m=header.plan.waypoints_m,
         waypoint_radius_m=header.plan.waypoint_radius_m,
         centre_m=pose.centre_m[:, :2],

@@ -15,7 +15,6 @@ from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest
 from snakewalk.controller.console.pool import each
-from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.run.execute import execute
@@ -95,6 +94,9 @@ class Trial:
     """Waypoints that the body came to, where its pose was estimated; NaN of a measured one."""
     head_error_m: float = math.nan
     """How far the estimated head is off, root of the mean square; NaN of a measured one."""
+    pose_evidence: str = ""
+    """How the poses that the walk used are known; ``measured``, ``dead-reckoned``, ..."""
+    pose_source: str = ""
     alarms: int = 0
     """For missing advance."""
     cause: str = ""
@@ -231,7 +233,7 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
         reached=reached,
         missed=outcome.missed,
         duration_s=outcome.duration_s,
-        speed_m_s=gait_displacement(finished.record).speed_m_s if trial.case.is_gait else math.nan,
+        speed_m_s=_number(numbers.speed_m_s) if trial.case.is_gait else math.nan,
         path_error_m=_number(numbers.path_error_mean_m),
         path_error_max_m=_number(numbers.path_error_max_m),
         eta=_number(numbers.eta),
@@ -242,6 +244,8 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
         in_air=stood.in_air,
         truly_reached=math.nan if off is None else float(off.waypoints_reached),
         head_error_m=math.nan if off is None else off.head_rms_m,
+        pose_evidence=numbers.pose_evidence,
+        pose_source=numbers.pose_source,
         alarms=outcome.alarms,
         cause="" if ended is None else ended.cause,
         why="" if ended is None else ended.text,
@@ -331,6 +335,8 @@ class CaseSummary:
     """Of an estimated pose, mean over the runs."""
     world: str = ""
     """Where one was chosen."""
+    pose: str = ""
+    """Evidence of the poses: ``measured (simulator)``."""
     rolled: int = 0
     """Runs in which the head link was over 90 degrees on its side at some time."""
 
@@ -374,10 +380,16 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 truly_complete=_truly_complete(some),
                 head_error_m=_mean([t.head_error_m for t in some], 3),
                 world=case.world or "",
+                pose=_evidence(some),
                 rolled=sum(t.roll_max_deg > 90.0 for t in some),
             )
         )
     return rows
+
+
+def _evidence(some: Sequence[Trial]) -> str:
+    known = {f"{t.pose_evidence} ({t.pose_source})": None for t in some if t.pose_evidence}
+    return ", ".join(known)
 
 
 def _truly_complete(some: Sequence[Trial]) -> str:

@@ -5,24 +5,29 @@ from collections.abc import Callable
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 
 _CHORD_M = 0.05  # the path is tabulated every centimetre; a shorter arc has no curvature
 _WORTH = 1.1  # a change must widen the sharpest bend by this much
 _CHANGES = 8
 _NEAREST = 2
+_SPLINE_UNITS = 500
+"""Work of a spline, of its bends, or of its check."""
 
 
-def widen(
+def widen_in_steps(
     points_m: Floats, free: Bools, radius_m: float, safe: Callable[[SplinePath], bool]
-) -> SplinePath:
+) -> Steps[SplinePath]:
     """Spline through points, with free ones near its sharpest bends dropped or pulled straight.
 
     Ends when every bend has ``radius_m``, or when no change that keeps the path safe helps; the
     points that are not free stay.
     """
+    yield _SPLINE_UNITS
     path = SplinePath(points_m)
     for _ in range(_CHANGES):
+        yield _SPLINE_UNITS
         radius, at_m = sharpest_bend(path)
         if radius >= radius_m:
             break
@@ -32,9 +37,14 @@ def widen(
             straight[k] = (points_m[k - 1] + 2.0 * points_m[k] + points_m[k + 1]) / 4.0
             dropped = np.delete(points_m, k, axis=0), np.delete(free, k)
             for points, still_free in (dropped, (straight, free)):
+                yield _SPLINE_UNITS
                 changed = SplinePath(points)
+                yield _SPLINE_UNITS
                 wider = sharpest_bend(changed)[0]
-                if wider > _WORTH * (radius if best is None else best[0]) and safe(changed):
+                if wider <= _WORTH * (radius if best is None else best[0]):
+                    continue
+                yield _SPLINE_UNITS
+                if safe(changed):
                     best = wider, points, still_free, changed
         if best is None:
             break

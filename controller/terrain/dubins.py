@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.drivers.compiling import compiled
 
@@ -24,6 +25,8 @@ _STEP_M = 0.01
 _JOINS = 16
 _SAMPLES = 24
 _BATCH = 48
+_LAID_POSES = 16
+"""Poses to which curves are laid in a step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +160,7 @@ class PathTurns:
         least_per_m: float,
         joins: int = _JOINS,
     ) -> None:
-        """Lay all Dubins curves to ``joins`` places on the path, up to ``until_m``.
+        """Choose ``joins`` places on the path, up to ``until_m``.
 
         Args:
             path: its start is where the curves begin.
@@ -169,38 +172,64 @@ class PathTurns:
             joins: places.
 
         """
-        headings = np.atleast_1d(np.asarray(headings_rad, float))
-        self.path, self._cost_per_m = path, cost_per_m
-        self._s_m = s_m = np.linspace(0.0, until_m, joins)
+        self.path, self._cost_per_m, self._least_per_m = path, cost_per_m, least_per_m
+        self._headings_rad = np.atleast_1d(np.asarray(headings_rad, float))
+        self._radius_m = radius_m
+        self._s_m = np.linspace(0.0, until_m, joins)
+        self._curves: DubinsCurves | None = None
+        self._length_m = self._rest = self._bound = np.empty(0)
+        self.least = np.empty(0)
+        """(h,) less than the cheapest turn in each direction costs; empty before they are laid."""
+
+    def lay_in_steps(self) -> Steps[DubinsCurves]:
+        """Lay all Dubins curves, once."""
+        if self._curves is not None:
+            return self._curves
+        headings, s_m, path = self._headings_rad, self._s_m, self.path
+        yield 100
+        joins, times = len(s_m), len(headings)
         at_m = path.position(s_m)
         ahead = path.position(s_m + _STEP_M) - path.position(s_m - _STEP_M)
-        direction, times = np.arctan2(ahead[:, 1], ahead[:, 0]), len(headings)
-        self._curves = dubins_curves(
-            at_m[0],
-            np.repeat(headings, joins),
-            np.tile(at_m, (times, 1)),
-            np.tile(direction, times),
-            radius_m,
+        direction = np.tile(np.arctan2(ahead[:, 1], ahead[:, 0]), times)
+        starts, goals = np.repeat(headings, joins), np.tile(at_m, (times, 1))
+        pieces = []
+        for k in range(0, len(starts), _LAID_POSES):
+            yield 700
+            some = slice(k, k + _LAID_POSES)
+            laid = dubins_curves(
+                at_m[0], starts[some], goals[some], direction[some], self._radius_m
+            )
+            pieces.append(laid.pieces_m)
+        yield 500
+        self._curves = curves = DubinsCurves(
+            complex(*at_m[0]), starts, self._radius_m, np.concatenate(pieces)
         )
-        per_m = cost_per_m(at_m)
+        per_m = self._cost_per_m(at_m)
         spent = np.concatenate([[0.0], np.cumsum(np.diff(s_m) * (per_m[1:] + per_m[:-1]) / 2.0)])
-        self._length_m = self._curves.length_m.ravel()
+        self._length_m = curves.length_m.ravel()
         self._rest = np.tile(np.repeat(spent[-1] - spent, len(_TURNS)), times)
-        self._bound = least_per_m * self._length_m + self._rest
+        self._bound = self._least_per_m * self._length_m + self._rest
         self.least = self._bound.reshape(times, -1).min(axis=1)
-        """(h,) less than the cheapest turn in each direction costs."""
+        return curves
 
     def cheapest(self, direction: int = 0) -> Turn:
         """Return the turn in one direction with which the way to ``until_m`` costs least."""
+        return at_once(self.cheapest_in_steps(direction))
+
+    def cheapest_in_steps(self, direction: int = 0) -> Steps[Turn]:
+        """Find ``cheapest`` in steps."""
+        curves = yield from self.lay_in_steps()
         count = len(self._s_m) * len(_TURNS)
         first = direction * count
+        yield 100
         order = first + np.argsort(self._bound[first : first + count])
         best, chosen = np.inf, int(order[0])
         for some in np.split(order, range(_BATCH, count, _BATCH)):
             if self._bound[some[0]] >= best:
                 break
+            yield 800
             exist = some[np.isfinite(self._bound[some])]
-            cost = self._cost_per_m(self._curves.samples(exist, _SAMPLES)).mean(axis=-1)
+            cost = self._cost_per_m(curves.samples(exist, _SAMPLES)).mean(axis=-1)
             cost = cost * self._length_m[exist] + self._rest[exist]
             k = int(np.argmin(cost))
             if cost[k] < best:
@@ -209,7 +238,7 @@ class PathTurns:
         turn_m = self._length_m[chosen]
         at = np.linspace(0.0, turn_m, max(2, round(turn_m / _STEP_M)))
         join_m = float(self._s_m[goal % len(self._s_m)])
-        return Turn(self._curves.position(goal, kind, at), join_m, best)
+        return Turn(curves.position(goal, kind, at), join_m, best)
 
     def onto(self, turn: Turn) -> SplinePath:
         """Return the path that begins with a turn."""

@@ -16,6 +16,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.relief import Relief
@@ -60,14 +61,29 @@ class MapPlanner:
             InputError: no safe ground is known.
 
         """
+        return at_once(self.in_steps(points_m, heading_rad, avoid_m=avoid_m, number=number))
+
+    def in_steps(
+        self,
+        points_m: ArrayLike,
+        heading_rad: float | None = None,
+        *,
+        avoid_m: ArrayLike = (),
+        number: int = 1,
+    ) -> Steps[SplinePath]:
+        """Plan as a call does, in steps, on the map as it is when the first one is done."""
         points = np.asarray(points_m, float)
-        if self._on is None:
-            return TerrainPlanner(None, self._config)(points, heading_rad, avoid_m=avoid_m)
+        known = self._on
+        if known is None:
+            planner = TerrainPlanner(None, self._config)
+            return (yield from planner.in_steps(points, heading_rad, avoid_m=avoid_m))
         faults: tuple[str, ...] = ()
         for within_m in _WITHIN_M:
-            corners = self._on.corners(points, within_m)
+            yield 10000
+            corners = known.corners(points, within_m)
+            plan = known.cautious.in_steps(corners, heading_rad, avoid_m=avoid_m, number=number)
             try:
-                return self._on.cautious(corners, heading_rad, avoid_m=avoid_m, number=number)
+                return (yield from plan)
             except InputError as error:  # no smooth way: not so far
                 faults = error.faults
         raise InputError(faults)
@@ -94,7 +110,7 @@ class _Knowledge:
     @cached_property
     def cautious(self) -> TerrainPlanner:
         """Takes nothing unknown for safe."""
-        return TerrainPlanner(self._ground, self._config)
+        return TerrainPlanner(self._ground, self._config, exact=False)
 
     @cached_property
     def open_relief(self) -> Relief:

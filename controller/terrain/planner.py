@@ -5,15 +5,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
-from snakewalk.controller.terrain.bends import widen
+from snakewalk.controller.terrain.bends import widen_in_steps
 from snakewalk.controller.terrain.dubins import PathTurns
+from snakewalk.controller.terrain.exact_route import exact_route
+from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.relief import Relief
-from snakewalk.controller.terrain.safe_graph import SafeGraph
+from snakewalk.controller.terrain.rounded import rounded
+from snakewalk.controller.terrain.route_advice import route_advice
+from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
 _CHECK_STEP_M = 0.02  # how densely a spline is checked again
@@ -28,7 +32,19 @@ class TerrainPlanner:
     where the head is, and may lie anywhere.
     """
 
-    def __init__(self, ground: HeightField | None, config: PlannerConfig) -> None:
+    def __init__(
+        self, ground: HeightField | None, config: PlannerConfig, *, exact: bool = True
+    ) -> None:
+        """Build fields and graph.
+
+        Args:
+            ground: None for a flat floor.
+            config: limits of safe ground.
+            exact: search all safe ground where the graph's nodes find no way or no smooth one;
+                else such points are refused, which needs less time.
+
+        """
+        self._exact = exact
         self.relief = None if ground is None else Relief(ground, config)
         self.graph = None if self.relief is None else SafeGraph(self.relief)
         self._least_per_m = 1.0 if self.graph is None else self.graph.length_weight
@@ -65,39 +81,84 @@ class TerrainPlanner:
             InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
 
         """
+        return at_once(self.in_steps(points_m, heading_rad, turn_radius_m, avoid_m, number))
+
+    def in_steps(
+        self,
+        points_m: ArrayLike,
+        heading_rad: float | None = None,
+        turn_radius_m: float = 0.5,
+        avoid_m: ArrayLike = (),
+        number: int = 1,
+    ) -> Steps[SplinePath]:
+        """Plan as a call does, in steps."""
         points, avoid = np.asarray(points_m, float), np.asarray(avoid_m, float).reshape(-1, 2)
         self._number = number
         if heading_rad is None:
-            path = self._waypoint_turns(self._base(points, avoid), points[1:], any_start=True)
+            base = yield from self._base(points, avoid)
+            path = yield from self._waypoint_turns.in_steps(base, points[1:], any_start=True)
             self._planned = points, path
             return path
-        path = self._again(points, avoid)
+        path = yield from self._again(points, avoid)
+        yield 300
         until_m = path.first_pass(points[1])
         turns = PathTurns(
             *(path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, self._least_per_m)
         )
-        return turns.onto(turns.cheapest())
+        turn = yield from turns.cheapest_in_steps()
+        yield 300
+        return turns.onto(turn)
 
-    def _base(self, points: Floats, avoid: Floats) -> SplinePath:
+    def _base(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
         """Path through points that knows nothing of the body's direction."""
-        graph = self.graph and self.graph.avoiding(avoid)
-        if self.relief is None or graph is None:
+        yield 700
+        if self.relief is None or self.graph is None:
             return SplinePath(points)
+        graph = yield from self.graph.avoiding_in_steps(avoid)
         faults = [f for k in range(1, len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
-        return self._spline(self._polygon(points, graph), points, self.relief)
+        return (yield from self._through(points, graph, self.relief))
 
-    def _again(self, points: Floats, avoid: Floats) -> SplinePath:
+    def _through(self, points: Floats, graph: SafeGraph, relief: Relief) -> Steps[SplinePath]:
+        """Path through safe points: by the graph's nodes, or else by all safe ground."""
+        fault = ""
+        try:
+            corners = yield from self._polygon(points, graph)
+            return (yield from self._spline(corners, points, relief))
+        except InputError as error:
+            if not self._exact:
+                raise
+            fault = str(error)
+        legs = []
+        for k in range(1, len(points)):
+            yield _EXACT_STEP
+            leg = exact_route(relief, graph, points[k - 1], points[k])
+            if leg is None:
+                raise InputError(self._blocked(k, points))
+            legs.append(leg)
+        for shorten in (True, False):
+            shown = [_shortened(leg, graph) if shorten else leg for leg in legs]
+            corners = np.vstack([shown[0], *(leg[1:] for leg in shown[1:])])
+            free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
+            path = rounded(corners, free, lambda at: relief.safe(*at.T))
+            if not len(self._unsafe(path, points[0], relief)):
+                return path
+        raise InputError(fault)
+
+    def _again(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
         """Path from elsewhere: a new leg to the next waypoint, then the path that was planned.
 
         A body that moves has no time for more: turns by waypoints take some 30 ms each.
         """
+        yield 500
         onward = self._onward(points, avoid)
         if onward is None:
-            return self._waypoint_turns(self._base(points, avoid), points[1:], any_start=False)
-        path = self._waypoint_turns.arrive(self._base(points[:2], avoid), onward)
-        return self._base(points, avoid) if path is None else path
+            base = yield from self._base(points, avoid)
+            return (yield from self._waypoint_turns.in_steps(base, points[1:], any_start=False))
+        leg = yield from self._base(points[:2], avoid)
+        path = yield from self._waypoint_turns.arrive_in_steps(leg, onward)
+        return (yield from self._base(points, avoid)) if path is None else path
 
     def _onward(self, points: Floats, avoid: Floats) -> Floats | None:
         """(n, 2) points, a centimetre apart, of the planned path from the second point on.
@@ -142,36 +203,48 @@ class TerrainPlanner:
     def _all_safe(self, points_m: Floats) -> bool:
         return self.relief is None or bool(self.relief.safe(*points_m.T).all())
 
-    def _polygon(self, points: Floats, graph: SafeGraph) -> Floats:
+    def _polygon(self, points: Floats, graph: SafeGraph) -> Steps[Floats]:
         """(k, 2) corners through all points, leg by leg."""
-        anchors = [graph.nearest(point) for point in points]
+        anchors = []
+        for point in points:
+            yield 100
+            anchors.append(graph.nearest(point))
         pieces = [points[:1]]
         for k in range(1, len(points)):
             here, there = anchors[k - 1], anchors[k]
+            if there is not None and graph is not self.graph:
+                yield from graph.tree_in_steps(there)
+            yield 300
             if k == 1 and there is not None:  # the body may stand beside an island of safe nodes
                 here = graph.nearest(points[0], graph.can_reach(there))
             nodes = None if here is None or there is None else graph.cheapest_path(here, there)
             if nodes is None:
                 raise InputError(self._blocked(k, points))
-            pieces.append(straighten(np.vstack([points[k - 1], nodes, points[k]]), graph)[1:])
+            nodes = np.vstack([points[k - 1], nodes, points[k]])
+            corners = yield from straighten_in_steps(nodes, graph)
+            pieces.append(corners[1:])
         return np.vstack(pieces)
 
-    def _spline(self, corners: Floats, points: Floats, relief: Relief) -> SplinePath:
+    def _spline(self, corners: Floats, points: Floats, relief: Relief) -> Steps[SplinePath]:
         """Spline through the corners, with more of them wherever it would leave safe ground.
 
         A cubic overshoots its polygon; the polygon is safe, and enough points hold the cubic to it.
         Bends are widened last, as far as that stays safe.
         """
         for _ in range(_ROUNDS):
+            yield 500
             path = SplinePath(corners)
+            yield 500
             bad = self._unsafe(path, points[0], relief)
             if not len(bad):
                 free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
-                return widen(
-                    corners,
-                    free,
-                    relief.config.bend_radius_m,
-                    lambda wider: not len(self._unsafe(wider, points[0], relief)),
+                return (
+                    yield from widen_in_steps(
+                        corners,
+                        free,
+                        relief.config.bend_radius_m,
+                        lambda wider: not len(self._unsafe(wider, points[0], relief)),
+                    )
                 )
             corners = _denser(corners, path, bad)
         points = path.position(bad)
@@ -179,8 +252,7 @@ class TerrainPlanner:
         x, y = (round(float(at), 2) + 0.0 for at in worst)  # no -0.00
         raise InputError(
             f"path: no smooth way over safe ground: ({x:.2f}, {y:.2f}) "
-            f"{_unsafe_because(relief, worst)}; move a waypoint, or allow more by "
-            "world.planner.slope_limit_rad or world.planner.variance_limit_m2"
+            f"{_unsafe_because(relief, worst)}; move a waypoint"
         )
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
@@ -194,11 +266,12 @@ class TerrainPlanner:
     def _blocked(self, k: int, points: Floats) -> str:
         assert self.relief is not None
         config = self.relief.config
+        advice = route_advice(self.relief, points[k - 1 : k + 1])
         return (
             f"{self._name(k, points[k])} cannot be reached from "
             f"{self._name(k - 1, points[k - 1])}: no way "
             f"stays under a slope of {np.degrees(config.slope_limit_rad):.1f} deg and an elevation "
-            f"variance of {config.variance_limit_m2:.2g} m2"
+            f"variance of {config.variance_limit_m2:.2g} m2; {advice}"
         )
 
     def _fault(self, k: int, point: Floats) -> list[str]:
@@ -257,10 +330,19 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
 
 
 _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
+_SAMPLES_IN_STEP = 6000
+_EXACT_STEP = 50_000  # a search of all safe ground is one step; it is rare
 _CORNER_M = 1.0  # what a corner costs, as metres of path: few corners make wide bends
 
 
-def straighten(nodes_m: Floats, graph: SafeGraph) -> Floats:
+def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:
+    """Return corners straightened again and again, until none can be left out."""
+    while len(shorter := at_once(straighten_in_steps(corners_m, graph))) < len(corners_m):
+        corners_m = shorter
+    return corners_m
+
+
+def straighten_in_steps(nodes_m: Floats, graph: SafeGraph) -> Steps[Floats]:
     """(k, 2) corners of the cheapest safe polygon from the first to the last of (m, 2) points.
 
     Consecutive points are taken to be joined; any other piece must be safe all along.
@@ -270,7 +352,18 @@ def straighten(nodes_m: Floats, graph: SafeGraph) -> Floats:
     if last > _REACH:
         pairs.append((0, last))
     a, b = np.array(pairs).T
-    cost, _, safe = graph.edge_cost(nodes_m[a], nodes_m[b])
+    yield 200 + 2 * len(a)
+    longest_m = float(np.hypot(*(nodes_m[b] - nodes_m[a]).T).max())
+    samples = 1 + longest_m / SAMPLE_M
+    costs, safes = list[Floats](), list[Bools]()
+    for k in range(0, len(a), pairs_in_step := max(1, int(_SAMPLES_IN_STEP / samples))):
+        yield 1000
+        some = slice(k, k + pairs_in_step)
+        part, _, is_safe = graph.edge_cost(nodes_m[a[some]], nodes_m[b[some]], longest_m)
+        costs.append(part)
+        safes.append(is_safe)
+    cost, safe = np.concatenate(costs), np.concatenate(safes)
+    yield 200 + len(a)
     cost = np.where(safe | (b - a == 1), cost, np.inf) + _CORNER_M * graph.length_weight
     best, back = np.full(last + 1, np.inf), np.zeros(last + 1, dtype=int)
     best[0] = 0.0

@@ -8,7 +8,9 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from snakewalk.config.arrays import Bools, Floats, Indices
+from snakewalk.controller.terrain.dijkstra import shortest_tree
 from snakewalk.controller.terrain.footprint import Footprint
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.relief import EDGE_TOLERANCE_M, Relief
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -17,9 +19,11 @@ RISK_LIMIT = 0.9
 
 # Half of the sixteen neighbours; the other half are the same edges in the other direction.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
-_SAMPLE_M = 0.05
+SAMPLE_M = 0.05
+"""Between the points at which an edge is weighed, at most."""
 _AVOID = 30.0
 """Metres of level path that a metre through an avoided place costs more."""
+_EDGES_IN_STEP = 5000
 
 
 class SafeGraph:
@@ -62,19 +66,23 @@ class SafeGraph:
         self._edges = self._joined(index)
         self._trees: dict[int, tuple[Floats, Indices]] = {}
 
-    def avoiding(self, places_m: Floats) -> Self:
+    def avoiding_in_steps(self, places_m: Floats) -> Steps[Self]:
         """Return this graph with a cost on what lies within a footprint of places (k, 2)."""
         if len(places_m) == 0:
             return self
-        found = copy(self)
+        found, edges = copy(self), self._edges
         found._avoid_m, found._trees = np.asarray(places_m, float), {}
-        edges = self._edges.tocoo()
-        from_m, to_m = self.nodes_m[edges.col], self.nodes_m[edges.row]
-        length = np.hypot(*(to_m - from_m).T)
-        more = self.length_weight * length * found._avoided(0.5 * (from_m + to_m))
-        found._edges = csr_array(
-            coo_array((edges.data + more, (edges.row, edges.col)), shape=edges.shape)
-        )
+        yield 500
+        rows = np.repeat(np.arange(len(self.nodes_m)), np.diff(edges.indptr))
+        weights = edges.data.copy()
+        for k in range(0, len(weights), _EDGES_IN_STEP):
+            yield 300 + 500 * len(places_m)
+            some = slice(k, k + _EDGES_IN_STEP)
+            from_m, to_m = self.nodes_m[edges.indices[some]], self.nodes_m[rows[some]]
+            length = np.hypot(*(to_m - from_m).T)
+            weights[some] += self.length_weight * length * found._avoided(0.5 * (from_m + to_m))
+        yield 300
+        found._edges = csr_array((weights, edges.indices, edges.indptr), shape=edges.shape)
         return found
 
     def _avoided(self, points_m: Floats) -> Floats:
@@ -97,6 +105,14 @@ class SafeGraph:
     def can_reach(self, target: int) -> Bools:
         """(n,) nodes from which ``target`` can be reached."""
         return np.isfinite(self.costs_to(target))
+
+    def tree_in_steps(self, target: int) -> Steps[None]:
+        """Prepare what ``can_reach`` and ``cheapest_path`` need of a target."""
+        if target in self._trees:
+            return
+        edges = self._edges
+        found = yield from shortest_tree(edges.indptr, edges.indices, edges.data, target)
+        self._trees[target] = found
 
     def costs_to(self, target: int) -> Floats:
         """(n,) cost of the cheapest path to ``target``; infinite where there is none."""
@@ -129,10 +145,16 @@ class SafeGraph:
             at.append(int(towards[at[-1]]))
         return self.nodes_m[at]
 
-    def edge_cost(self, from_m: Floats, to_m: Floats) -> tuple[Floats, Floats, Bools]:
-        """Weights of straight pieces (k, 2) to (k, 2), of them back, and whether they are safe."""
+    def edge_cost(
+        self, from_m: Floats, to_m: Floats, least_longest_m: float = 0.0
+    ) -> tuple[Floats, Floats, Bools]:
+        """Weights of straight pieces (k, 2) to (k, 2), of them back, and whether they are safe.
+
+        All pieces have as many samples as the longest one, or one of ``least_longest_m``.
+        """
         length = np.hypot(*(to_m - from_m).T)
-        count = max(2, int(np.ceil(length.max(initial=0.0) / _SAMPLE_M)) + 1)
+        longest_m = float(length.max(initial=least_longest_m))
+        count = max(2, int(np.ceil(longest_m / SAMPLE_M)) + 1)
         part, at = np.linspace(0.0, 1.0, count), np.empty((len(from_m), count, 2))
         for axis in range(2):  # numpy is slow where the innermost axis has two values
             step = np.multiply.outer(to_m[:, axis] - from_m[:, axis], part)

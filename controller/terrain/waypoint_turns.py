@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.terrain.bends import sharpest_bend
 from snakewalk.controller.terrain.dubins import PathTurns, Turn
+from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.path import SplinePath
 
 _SHARP = 0.45
@@ -62,44 +63,57 @@ class WaypointTurns:
             any_start: whether the path may begin in another direction.
 
         """
+        return at_once(self.in_steps(path, waypoints_m, any_start=any_start))
+
+    def in_steps(
+        self, path: SplinePath, waypoints_m: ArrayLike, *, any_start: bool
+    ) -> Steps[SplinePath]:
+        """Do a call in steps."""
+        yield 500
         legs, turned = _legs(path, np.asarray(waypoints_m, float)), False
         for k in range(0 if any_start else 1, len(legs) + 1):
+            yield 200
             if _bend_m(legs, k) < _SHARP * self._radius_m:
                 to_m = legs[k - 1] if k > 0 else None
                 from_m = legs[k] if k < len(legs) else None
-                found = self._turned(to_m, from_m, _ALL_ROUND_RAD + np.pi, _ALL_ROUND_RAD)
+                found = yield from self._turned(
+                    to_m, from_m, _ALL_ROUND_RAD + np.pi, _ALL_ROUND_RAD
+                )
                 if found is not None:
                     legs[max(k - 1, 0) : k + 1], turned = found, True
         if not turned:
             return path
+        yield 200
         return SplinePath.tabulated(np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]))
 
-    def arrive(self, leg: SplinePath, onward_m: Floats) -> SplinePath | None:
+    def arrive_in_steps(self, leg: SplinePath, onward_m: Floats) -> Steps[SplinePath | None]:
         """Return the path of a leg to a waypoint and points (n, 2) from there on, joined by a turn.
 
         None where every turn leads over unsafe ground.
         """
         back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
         to_m, backs = leg.piece_m(0.0, leg.length_m), np.array([back])
-        found = self._turned(to_m, None, backs, backs - np.pi)
+        found = yield from self._turned(to_m, None, backs, backs - np.pi)
         return None if found is None else SplinePath.tabulated(np.vstack([*found, onward_m[1:]]))
 
     def _turned(
         self, to_m: Floats | None, from_m: Floats | None, backs_rad: Floats, headings_rad: Floats
-    ) -> list[Floats] | None:
+    ) -> Steps[list[Floats] | None]:
         """Legs (n, 2) to and from a waypoint with a turn there; None where none is safe.
 
         The path leaves the waypoint in one of the directions ``headings_rad`` (h,), and comes from
         the opposite of it, ``backs_rad`` (h,).
         """
         for share in _RADII:
+            yield 200
             sides = []
             if to_m is not None:
                 sides.append(self._turns(to_m[::-1], backs_rad, share, back=True))
             if from_m is not None:
                 sides.append(self._turns(from_m, headings_rad, share, back=False))
-            turns = self._cheapest(sides)
+            turns = yield from self._cheapest(sides)
             if turns:
+                yield 400
                 found = [side.onto(turn) for side, turn in zip(sides, turns, strict=True)]
                 points = [leg.piece_m(0.0, leg.length_m) for leg in found]
                 return points if to_m is None else [points[0][::-1], *points[1:]]
@@ -116,8 +130,10 @@ class WaypointTurns:
     def _cost_backwards(self, points_m: Floats) -> Floats:
         return self._cost_per_m(points_m[..., ::-1, :])[..., ::-1]
 
-    def _cheapest(self, sides: list[PathTurns]) -> list[Turn]:
+    def _cheapest(self, sides: list[PathTurns]) -> Steps[list[Turn]]:
         """Return the safe turns, one on each side, in the direction that costs least; or none."""
+        for side in sides:
+            yield from side.lay_in_steps()
         least = np.sum([side.least for side in sides], axis=0)
         best, chosen = np.inf, list[Turn]()
         for direction in np.argsort(least).tolist():
@@ -125,7 +141,7 @@ class WaypointTurns:
                 break
             cost, turns = float(least[direction]), list[Turn]()
             for side in sides:
-                turn = side.cheapest(direction)
+                turn = yield from side.cheapest_in_steps(direction)
                 cost += turn.cost - side.least[direction]
                 if cost >= best or not self._safe(turn.points_m):
                     break

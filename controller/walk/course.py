@@ -2,15 +2,15 @@
 
 A waypoint counts when the body's centre is near it. Where the body passes by one, is three quarters
 of its length off the path, or stands still, another path is planned from its head, in its
-direction, off the places where it stood still. Other waypoints may be set while the body is on its
-way.
+direction, off the places where it stood still. The planning is spread over several control cycles;
+until it is done, the body goes on along the old path. Other waypoints may be set while the body is
+on its way.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.walk.replanning import PathPlanner, PathRequest, Replanning
 
 _OFF_PATH_BODIES = 0.75
 # Body lengths of travel before another path may be planned: turning back takes about as much.
@@ -31,20 +32,6 @@ _BEND_RAD = 0.8
 """By which a renewed path may bend where it goes on (ours)."""
 _BEYOND = 1.5
 """Metres of path for a straight metre that none leads along yet (ours)."""
-
-
-class PathPlanner(Protocol):
-    """Plans paths."""
-
-    def __call__(
-        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats, number: int = 1
-    ) -> SplinePath:
-        """Plan through (n, 2) points in order, from a heading where one is given.
-
-        The path keeps off places ``avoid_m`` (k, 2) where another way exists. ``number`` is that of
-        the second point, a waypoint, for what is said of it.
-        """
-        ...
 
 
 def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -> float:
@@ -153,6 +140,7 @@ class Course:
         self._gained_m, self._gained_at = 0.0, travel
         self._stalls_m: list[Floats] = []
         self._missed_before = -1
+        self._replanning: Replanning | None = None
         self.reached = 0
         """Number of waypoints reached."""
         self.missed = 0
@@ -228,6 +216,7 @@ class Course:
         if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) > self._radius_m:
             return False
         self.reached += 1
+        self._replanning = None  # it would lead to this waypoint first
         fall_back(False)
         return True
 
@@ -239,32 +228,61 @@ class Course:
         travel: float,
         fall_back: Callable[[bool], None] = lambda lost: None,
     ) -> None:
-        """Count a waypoint when the centre is near it; lay another path where this one failed.
+        """Count a waypoint when the centre is near it; request another path if this one failed.
+
+        ``continue_planning`` plans it.
 
         Args:
             centre_m: (2,) of mass.
             head_m: (2,)
             heading_rad: of the body; asked only for another path.
             travel: of the motion since its begin, whether or not the body came on.
-            fall_back: told whether the same waypoint was missed again, and when one is reached.
+            fall_back: called with False when a waypoint is reached.
 
         """
         self._travel = travel
-        if self.observe(centre_m, head_m, fall_back) or self.complete:
+        if self.observe(centre_m, head_m, fall_back) or self.complete or self.is_planning:
             return
         if self._feedback and travel >= self._replan_after:
             self._note_gain()
-            self.replanned = self._failing(centre_m)
-            if self.replanned is None:
+            why = self._failing(centre_m)
+            if why is None:
                 return
             if self._is_stalled:
                 self._stalls_m.append(np.array(head_m))
+            self._request(why, heading_rad, is_miss=True)
+
+    @property
+    def is_planning(self) -> bool:
+        """Whether another path is being planned."""
+        return self._replanning is not None
+
+    def cancel_planning(self) -> None:
+        """Drop the path that was requested, for a body that moves otherwise meanwhile."""
+        self._replanning = None
+
+    def continue_planning(self, fall_back: Callable[[bool], None] = lambda lost: None) -> None:
+        """Do a cycle's work on the path that was requested; when it is done, it is in force.
+
+        If no safe path is found, the old one stays.
+
+        Args:
+            fall_back: called with whether the same waypoint was missed again.
+
+        """
+        replanning = self._replanning
+        if replanning is None or not replanning.carry_on():
+            return
+        self._replanning, request = None, replanning.request
+        self._replan_after = self._travel + _REPLAN_AFTER_BODIES * self._per_body
+        if request.is_miss:
+            self.replanned = request.why
             self.missed += 1
             fall_back(self.reached == self._missed_before)
             self._missed_before = self.reached
-            self._replan_after = travel + _REPLAN_AFTER_BODIES * self._per_body
-            with suppress(InputError):  # no safe path leads back from here: the old one stays
-                self._lay(self._followers_m[1].copy(), heading_rad())
+        if replanning.path is not None:
+            self.replanned = request.why
+            self._follow_path(replanning.path)
 
     def renew(
         self,
@@ -307,19 +325,16 @@ class Course:
         return float(self._gap_m[0])
 
     def lay_from_here(self, why: str, heading_rad: Callable[[], float]) -> None:
-        """Plan again from the head, in the body's direction; it counts as no miss.
+        """Request another path from the head, in the body's direction; it counts as no miss.
 
-        Where no path is found, the old one stays.
+        ``continue_planning`` plans it. If no safe path is found, the old one stays.
 
         Args:
             why: for ``replanned``.
             heading_rad: of the body.
 
         """
-        with suppress(InputError):
-            self._lay(self._followers_m[1].copy(), heading_rad())
-            self.replanned = why
-            self._replan_after = self._travel + _REPLAN_AFTER_BODIES * self._per_body
+        self._request(why, heading_rad, is_miss=False)
 
     def lead_to(self, left_m: Floats, heading_rad: Callable[[], float]) -> None:
         """Go on to waypoints (k, 2) instead of those that are left.
@@ -334,7 +349,7 @@ class Course:
             InputError: as the planner; nothing has changed then.
 
         """
-        before = self.waypoints_m, self._goals_m
+        before, self._replanning = (self.waypoints_m, self._goals_m), None
         kept = self.waypoints_m[self.reached :]
         if np.array_equal(kept, left_m):
             return
@@ -416,12 +431,24 @@ class Course:
             along_m += float((centre_m - last[1]) @ ahead)
         return bool(along_m > self._passed_m[self.reached] + self._radius_m)
 
+    def _request(self, why: str, heading_rad: Callable[[], float], *, is_miss: bool) -> None:
+        """Request a path from the head through the waypoints that are left."""
+        points_m = np.vstack([self._followers_m[1], self.waypoints_m[self.reached :]])
+        stalls_m, number = np.array(self._stalls_m).reshape(-1, 2), self.reached + 1
+        request = PathRequest(why, points_m, heading_rad(), stalls_m, number, is_miss)
+        self._replanning = Replanning(request, self._plan)
+
     def _lay(self, from_m: Floats, heading_rad: float | None) -> None:
         """Plan from a point, with the body's heading, through the waypoints that are left."""
         points_m = np.vstack([from_m, self.waypoints_m[self.reached :]])
         stalls_m = np.array(self._stalls_m).reshape(-1, 2)
         number = self.reached + 1
-        self.path = self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number)
+        self._replanning = None
+        self._follow_path(self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number))
+
+    def _follow_path(self, path: SplinePath) -> None:
+        """Put a path in force that begins at the head, and leads to the waypoints left."""
+        self.path = path
         self._gained_m, self._gained_at = 0.0, self._travel
         self._along_m[:] = 0.0
         left_m = self.waypoints_m[self.reached :]

@@ -157,6 +157,7 @@ class Pilot(OnCourse):
         self._start: tuple[Floats, float] | None = None
         self._at_rest = True
         self._decides = True
+        self._has_thought = False
         self._coasts = False
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
@@ -216,6 +217,7 @@ class Pilot(OnCourse):
 
     def watch(self, view: BodyView) -> None:
         """Count waypoints while something else moves the body."""
+        self.course.cancel_planning()
         self.course.observe(view.centre_m[:2], view.link_m[0, :2], self._fall_back)
         self.decision = None
 
@@ -254,22 +256,34 @@ class Pilot(OnCourse):
             self._fall_back,
         )
         self.decision = None
-        left = self._chooser.track.end - self.head
-        if not self._decides or (
-            # at rest there is the time to think to the end
-            self._at_rest and self._chooser.think(lambda: self.path_pose(view))
-        ):
-            pass
-        elif left <= _LOOKAHEAD_SEGMENTS:
-            self._at_rest = False
-            self.decision = self._chooser.decide(self.path_pose(view))
-        elif left <= _LOOKAHEAD_SEGMENTS + _THINK_SEGMENTS:
-            self._chooser.think(lambda: self.path_pose(view))
+        self._has_thought = self._think(view)
+        if not self._has_thought:
+            self.course.continue_planning(self._fall_back)
         if self.course.complete:
             self._time_law.stop()
         else:
             self._time_law.go_on()
         return self._move(dt_s, view)
+
+    def _think(self, view: BodyView) -> bool:
+        """Think about the next piece of track, or decide; return whether that fills the cycle.
+
+        While a path is planned, every second cycle at least is left for that. At rest there is time
+        for both, so the path comes first: the piece depends on it.
+        """
+        if not self._decides or (self._at_rest and self.course.is_planning):
+            return False
+        if self._at_rest and self._chooser.think(lambda: self.path_pose(view)):
+            return True
+        left = self._chooser.track.end - self.head
+        if left <= _LOOKAHEAD_SEGMENTS:
+            self._at_rest = False
+            self.decision = self._chooser.decide(self.path_pose(view))
+            return True
+        plans_now = self.course.is_planning and self._has_thought
+        if left <= _LOOKAHEAD_SEGMENTS + _THINK_SEGMENTS and not plans_now:
+            return self._chooser.think(lambda: self.path_pose(view))
+        return False
 
     def _move(self, dt_s: float, view: BodyView) -> Floats:
         """Go on along the track; the goals (J,) there."""

@@ -106,7 +106,6 @@ class SideRolls(MotionWrapper, OnCourse):
         self._plan: RollPlan | None = None
         self._rolling: _Rolling | None = None
         self._walks_until = 0.0
-        self._relaid: str | None = None
         self.decision: Decision | None = None
         """Made in the last step, if one was."""
 
@@ -114,11 +113,6 @@ class SideRolls(MotionWrapper, OnCourse):
     def needs(self) -> Needs:
         """Those of the walk, and pitch joints."""
         return Needs(yaw=True, pitch=True, wheels=True)
-
-    @property
-    def replanned(self) -> str | None:
-        """Why another path was laid in the last step, if one was."""
-        return self._relaid or self.course.replanned
 
     @property
     def rolling(self) -> bool:
@@ -153,7 +147,6 @@ class SideRolls(MotionWrapper, OnCourse):
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Go on by ``dt_s`` and return the new targets (J,)."""
-        self._relaid = None
         if self._rolling is not None:
             self._pilot.watch(view)
             if self._rolling.is_over(dt_s, view, self._planner):
@@ -263,7 +256,6 @@ class SideRolls(MotionWrapper, OnCourse):
         course = self.course
         if not course.complete and course.off_path_m > _OFF_PATH_M:
             course.lay_from_here("the roll has ended off the path", lambda: view.heading_rad)
-            self._relaid = course.replanned
 
 
 def _cycle(plan: RollPlan, robot: RobotConfig) -> GaitCycle:

@@ -153,7 +153,7 @@ def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | 
     """The first joint that was not read for too long, as one line; None if there is none."""
     since_s = now_s - state.time_s
     # the greatest age stands for all, as rounding keeps the order; not so for a NaN
-    if np.maximum.reduce(state.age_s) + since_s <= limits.stale_limit_s:
+    if _oldest_s(state.age_s) + since_s <= limits.stale_limit_s:
         return None
     age_s = state.age_s + since_s
     joint = int(np.argmin(age_s <= limits.stale_limit_s))
@@ -300,6 +300,18 @@ def _quick_check(
             return np.nan
         age_max_s = max(age_max_s, age_s[k])
     return age_max_s
+
+
+@compiled(f"float64({_FLOATS})", makes_arrays=False)
+def _oldest_s(age_s: Floats) -> float:
+    """Greatest of the ages; NaN if one is not a number."""
+    oldest_s = -np.inf
+    for k in range(len(age_s)):
+        if not age_s[k] <= oldest_s:
+            oldest_s = age_s[k]
+            if np.isnan(oldest_s):
+                break
+    return oldest_s
 
 
 @compiled(

@@ -60,6 +60,8 @@ class Marks:
     """When the first, second, ... of them turn green."""
     paths: Sequence[tuple[float, Floats]] = ()
     """Each the time from when it is in force and (P, 2) points; drawn as dots."""
+    hollow: bool = False
+    """Whether the arrivals are not measured: rings are dashed then, without poles."""
 
 
 def render_film(
@@ -156,6 +158,7 @@ class _Stage:
             *(robot, world, ground, marks.waypoints_m, marks.waypoint_radius_m),
             look=look,
             fine=style.fine,
+            hollow=marks.hollow,
         )
         self.data = mujoco.MjData(self.model)
         self._view, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
@@ -244,7 +247,7 @@ def _corner(camera: Floats) -> Floats:
     turn = np.radians(camera[3])
     ahead = np.array([np.cos(turn), np.sin(turn)])
     left = np.array([-ahead[1], ahead[0]])
-    at_m: Floats = camera[:2] + camera[4] * (0.42 * left - 0.30 * ahead)
+    at_m: Floats = camera[:2] + camera[4] * (0.38 * left - 0.28 * ahead)
     return at_m
 
 

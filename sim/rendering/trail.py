@@ -22,6 +22,8 @@ CENTRE: Final[Rgba] = (0.85, 0.30, 0.10, 1)
 AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
 """The world's x and y."""
 AXES_GEOMS: Final = 5
+_AXES_SAMPLES: Final = 9
+"""Points of each rod at which the ground is looked up (ours)."""
 LIFT_M = 0.004
 SPACING_M = 0.12
 """Between dots of a path."""
@@ -112,8 +114,12 @@ def make_trail(
 def add_axes(
     scene: mujoco.MjvScene, at_m: Floats, length_m: float, ground: HeightField | None
 ) -> None:
-    """Append a rod along the world's x and one along its y, from (2,) on the ground."""
-    foot = _on_ground(at_m[None], ground)[0] + [0.0, 0.0, 0.02 * length_m]
+    """Append a rod along the world's x and one along its y, around (2,), above the ground."""
+    at_m = at_m - 0.5 * length_m  # so that both keep close to the place, whichever way they point
+    along_m = np.linspace(0.0, length_m, _AXES_SAMPLES)[:, None]
+    below = np.concatenate([at_m + along_m * np.eye(2)[axis] for axis in range(2)])
+    highest_m = _on_ground(below, ground)[:, 2].max()
+    foot = np.array([*at_m, highest_m + 0.03 * length_m])  # no hill covers a rod
     rod, still = mujoco.mjtGeom.mjGEOM_CAPSULE, (np.zeros(3), np.zeros(3), np.eye(3).ravel())
     _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
     for axis, (name, rgba) in enumerate(zip("xy", AXES, strict=True)):

@@ -106,7 +106,9 @@ def _robot_skin(skin: Skin, record: RunRecord, fps: float, source: str) -> tuple
     rows = _thinned(time_s, fps)
     robot = record.header.robot
     in_water = isinstance(record.header.world.ground, Water)
-    return robot_skin(skin, robot, in_water), from_poses(robot, time_s[rows], qpos[rows])
+    motion = from_poses(robot, time_s[rows], qpos[rows])
+    motion = replace(motion, pose=record.header.pose_evidence.texts)
+    return robot_skin(skin, robot, in_water), motion
 
 
 def robot_skin(skin: Skin, robot: RobotConfig, in_water: bool = False) -> Skin:

@@ -63,7 +63,11 @@ def write_skin(
     nodes, local = _bones(rig)
     animation = _animation(out, rig, motion, local, name)
     gltf = pygltflib.GLTF2(
-        asset=pygltflib.Asset(version="2.0", generator="snakewalk"),
+        asset=pygltflib.Asset(
+            version="2.0",
+            generator="snakewalk",
+            extras=dict(motion.pose),
+        ),
         scene=0,
         scenes=[pygltflib.Scene(name=name, nodes=[0, 1])],
         nodes=nodes,

@@ -46,7 +46,9 @@ def analyse(
     plane: Plane = None,
     picture: Annotated[
         Path | None,
-        typer.Option(help="draw tracks and maps: a file (.png, .svg, .pdf), or a folder for PNGs"),
+        typer.Option(
+            help="draw tracks and maps into a file (.png, .svg, .pdf), or a folder for PNGs"
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="overwrite pictures")] = False,
     as_json: Json = False,

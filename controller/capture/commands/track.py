@@ -61,7 +61,7 @@ def track(
     plane: Plane = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="write what was chosen as a track of its own (.npz)"),
+        typer.Option("-o", "--output", help="write the chosen frames as a new track (.npz)"),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")

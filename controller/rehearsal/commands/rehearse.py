@@ -43,24 +43,30 @@ def rehearse_runs(
         bool,
         typer.Option(
             "--errors",
-            help="wrong friction and mass, a weak servo, horns off by 2 degrees, goals 40 ms late",
+            help="add wrong friction and mass, a weak servo, horns off by 2 degrees and goals 40 "
+            "ms late",
         ),
     ] = False,
     tracker: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY=VALUE",
-            help="of the simulated tracker; default: noise_m=0.01 noise_deg=3 delay_s=0.1",
+            help="errors of the simulated tracker; default: noise_m=0.01 noise_deg=3 delay_s=0.1",
         ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", dir_okay=False, help="results, JSON lines; continued if there"),
+        typer.Option(
+            "--out",
+            "-o",
+            dir_okay=False,
+            help="write the results here as JSON lines, or continue an existing file",
+        ),
     ] = Path("rehearsal.jsonl"),
     as_json: Json = False,
 ) -> None:
-    """Rehearse runs against served robots in simulated time; 1 if one did not truly arrive."""
+    """Rehearse runs against served robots in simulated time; exit code 1 if one did not arrive."""
     given = {**_TRACKER, **dict(key_values("--tracker", tracker))}
     config = checked(TrackerConfig, given, "--tracker")
     planned = [

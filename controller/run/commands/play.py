@@ -33,13 +33,19 @@ def play(
     robot: Robot = None,
     world: World = None,
     speed: Annotated[
-        str, typer.Option(help="times the animal's own; auto: as fast as the joints can, at most 1")
+        str,
+        typer.Option(
+            help="factor on the animal's speed; auto: as fast as the joints can, at most 1"
+        ),
     ] = "auto",
     scale: Annotated[
-        float, typer.Option(help="times the joint angles: below 1 the whole motion is smaller")
+        float, typer.Option(help="factor on the joint angles; below 1 the motion is smaller")
     ] = 1.0,
     clip: Annotated[
-        bool, typer.Option("--clip", help="hold joints within their limits where it bends further")
+        bool,
+        typer.Option(
+            "--clip", help="hold joints at their limits where the recording bends further"
+        ),
     ] = False,
     set_: Set = None,
     *,

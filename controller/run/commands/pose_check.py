@@ -30,7 +30,7 @@ Judge = Callable[[PoseSample], str | None]
     examples=("pose check udp:9870", "pose check udp:9870 --run jacksboro-traverse --seconds 5"),
 )
 def check(
-    source: Annotated[str, typer.Argument(help="external pose source, as of `run --pose`")],
+    source: Annotated[str, typer.Argument(help="external pose source, as for `run --pose`")],
     robot: Robot = None,
     run: Annotated[
         str | None,
@@ -39,10 +39,12 @@ def check(
             autocompletion=completion.RUNS,
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="then it ends")] = 10.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=3600.0, help="duration of the check in seconds")
+    ] = 10.0,
     as_json: Json = False,
 ) -> None:
-    """Show position, axes, rate, delay and noise of an external pose; 1 if something is wrong."""
+    """Show position, axes, rate, delay and noise of an external pose; exit code 1 on a fault."""
     plugin, argument = pose_plugin(source)
     if not isinstance(plugin, ExternalSource):
         raise InputError(f"pose check {source}: its poses do not come from another program")

@@ -24,11 +24,12 @@ from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.map_planner import MapPlanner
 from snakewalk.controller.track.readers.load import load_track
-from snakewalk.controller.walk.course import Course, PathPlanner
+from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.map_walk import MapWalk
 from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
+from snakewalk.controller.walk.replanning import PathPlanner
 from snakewalk.controller.walk.roll_planner import RollPlanner
 from snakewalk.controller.walk.serpenoid import Serpenoid
 from snakewalk.controller.walk.shape_filters import MADE, passes_all, shape_filters

@@ -218,3 +218,18 @@ def test_bad_options_are_told_before_any_work(
     with pytest.raises(InputError, match=said):
         capture_recording(options)
     assert not (tmp_path / "t.npz").exists()
+
+
+def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path) -> None:
+    """Some frames of a colour film are exactly grey: they become two-dimensional arrays."""
+    folder = tmp_path / "film"
+    folder.mkdir()
+    for number, frame in enumerate(film(SCENE)):
+        coloured = np.dstack([frame] * 3)
+        if number % 2:
+            coloured[0, 0] = (0, 10, 20)
+        cv2.imwrite(str(folder / f"{number}.png"), coloured)
+    options = CaptureOptions(folder, tmp_path / "t.npz", rate_hz=15.0, roi="2,2,190,150")
+    facts = capture_recording(options)
+    assert facts.frames_used == SCENE.frames
+    assert facts.head_by == "travel"

@@ -19,6 +19,7 @@ from snakewalk.controller.motion.command import (
     JointTrajectory,
     Refused,
     StartGait,
+    Velocity,
 )
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
@@ -232,7 +233,11 @@ COMMANDS = st.one_of(
         st.floats(0.05, 2.0),
     ),
     st.sampled_from(
-        [HoldStill(), *(StartGait(make_gait(name)) for name in ("rolling", "sidewinding"))]
+        [
+            HoldStill(),
+            *(Velocity(*pair) for pair in ((0.02, 0.0), (0.1, 0.08), (-0.1, 0.05), (0.0, 0.0))),
+            *(StartGait(make_gait(name)) for name in ("rolling", "sidewinding")),
+        ]
     ),
 )
 

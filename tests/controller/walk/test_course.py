@@ -40,6 +40,11 @@ def walked(on: Course, head_x_m: float) -> None:
     on.follow(np.array([head_x_m - 0.6, 0.0]), np.array([head_x_m, 0.0]), lambda: 0.0, 0.0)
 
 
+def planned(on: Course) -> None:
+    while on.is_planning:
+        on.continue_planning()
+
+
 def test_a_path_that_ends_before_a_waypoint_does_not_pass_it_by() -> None:
     on = course(Plans(1.2))
     assert on.path.length_m == pytest.approx(1.2)
@@ -185,6 +190,8 @@ def test_a_path_from_here_begins_at_the_head_and_is_no_miss() -> None:
     on.follow(np.array([0.0, 0.5]), np.array([0.6, 0.6]), lambda: 0.0, 0.0)
     assert on.off_path_m == pytest.approx(0.5)
     on.lay_from_here("moved aside", lambda: 0.3)
+    assert on.is_planning
+    planned(on)
     assert on.replanned == "moved aside"
     assert (on.reached, on.missed) == (0, 0)
     np.testing.assert_allclose(plan.asked[-1], [[0.6, 0.6], *WAYPOINTS])
@@ -195,4 +202,5 @@ def test_a_path_from_here_begins_at_the_head_and_is_no_miss() -> None:
 
     on._plan = nothing  # type: ignore[assignment]
     on.lay_from_here("again", lambda: 0.3)
+    planned(on)
     assert on.path is before

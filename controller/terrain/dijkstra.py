@@ -1,0 +1,87 @@
+"""Dijkstra's algorithm on a graph of arcs, in steps."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Indices, Ints
+from snakewalk.controller.terrain.in_steps import Steps
+from snakewalk.drivers.compiling import compiled
+
+_SETTLED_IN_STEP = 400
+"""Nodes whose distance becomes final in a step; each has up to sixteen arcs."""
+_UNITS = 1000
+
+
+def shortest_tree(
+    starts: Ints, ends: Ints, weights: Floats, source: int
+) -> Steps[tuple[Floats, Indices]]:
+    """Find the shortest distances from a node to all others.
+
+    Args:
+        starts: (n + 1,) index of the first arc of each node, and the number of arcs.
+        ends: (m,) node at the end of each arc.
+        weights: (m,) lengths of the arcs, 0 or more.
+        source: node.
+
+    Returns:
+        Distances (n,), infinite where no arcs lead, and the node before each (n,); -9999
+        if nothing leads there.
+
+    """
+    count = len(starts) - 1
+    distance, before = np.full(count, np.inf), np.full(count, -9999, np.int64)
+    keys, nodes = np.empty(len(ends) + 1), np.empty(len(ends) + 1, np.int64)
+    settled, size = np.zeros(count, np.bool_), np.array([1])
+    distance[source], keys[0], nodes[0] = 0.0, 0.0, source
+    starts, ends = np.asarray(starts, np.int64), np.asarray(ends, np.int64)
+    while size[0] > 0:
+        yield _UNITS
+        _settle(starts, ends, weights, distance, before, settled, keys, nodes, size)
+    return distance, before.astype(np.intp)
+
+
+@compiled(
+    "void(int64[::1], int64[::1], float64[::1], float64[::1], int64[::1], boolean[::1],"
+    " float64[::1], int64[::1], int64[::1])",
+    makes_arrays=False,
+)
+def _settle(
+    starts: Ints,
+    ends: Ints,
+    weights: Floats,
+    distance: Floats,
+    before: Ints,
+    settled: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    keys: Floats,
+    nodes: Ints,
+    size: Ints,
+) -> None:
+    """Settle the next nodes; ``keys`` and ``nodes`` are a binary heap with ``size[0]`` entries."""
+    done, n = 0, size[0]
+    while n > 0 and done < _SETTLED_IN_STEP:
+        node = nodes[0]
+        n -= 1
+        key, moved, at = keys[n], nodes[n], 0
+        while 2 * at + 1 < n:  # sift the last entry down from the top
+            child = 2 * at + 1
+            if child + 1 < n and keys[child + 1] < keys[child]:
+                child += 1
+            if keys[child] >= key:
+                break
+            keys[at], nodes[at] = keys[child], nodes[child]
+            at = child
+        keys[at], nodes[at] = key, moved
+        if settled[node]:
+            continue
+        settled[node] = True
+        done += 1
+        for arc in range(starts[node], starts[node + 1]):
+            end, length = ends[arc], distance[node] + weights[arc]
+            if length < distance[end]:
+                distance[end], before[end] = length, node
+                at = n
+                n += 1
+                while at > 0 and keys[(at - 1) // 2] > length:
+                    keys[at], nodes[at] = keys[(at - 1) // 2], nodes[(at - 1) // 2]
+                    at = (at - 1) // 2
+                keys[at], nodes[at] = length, end
+    size[0] = n
