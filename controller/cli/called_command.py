@@ -35,7 +35,7 @@ class CalledCommand(TyperCommand):
             order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
             for option in dict.fromkeys(order):
                 if order.count(option) > 1 and _takes_one_value(option):
-                    told = f"given {order.count(option)} times, and takes one value: leave one"
+                    told = f"given {order.count(option)} times, but has one value; leave one"
                     raise typer.BadParameter(told, ctx=ctx, param=option)
         return rest
 

@@ -204,8 +204,8 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
         count, stated = by_av
     elif not first:
         raise InputError(
-            f"{path}: no frame can be read: it is no video, is cut, or has a codec that this "
-            "OpenCV lacks (PyAV, of the extra view, reads more); convert it, or give images"
+            f"{path}: OpenCV cannot read a frame: the file is incomplete, or not a video, or "
+            "has another codec; convert it, install PyAV (extra view), or give images"
         )
     if not 0.0 < stated < 1e5:
         stated = 0.0
@@ -281,7 +281,7 @@ def _decoded(file: Path, how: int) -> NDArray[np.uint8 | np.uint16 | np.float32]
         raise InputError(f"{file}: {error.strerror or error}") from None
     image = cv2.imdecode(data, how) if data.size else None
     if image is None:
-        raise InputError(f"{file}: is no image that can be read")
+        raise InputError(f"{file}: is not a readable image; choose another file")
     whole: NDArray[np.uint8 | np.uint16 | np.float32] = np.asarray(image)
     return whole
 

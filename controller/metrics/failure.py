@@ -9,6 +9,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.ground_contact import roll_rad
 from snakewalk.controller.metrics.path_error import length_m, path_error_m, waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.terrain.climb import CLIMBED_RAD
 
 Cause = Literal["safety", "roll", "joint", "slip", "climb", "steering", "time"]
 
@@ -20,9 +21,6 @@ CLAMP_SHARE = 0.2
 """Share of cycles with a clamped goal from which on the joints do not follow (ours)."""
 PROGRESS_SHARE = 0.5
 """Progress along the path over advance of the body, below which it goes elsewhere (ours)."""
-CLIMBED_RAD = float(np.radians(15.5))
-"""Steepest ground that the walk is known to climb: 20 of 20 runs complete a plane of 15 degrees
-(docs/terrain.md)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +61,7 @@ def failure(record: RunRecord) -> Failure | None:
     if way_m > speed_m_s * limit_s > 0.0:  # no body that does what was planned comes to the end
         return Failure(
             "time",
-            f"its path takes {way_m / speed_m_s:.0f} s at the {speed_m_s:.2f} m/s of the plan; "
+            f"its path needs {way_m / speed_m_s:.0f} s at the {speed_m_s:.2f} m/s of the plan; "
             f"time_limit_s is {limit_s:g}",
         )
     clamped = np.array([verdict == "clamp" for verdict in cycle.verdict], dtype=bool)

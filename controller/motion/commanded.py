@@ -273,8 +273,8 @@ class Commanded:
     def _move_by(self, gait: Gait) -> None:
         if gait.p_gain is not None:
             raise InputError(
-                f"gait {gait.name}: takes soft servos (P gain {gait.p_gain}), which are set up "
-                "before a run: snakewalk gait run"
+                f"gait {gait.name}: needs soft servos (P gain {gait.p_gain}), which are set up "
+                "before a run; use snakewalk gait run"
             )
         gait.check(self._robot)
         self._waiting, self._driven = (lambda: GaitMotion(gait, self._robot)), None

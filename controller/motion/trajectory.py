@@ -75,7 +75,7 @@ class JointLimits:
         unknown = [name for name in names if name not in numbers]
         if unknown:
             raise InputError(
-                f"{what}: {unknown[0][:NAME_MAX]} is no joint of {self.robot}; they are "
+                f"{what}: robot {self.robot} has no joint {unknown[0][:NAME_MAX]}; use "
                 f"{self.names[0]} to {self.names[-1]}"
             )
         joints = [numbers[name] for name in names]
@@ -142,7 +142,7 @@ def _checked(given: JointTrajectory) -> JointTrajectory:
         if rate is not None and not np.isfinite(rate).all():
             raise InputError("trajectory: a velocity or acceleration is not a number")
     if velocity is None and acceleration is not None:
-        raise InputError("trajectory: accelerations need velocities beside them")
+        raise InputError("trajectory: has accelerations but no velocities; add velocities")
     if velocity is not None and np.abs(velocity[-1]).max() > _AT_REST_RAD_S:
         raise InputError("trajectory: its last point is its end: the velocities there must be 0")
     return JointTrajectory(given.joints, time_s, *values)  # type: ignore[arg-type]

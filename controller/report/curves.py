@@ -48,7 +48,7 @@ def curves_html(record: RunRecord) -> str:
     return (
         "<section id='curves'><h2>Curves</h2><figure>"
         f"<p class='facts'><label>Last two panels: <select id='joint'>{joints}</select></label></p>"
-        "<div id='plot'><noscript>Curves need scripts; the pictures below do not.</noscript></div>"
+        "<div id='plot'><noscript>Curves need scripts. The pictures below do not.</noscript></div>"
         "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
         "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is the "
         f"film's time.{which}{constant}</figcaption></figure>"

@@ -318,7 +318,7 @@ class RobotNode:
         """Press the run's stop button, and answer when torque is off."""
         button = self._button
         if button is None:
-            response.success, response.message = False, "there is no run to stop yet"
+            response.success, response.message = False, "no run has begun yet"
             return response
         began_s = self._clock.now_s()
         button.press(f"ROS service {self._node.get_fully_qualified_name()}/stop")

@@ -399,7 +399,8 @@ def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
     """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
     if metal and prepared.run.deviation != DeviationConfig():
         raise InputError(
-            f"run {prepared.run.name}: deviation: a robot on a port is as it is; take the table out"
+            f"run {prepared.run.name}: deviation: changes a simulated robot only; remove the "
+            "table, or --port"
         )
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=metal)
     map_faults(prepared, metal=metal)

@@ -113,8 +113,8 @@ def prepare_walk(
         )
     if not isinstance(found, WalkRun):
         raise InputError(
-            f"run {found.run.name}: motion {found.run.motion} is no walk; run it by: snakewalk "
-            f"run {name}"
+            f"run {found.run.name}: motion {found.run.motion} is not a walk; run it by: "
+            f"snakewalk run {name}"
         )
     return found
 
@@ -202,8 +202,8 @@ def _refuse_one_joint(robot: RobotConfig) -> None:
     """
     if len(robot.yaw_joints) == 1:
         raise InputError(
-            f"robot {robot.name}: has one yaw joint, which only bends to and fro; a walk takes two "
-            "at least, and more to steer"
+            f"robot {robot.name}: has one yaw joint, but a walk needs two, and more for "
+            "steering; choose another robot"
         )
 
 
@@ -337,8 +337,15 @@ def prepare_playback(
     scale: float = 1.0,
     clip: bool = False,
     keys: Mapping[str, object] | None = None,
+    joints: Mapping[str, str] | None = None,
+    unit: str | None = None,
+    topic: str | None = None,
+    episode: int | None = None,
 ) -> PlaybackRun:
     """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
+
+    ``joints``, ``unit``, ``topic`` and ``episode`` answer what a file of joint angles does not
+    state, as the keys of ``[playback]`` do.
 
     Raises:
         InputError: no such recording, joints that do not bend so far, too fast for them.
@@ -352,7 +359,10 @@ def prepare_playback(
         "world": world or "flat",
         "track": track,
         "motion": "playback",
-        "playback": {"speed": speed, "scale": scale, "clip": clip},
+        "playback": {
+            **{"speed": speed, "scale": scale, "clip": clip, "joints": dict(joints or {})},
+            **{"unit": unit, "topic": topic, "episode": episode},
+        },
     }
     _reject_legs(body)
     run, ground = assemble(fields, keys, body)

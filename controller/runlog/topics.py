@@ -136,7 +136,7 @@ class CycleTable(Table):
         ),
     ]
     electrical_j: Annotated[
-        Floats, _optional("taken in by all motors so far; what they give back is lost")
+        Floats, _optional("consumed by all motors so far; energy that they return is lost")
     ]
     """``MotorEnergy`` since the start; NaN on servos, which do not measure it."""
     mechanical_j: Annotated[Floats, _optional("net work at all shafts so far")]

@@ -91,9 +91,9 @@ def build_library(
     if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
         raise InputError(
-            f"states: only {len(fresh)} of {random_count} random states can be used by this robot "
-            f"(refused for {reasons}); raise behaviour.curvature if it is traction, lower it if it "
-            "is anything else, or take another track"
+            f"states: this robot can use only {len(fresh)} of {random_count} random states "
+            f"(refused for {reasons}); raise behaviour.curvature for traction, lower it for any "
+            "other reason, or use another track"
         )
     kept = float(energy_kept(track_rad, coefficients).mean())
     shapes_rad = np.concatenate([recorded, fresh])

@@ -218,6 +218,6 @@ class _LivePage:
 
     def _press(self, who: str) -> str:
         if self._button is None:
-            return "there is no run to stop yet"
+            return "no run has begun yet"
         self._button.press(who)
         return "stop requested"

@@ -171,7 +171,7 @@ class LiveCourse(MotionWrapper, OnCourse):
         if not np.isfinite(point_m).all():
             raise InputError(f"waypoint {text}: expected X,Y in metres")
         if len(self.waypoints_m) >= WAYPOINTS_MAX:
-            raise InputError(f"waypoint {_shown(point_m)}: a run takes {WAYPOINTS_MAX} at most")
+            raise InputError(f"waypoint {_shown(point_m)}: a run accepts {WAYPOINTS_MAX} at most")
         self._check(point_m)
         before_m = left_m[-1] if len(left_m) else view.link_m[0, :2]
         if np.hypot(*(point_m - before_m)) < _APART_M:

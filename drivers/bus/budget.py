@@ -84,9 +84,9 @@ class WireBudget:
         if self.share(rate_hz) > 1.0:
             fast = "" if self.fast else ", use fast sync read"
             raise BudgetError(
-                f"{rate_hz:g} Hz: {self.servos} servos at {self.baud} baud take "
-                f"{self.cycle_s * 1e3:.2f} ms of wire a cycle; at most {self.limit_hz:.0f} Hz: "
-                f"lower the rate, raise the baud rate{fast}"
+                f"{rate_hz:g} Hz: a cycle of {self.servos} servos at {self.baud} baud occupies "
+                f"the wire for {self.cycle_s * 1e3:.2f} ms, which allows at most "
+                f"{self.limit_hz:.0f} Hz; lower the rate, raise the baud rate{fast}"
             )
 
 

@@ -155,8 +155,8 @@ class SegmentedBus:
         spans = {(cycle.read_address, cycle.read_bytes) for cycle in cycles.values()}
         if len(spans) > 1:
             raise ControlTableError(
-                "the models on the ports have the block of a control cycle at different places: "
-                "such servos are no one chain"
+                "ports: the servo models have their block of a control cycle at different "
+                "addresses; use models with the same control table"
             )
         return SegmentedCycle(cycles, places, self._each)
 

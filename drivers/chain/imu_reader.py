@@ -43,8 +43,8 @@ class ImuReader:
             reply = self._bus.ping(config.id)
         except NoAnswerError:
             raise ChainError(
-                f"imu (ID {config.id}): no answer at {self._port.getBaudRate()} baud: power, "
-                "cable, id or baud rate; without one, take [imu] out of the robot's file"
+                f"imu (ID {config.id}): no reply at {self._port.getBaudRate()} baud; check "
+                "power, cable, id and baud rate, or remove [imu] from the robot's file"
             ) from None
         if number is not None and reply.model_number != number:
             raise ChainError(

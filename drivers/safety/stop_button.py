@@ -132,7 +132,9 @@ class PressedButton:
         try:
             info = os.fstat(self._file)
             if not _is_mine(info) or info.st_size != _BYTES:
-                raise PermissionError(f"{path}: is no stop button of this user")
+                raise PermissionError(
+                    f"{path}: is not a stop button of this user; name a run of this user"
+                )
             self._map = mmap.mmap(self._file, _BYTES)
             known = parse_json(_read_text(self._map, _RUN))
             self.run = StoppableRun(**known | {"ports": tuple(known["ports"])})

@@ -87,7 +87,9 @@ def test_numbers_of_numpy_are_numbers_and_other_objects_a_fault() -> None:
     run = checked(RunConfig, given, "library")
     assert run.seed == 3
     assert run.waypoints_m == ((1.0, 2.0),)
-    with pytest.raises(ConfigError, match=r"library: .*object is no value of a configuration"):
+    with pytest.raises(
+        ConfigError, match=r"library: .*object cannot be a value of a configuration"
+    ):
         checked(RunConfig, given | {"seed": object()}, "library")
 
 

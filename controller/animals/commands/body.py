@@ -269,7 +269,7 @@ def _check_options(
     """Refuse options that would do nothing."""
     mesh = given and body.lower().endswith(MESH_ENDINGS)
     faults = [
-        f"{name}: is for recordings with widths; {body} is none"
+        f"{name}: is for recordings with widths, and {body} has none; leave it out"
         for name, value in of_widths.items()
         if given and value
     ]
@@ -338,7 +338,7 @@ def _read_picture(image: Path) -> Image:
     except Pillow.DecompressionBombError as error:
         raise InputError(f"{image}: {error}") from None
     except (UnidentifiedImageError, OSError, SyntaxError):
-        raise InputError(f"{image}: is no picture that can be read") from None
+        raise InputError(f"{image}: is not a readable picture; choose another file") from None
 
 
 def _check_frame(name: str, points: Floats, frame: int) -> None:

@@ -26,4 +26,4 @@ def check_npz(path: Path) -> None:
 
     """
     if path.suffix.lower() != ".npz":
-        raise InputError(f"{path}: what is written is an .npz")
+        raise InputError(f"{path}: the result is an .npz; change the ending")

@@ -23,7 +23,9 @@ def reboot(
     facts: dict[str, object] = {}
     with open_lines(port, baud) as lines:
         buses = {each: lines.open_servo(each) for each in servo_id}
-        if yes or confirmed(as_json, "torque goes off: what these servos hold falls; reboot them?"):
+        if yes or confirmed(
+            as_json, "torque goes off, and a load that these servos hold falls; reboot them?"
+        ):
             for each, bus in buses.items():
                 before, after = restart(bus, each)
                 facts[f"ID {each}"] = (

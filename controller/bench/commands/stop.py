@@ -49,7 +49,7 @@ def stop(
 ) -> None:
     """Stop a run at once, latched; without a run, switch off the torque of all servos on a port."""
     if run is not None and port is not None:
-        raise InputError("stop takes a run or --port, not both")
+        raise InputError("stop: a run and --port exclude each other; leave one out")
     who = f"snakewalk stop (process {os.getpid()})"
     outcomes = emergency_stop.stop_runs(emergency_stop.runs_of(port, run), who)
     if run is not None and not outcomes:

@@ -22,7 +22,7 @@ Squares = Annotated[
 ]
 SquareMm = Annotated[float, typer.Option(help="side of a square in mm, as measured on the print")]
 DOTS = 300.0
-"""Per inch of what is printed."""
+"""Resolution of the print, dots per inch."""
 
 
 def read_squares(text: str) -> tuple[int, int]:
@@ -69,7 +69,7 @@ def check_print(out: Path) -> None:
 
     """
     if out.suffix.lower() not in (".pdf", ".png"):
-        raise InputError(f"{out}: what is printed ends in .pdf or .png")
+        raise InputError(f"{out}: the ending must be .pdf or .png")
 
 
 def write_print(out: Path, pages: list[Image]) -> None:

@@ -149,7 +149,7 @@ def _head(
         f"{read.relief_m:.4g} m of relief, at a scale of {options.scale:g}, heights at "
         f"{options.rise:g};",
         f"samples {spacing_m:g} m apart.",
-        *([f"Of the file from its south-west corner: {crop} m."] if crop else []),
+        *([f"Part of the file, from its south-west corner: {crop} m."] if crop else []),
         *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         *(f"- {note}" for note in notes),
     ]

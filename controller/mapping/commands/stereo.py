@@ -103,7 +103,7 @@ def stereo(
     check_fill(fill, faults)
     faults += _stand_faults(height, tilt, roll)
     if unit not in _UNITS_M:
-        faults.append(f"--unit {unit}: is none of {', '.join(_UNITS_M)}")
+        faults.append(f"--unit {unit}: is unknown; use one of {', '.join(_UNITS_M)}")
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)

@@ -36,8 +36,9 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
     ),
     (
         "Joint angles",
-        "The shape travels from the head (top) to the tail (bottom). What remains between asked "
-        "and measured is servo lag, a clamp, or ground that does not give way.",
+        "The shape travels from the head (top) to the tail (bottom). The remaining difference "
+        "between goal and measured angle is servo lag, a clamp, or ground that does not give "
+        "way.",
         joints_figure,
     ),
     (

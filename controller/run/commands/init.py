@@ -68,7 +68,9 @@ def init(
             f"{robot or run.robot}"
         )
     if run.motion in {"gait", "playback", "source", "repertoire"}:
-        raise InputError(f"run {run.name}: a {run.motion} is no walk; --from takes a walk's run")
+        raise InputError(
+            f"run {run.name}: a {run.motion} is not a walk; choose the run of a walk for --from"
+        )
     track = Path(run.track) if beside is None else beside / run.track
     texts = {
         "run.toml": template(

@@ -77,7 +77,9 @@ def plan(
     if with_ is not None:
         planner = require("planner", with_, "--with")
         if motion is not None or track is not None or seed is not None or set_:
-            raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
+            raise InputError(
+                "--with repertoire: does not use --motion, --track, --seed or --set; leave them out"
+            )
         planner.load()(
             run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,
@@ -136,7 +138,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
-    warnings = list(prepared.warnings)
+    warnings = [*prepared.warnings, *prepared.climb_warnings]
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
         found |= facts
@@ -156,6 +158,14 @@ def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "up_slope_max_deg": _deg(relief.max_up_slope_rad),
         "side_slope_max_deg": _deg(relief.max_side_slope_rad),
         "climb_m": round(relief.climb_m, 3),
+        "too_steep": [
+            {
+                "begin_m": round(section.begin_m, 2),
+                "end_m": round(section.end_m, 2),
+                "slope_deg": _deg(section.slope_rad),
+            }
+            for section in prepared.steep_sections
+        ],
         "safe_nodes": f"{relief.safe_node_share:.0%}",
     }
     return facts, list(path_warnings(prepared.planner, relief, prepared.run.waypoints_m))

@@ -39,7 +39,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a TOML file; editors use it to complete and check the file."""
     if kind not in KINDS:
-        raise InputError(f"{kind}: no such file; there are {', '.join(KINDS)}")
+        raise InputError(f"{kind}: is not a kind of file; use one of {', '.join(KINDS)}")
     refuse_to_overwrite([out], force)
     text = json.dumps(json_schema(kind, models()[kind]), indent=2)
     if out is None:

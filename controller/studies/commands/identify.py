@@ -52,14 +52,14 @@ if TYPE_CHECKING:
 
 
 class _RobotFile(NamedTuple):
-    """A robot to be written with what is found of it."""
+    """A robot to write with the results."""
 
     before: "RobotConfig"
     out: Path
 
 
 class _Outs(NamedTuple):
-    """Files for what logs of runs tell: of the ground, and of the robot."""
+    """Files for the results from logs of runs: ground and robot."""
 
     world: Path | None
     robot: Path | None
@@ -127,11 +127,13 @@ def identify(
     if of_runs:
         if len(of_runs) < len(logs) + len(judge):
             raise InputError(
-                "logs of runs (.mcap) and recordings of a pendulum tell different things: give one "
-                "kind at a time"
+                "logs of runs (.mcap) and recordings of a pendulum cannot be combined; give "
+                "one kind"
             )
         if start is not None or not fit:
-            raise InputError("--start and --no-fit are of pendulums; for a run's log take --world")
+            raise InputError(
+                "--start and --no-fit: are for pendulums; for the log of a run use --world"
+            )
         if robot is not None:
             raise InputError(
                 "--robot is whose servo swings a pendulum; the robot of a run is in its log (.mcap)"
@@ -274,7 +276,7 @@ def _tell_friction(
         return
     table = Table("friction", "value", "95 % interval", "", box=None)
     for key, one in found.found.items():
-        note = "" if one.determined else "these logs do not tell it"
+        note = "" if one.determined else "not identified from these logs"
         interval = f"{one.low:.4g} to {one.high:.4g}"
         table.add_row(key.replace("_", " "), f"{one.value:.4g}", interval, note)
     console.print(table)

@@ -1,8 +1,8 @@
 """Constants of a servo fitted to recordings of a pendulum, each with an interval.
 
-The whole recording is computed from its first angle, and no measured angle helps on the way: what
-fits has the servo's motion, not its next sample. Many starts find the basin, steps from the best
-ones its ground; all chance comes from one seed.
+The whole recording is computed from its first angle, without further measured angles: so a fit
+reproduces the servo's motion, not only its next sample. Many starts find the basin, steps from the
+best ones its ground; all chance comes from one seed.
 """
 
 import math
@@ -38,15 +38,15 @@ _COARSE_S: Final = 2e-3
 _COARSE_TURNS: Final = 25
 _FINE_TURNS: Final = 100
 _SPREAD: Final = 0.4
-"""Of the starts, as a factor's logarithm."""
+"""Spread of the starts, as a factor's logarithm."""
 _FIRST: Final = 4
 """Best fits that hops begin from."""
 _OUTLIER_RAD: Final = 0.02
 """Errors above this count linearly, as in a mean absolute error."""
 _TURN: Final = 1e-3
-"""Of a constant's range: step of the search's derivatives."""
+"""Share of a constant's range: step of the search's derivatives."""
 _FINE_TURN: Final = 1e-4
-"""Of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
+"""Share of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
 constants trade against each other exactly, a long step's error would pass for knowledge."""
 _BLOCK_S: Final = 0.5
 """Errors within this are not independent: they count as one in the intervals (ours)."""
@@ -56,7 +56,7 @@ _LEAST_SHARE: Final = 0.01
 _FACTOR: Final = 1.05
 """Step along constants that move a servo alike (ours)."""
 _CHI_SQUARE: Final = 3.84
-"""Of one constant: what is less likely than 5 %."""
+"""Threshold of one constant: less likely than 5 %."""
 _TORQUE_CONSTANT: Final = NAMES.index("torque_constant_n_m_a")
 _RESISTANCE: Final = NAMES.index("resistance_ohm")
 _P_UNIT: Final = NAMES.index("p_unit_per_rad")

@@ -159,8 +159,8 @@ class Diagnosis:
                 f"does {robot.joint_label(most)}, by {self.residual_a[most]:.3f} A"
             )
         return (
-            f"what differs from the shadow is explained by {named.text(robot)} "
-            f"({self.probability:.0%} of what was looked at)"
+            f"the difference from the shadow is explained by {named.text(robot)} "
+            f"({self.probability:.0%} of the measured values)"
         )
 
     def evidence_over(self, cause: NamedCause) -> float:
@@ -252,8 +252,8 @@ def check_level(world: WorldConfig) -> None:
     """
     if world.ground.kind != "flat" or world.obstacle is not None:
         raise InputError(
-            f"world {world.name}: a shadow needs a level, open floor: elsewhere its body comes to "
-            "lie beside the robot's, and joints differ by that alone"
+            f"world {world.name}: a shadow needs a level floor without obstacles, because "
+            "elsewhere a small displacement changes the joints; use a flat world"
         )
 
 
@@ -281,7 +281,8 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
         if len(goals.since_start_s) >= least:
             return goals, measured
     raise InputError(
-        f"the log has less than {LEAST_S:g} s without a pause: too little to tell what differs"
+        f"the log has less than {LEAST_S:g} s without a pause, too little to find a cause; use "
+        "a longer log"
     )
 
 

@@ -139,7 +139,7 @@ FURTHER = [
         "an adapter slower than configured",
         later([], 0.012),
         "response time",
-        "the driver waits 4 ms: a run takes all of them for lost",
+        "the driver waits 4 ms: a run loses all of them",
         "fail",
     ),
     Kind(

@@ -159,7 +159,10 @@ def test_wrong_files_and_options_are_refused(folder: Path, tmp_path: Path) -> No
     for options, said in (
         (CaptureOptions(track, new, corrections=junk), "is no JSON"),
         (CaptureOptions(track, new, corrections=tmp_path / "no.json"), "No such file"),
-        (CaptureOptions(track, new, corrections=junk, roi="1,2,3,4"), "belong to a film"),
+        (
+            CaptureOptions(track, new, corrections=junk, roi="1,2,3,4"),
+            "leave the other options out",
+        ),
         (CaptureOptions(track, track, corrections=junk), "exists; --force"),
         (CaptureOptions(track, tmp_path / "a.csv", corrections=junk), "a track is an .npz"),
     ):

@@ -313,7 +313,7 @@ def test_nothing_is_taken_before_the_run_has_begun(graph: Graph, client: Client)
         goals.publish(JointState(name=["joint0"], position=[0.1]))
         client.until(lambda: answer.done() and graph.robot.commands.pending)
     assert not answer.result().success
-    assert answer.result().message == "there is no run to stop yet"
+    assert answer.result().message == "no run has begun yet"
     assert graph.robot.commands.pending[0].why == "joint goals: the run has not begun"
 
 
