@@ -23,7 +23,7 @@ class Decision:
     visited: int
     """Distinct states visited so far."""
     carrier_rad: float = 0.0
-    """Amplitude of the wide wave on which the shape rides; 0 if there is none."""
+    """Amplitude of the wide wave on which the shape rides; 0 without one."""
 
 
 @runtime_checkable
