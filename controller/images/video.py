@@ -30,7 +30,7 @@ _DEEP_RANGE = (16.0, 240.0)
 """Grey levels between which the values of deep images are put."""
 _DEEP_SAMPLE = 9
 _EVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
-_ALIKE = 0.005  # of the rate: what the times say beside what the file states
+_ALIKE = 0.005  # share of the rate: difference between the times and the rate that the file states
 _MISSING = 0.02  # of the frames that a file declares may be absent: some codecs count wrongly
 
 
@@ -59,7 +59,7 @@ class Footage:
     decoded_by_av: bool = False
     """Whether PyAV reads the video, as this OpenCV lacks its codec."""
     deep: GreyScale | None = None
-    """Of images of 16 bit; None for all others."""
+    """Scale of images of 16 bit; None for all others."""
 
     def read(self) -> Iterator[DeepImage]:
         """(H, W) or (H, W, 3) frames in order, 8 bit, or deeper ones on the same scale.
@@ -143,7 +143,7 @@ def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
                 whole = None if number % every else frame.to_ndarray(format="bgr24")
                 yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
-        return  # what is missing is counted by the caller
+        return  # missing frames are counted by the caller
 
 
 def _av() -> ModuleType:

@@ -252,8 +252,7 @@ def check_level(world: WorldConfig) -> None:
     """
     if world.ground.kind != "flat" or world.obstacle is not None:
         raise InputError(
-            f"world {world.name}: a shadow needs a level floor without obstacles, because "
-            "elsewhere a small displacement changes the joints; use a flat world"
+            f"world {world.name}: a shadow needs a level floor without obstacles; use a flat world"
         )
 
 
