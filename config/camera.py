@@ -5,6 +5,8 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
+from snakewalk.config.pose import Metres3
+from snakewalk.config.tags import FixedTag
 
 PoseName = Annotated[str, Field(min_length=1, max_length=500)]
 """A pose source, with an argument after a colon where the source accepts one."""
@@ -12,7 +14,7 @@ Place = tuple[float, float]
 
 
 class CameraConfig(Strict):
-    """A camera that looks down on a level floor (docs/overhead-camera.md)."""
+    """A camera above known ground, or one that sees tags (docs/overhead-camera.md)."""
 
     width_px: int = Field(640, ge=64, le=4096)
     height_px: int = Field(480, ge=64, le=4096)
@@ -43,6 +45,20 @@ class CameraConfig(Strict):
     marker_side_m: float = Field(
         0.15, gt=0.005, le=2.0, description="side of a printed marker, without its white margin"
     )
+    place_m: Metres3 | None = Field(
+        None, description="of the lens in the world, for `--pose tags`; with aim_m"
+    )
+    aim_m: Metres3 | None = Field(
+        None, description="place in the world that the middle of the picture shows"
+    )
+    roll_deg: float = Field(
+        0.0, ge=-360.0, le=360.0, description="turn of the picture about the line of sight"
+    )
+    fixed_tags: tuple[FixedTag, ...] = Field(
+        (),
+        description="tags at known places, by which a camera for `--pose tags` finds its own "
+        "place; in place of place_m",
+    )
     lens: str | None = Field(
         None,
         description="file of `snakewalk camera calibrate`: the distortion of a real camera is "
@@ -72,6 +88,14 @@ class CameraConfig(Strict):
     def _corners_are_pairs(self) -> Self:
         if (self.corners_px is None) != (self.corners_m is None):
             raise ValueError("corners_px and corners_m are given together")
+        return self
+
+    @model_validator(mode="after")
+    def _place_and_aim(self) -> Self:
+        if (self.place_m is None) != (self.aim_m is None):
+            raise ValueError("place_m and aim_m are given together")
+        if self.place_m is not None and self.place_m == self.aim_m:
+            raise ValueError("aim_m must not be the place of the lens")
         return self
 
     @model_validator(mode="after")

@@ -73,9 +73,14 @@ class WalkConfig(Strict):
 
     decision_fraction: float = Field(1.0, gt=0.05, le=1.0, description="of a state that is walked")
     proposals: int = Field(
-        120, ge=1, le=1000, description="first states in the order of W: the smoothest of them ..."
+        120,
+        ge=1,
+        le=1000,
+        description="first states in the order of W, from which the candidates come",
     )
-    candidates: int = Field(6, ge=1, le=50, description="number of these states to simulate")
+    candidates: int = Field(
+        6, ge=1, le=50, description="number of candidates to simulate: the smoothest"
+    )
     climb_progress: float = Field(
         0.65, ge=0.0, le=1.0, description="under this predicted progress states ride on wide waves"
     )
@@ -282,8 +287,8 @@ class RunConfig(Strict):
     )
     pose: PoseName | None = Field(
         None,
-        description="source of the head's pose; default: the simulator, or on servos the "
-        "robot's IMU, else the joints",
+        description="source of the head's pose; default: the simulator, on servos the robot's IMU, "
+        "or the joints",
     )
     deviation: DeviationConfig = Field(
         DeviationConfig(),

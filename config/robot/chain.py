@@ -136,6 +136,11 @@ class RobotConfig(JointValues):
     def _tracked_body_is_on_the_spine(self) -> Self:
         if self.pose is not None and self.pose.link >= self.link_count:
             raise ValueError(f"pose: link {self.pose.link} of {self.link_count}: 0 is the head")
+        for tag in () if self.tags is None else self.tags.on:
+            if tag.link >= self.link_count:
+                raise ValueError(
+                    f"tags: tag {tag.id}: link {tag.link} of {self.link_count}: 0 is the head"
+                )
         return self
 
     @model_validator(mode="after")
@@ -265,7 +270,7 @@ class RobotConfig(JointValues):
         data: dict[str, Any] = handler(self)
         if not self.described_models:
             data.pop("described_models", None)
-        for key in ("pose", "ros"):
+        for key in ("pose", "ros", "tags"):
             if data[key] is None:
                 data.pop(key)
         return data

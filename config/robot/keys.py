@@ -21,6 +21,7 @@ from snakewalk.config.robot.power import PowerConfig
 from snakewalk.config.robot.servo import ServoConfig
 from snakewalk.config.ros import RosConfig
 from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.tags import TagsConfig
 
 
 class RobotKeys(Strict):
@@ -72,6 +73,9 @@ class RobotKeys(Strict):
         None,
         description="a table [pose]: the tracked body of an external pose source; default: the "
         "head link's centre in the world of the run",
+    )
+    tags: TagsConfig | None = Field(
+        None, description="a table [tags]: printed tags on the links; default: no tags"
     )
     ros: RosConfig | None = Field(
         None,

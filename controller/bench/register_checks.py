@@ -107,7 +107,11 @@ class _Checks:
             self._pose(),
             self._exchanged(),
             self._secondary(),
-            self._current_limit(),
+            self._weak(
+                *("current limit", "fail", "Current Limit"),
+                "a Current Limit(38) below the robot's current limit",
+                "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+            ),
             self._bad(
                 "status return level",
                 "warn",
@@ -182,7 +186,7 @@ class _Checks:
 
     def _limits(self) -> list[Finding | None]:
         """Limits, goals and sensors that other programs and faults leave behind."""
-        units, robot = self._units, self._robot
+        units = self._units
         return [
             self._bad(
                 "position limits",
@@ -204,14 +208,8 @@ class _Checks:
             self._not_factory(
                 "voltage limits", "Max Voltage Limit", "do they fit the supply? alarms come beyond"
             ),
-            self._bad(
-                "goal current",
-                "warn",
-                lambda servo: (
-                    robot.all_axes[servo.joint] == "p"
-                    and servo.values.get("Goal Current", math.inf)
-                    < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
-                ),
+            self._weak(
+                *("goal current", "warn", "Goal Current"),
                 "a Goal Current(102) below the robot's current limit: weak",
             ),
             self._bad(
@@ -328,18 +326,21 @@ class _Checks:
         remedy = "a run sets Secondary ID(12) to 255; until then it moves with the other's goals"
         return Finding("secondary ID", "fail", "; ".join(shadows), remedy)
 
-    def _current_limit(self) -> Finding | None:
+    def _weak(
+        self, check: str, grade: Grade, register: str, what: str, remedy: str = _BY_A_RUN
+    ) -> Finding | None:
+        """Pitch joints with a register of their current below the robot's limit."""
         robot, units = self._robot, self._units
         return self._bad(
-            "current limit",
-            "fail",
+            check,
+            grade,
             lambda servo: (
                 robot.all_axes[servo.joint] == "p"
-                and servo.values.get("Current Limit", math.inf)
+                and servo.values.get(register, math.inf)
                 < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
             ),
-            "a Current Limit(38) below the robot's current limit",
-            remedy="snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+            what,
+            remedy=remedy,
         )
 
     def _homing(self) -> Finding | None:

@@ -91,13 +91,14 @@ class CameraWatch:
         robot = prepared.robot
         self.locks = {"exposure": "locked", "white balance": "locked"}
         pose = prepared.initial_pose()
-        backend = simulated(run, robot, prepared.world, None, pose)
+        backend = simulated(run, robot, prepared.world, prepared.ground, pose)
         chain, clock, qpos = backend.chain, backend.clock, backend.qpos
         if qpos is None:
             raise AssertionError("the simulator knows its coordinates")
-        with closing(top_view(run, robot, prepared.world)) as view:
-            ground = view.empty_floor()
-            check = CameraCheck(camera, robot, rendered_detector(run, robot, ground))
+        with closing(top_view(run, robot, prepared.world, prepared.ground)) as view:
+            floor = view.empty_floor()
+            detector = rendered_detector(run, robot, floor, prepared.ground)
+            check = CameraCheck(camera, robot, detector)
             begin = chain.enable()
             goal, begin_s, cycles = begin.position_rad, clock.now_s(), 0
             next_s, coming = begin_s, list[tuple[float, Image]]()
@@ -120,7 +121,8 @@ class CameraWatch:
 
     def _real(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
         run, robot, camera = self._prepared.run, self._prepared.robot, self._camera
-        detector = None if camera.background is None else overhead_detector(run, robot)
+        ground = self._prepared.ground
+        detector = None if camera.background is None else overhead_detector(run, robot, ground)
         check = CameraCheck(camera, robot, detector)
         with ExitStack() as stack:
             chain = None

@@ -26,6 +26,7 @@ from snakewalk.controller.cameras.floor_markers import (
     fit_floor,
     picture_move,
 )
+from snakewalk.controller.cameras.ground_rest import Heights
 from snakewalk.controller.cameras.lens import Lens, projected
 from snakewalk.controller.cameras.pose_tracking import (
     REACH_M,
@@ -47,6 +48,8 @@ _PARTS = 6, 4  # of a picture, across and down
 _BETTER = 0.8  # share of the squared residual of a part, if a move explains it (ours)
 _LEAST_PARTS = 3
 _LIKE = 0.2  # correlation of two pictures of the floor, noise and robot included (ours)
+_SURFACE_ROUNDS = 6
+"""Rounds in which the ray of a pixel meets the ground: on 30 degrees each leaves a third (ours)."""
 MISPLACED_M = 0.03
 """A marker that lies further from its measured place fixes no floor (ours)."""
 _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
@@ -68,6 +71,8 @@ class CameraModel:
     """x, y by which the picture has moved since the homography was measured."""
     markers: Markers = field(default_factory=dict)
     """Printed markers in the picture in which the homography was measured."""
+    heights: Heights | None = None
+    """Heights of known ground above the floor of the homography; None: the ground is that floor."""
 
     @classmethod
     def of_floor(
@@ -172,19 +177,28 @@ class CameraModel:
         return np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
 
     def on_plane(self, points_px: Floats, z_m: float) -> Floats:
-        """(..., 2) world places of pixels (..., 2) of points that are ``z_m`` above the floor."""
+        """(..., 2) world places of pixels (..., 2) of points that are ``z_m`` above the ground."""
         plain = points_px - self.moved_px
         if self.lens is not None:
             plain = self.lens.undistorted(plain)
         floor = projected(self.floor_from_px, plain)
-        return np.asarray(self.foot_m + (floor - self.foot_m) * (1.0 - z_m / self.height_m))
+        out_m = floor - self.foot_m
+        places = self.foot_m + out_m * (1.0 - z_m / self.height_m)
+        if self.heights is None:
+            return np.asarray(places)
+        for _ in range(_SURFACE_ROUNDS):  # the ray of the pixel meets the ground
+            share = 1.0 - (self.heights(places) + z_m) / self.height_m
+            places = self.foot_m + out_m * share[..., None]
+        return np.asarray(places)
 
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
-        """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the floor."""
+        """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the ground."""
         return self.projection(z_m)(points_m)
 
     def projection(self, z_m: float) -> Callable[[Floats], Floats]:
         """``in_image`` of one height, for many calls."""
+        if self.heights is not None:
+            return self._projection_on(self.heights, z_m)
         grow = 1.0 / (1.0 - z_m / self.height_m)
         onto_floor = np.diag([grow, grow, 1.0])  # a higher point covers the floor further out
         onto_floor[:2, 2] = self.foot_m * (1.0 - grow)
@@ -194,6 +208,19 @@ class CameraModel:
         def project(points_m: Floats) -> Floats:
             plain = projected(back, points_m)
             return np.asarray((plain if lens is None else lens.distorted(plain)) + moved_px)
+
+        return project
+
+    def _projection_on(self, heights: Heights, z_m: float) -> Callable[[Floats], Floats]:
+        """Return the same for places on uneven ground."""
+        back = np.linalg.inv(self.floor_from_px)
+        moved_px = np.array(self.moved_px)
+
+        def project(points_m: Floats) -> Floats:
+            share = 1.0 - (heights(points_m) + z_m) / self.height_m
+            plain = projected(back, self.foot_m + (points_m - self.foot_m) / share[..., None])
+            distorted = plain if self.lens is None else self.lens.distorted(plain)
+            return np.asarray(distorted + moved_px)
 
         return project
 

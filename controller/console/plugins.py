@@ -20,7 +20,10 @@ from snakewalk.config.errors import InputError
 
 ENTRY_POINTS: Final = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
-KINDS: Final = ("command", "run", "motion", "pose", "map", "observer", "look", "planner", "results")
+KINDS: Final = (
+    *("command", "run", "motion", "joints", "pose", "map", "observer", "look", "planner"),
+    "results",
+)
 """Kinds of plug-ins."""
 OWN: Final = "snakewalk"
 

@@ -1,5 +1,6 @@
 """Progress for a person: one bar on standard error, and events in lines above it."""
 
+import logging
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Self, TypeVar
@@ -75,8 +76,8 @@ class ProgressBar:
         self._progress.update(self._task, visible=False)
 
     def on_event(self, kind: str, text: str) -> None:
-        """Say above the bar what a run decided by itself."""
-        LOGGER.info("%s", text)
+        """Show an event of a run above the bar; a climb that fails is a warning."""
+        LOGGER.log(logging.WARNING if kind == "climb" else logging.INFO, "%s", text)
 
 
 class RunBar(ProgressBar):

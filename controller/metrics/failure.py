@@ -1,4 +1,4 @@
-"""Failure of a run along waypoints: what ended it, told from its log."""
+"""Failure of a run along waypoints: its cause, from its log."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,6 +9,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.ground_contact import roll_rad
 from snakewalk.controller.metrics.path_error import length_m, path_error_m, waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.terrain.climb import CLIMBED_RAD
 
 Cause = Literal["safety", "roll", "joint", "slip", "climb", "steering", "time"]
 
@@ -20,9 +21,6 @@ CLAMP_SHARE = 0.2
 """Share of cycles with a clamped goal from which on the joints do not follow (ours)."""
 PROGRESS_SHARE = 0.5
 """Progress along the path over advance of the body, below which it goes elsewhere (ours)."""
-CLIMBED_RAD = float(np.radians(15.5))
-"""Steepest ground that the walk is known to climb: 20 of 20 runs complete a plane of 15 degrees
-(docs/terrain.md)."""
 
 
 @dataclass(frozen=True, slots=True)

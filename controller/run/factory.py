@@ -337,8 +337,15 @@ def prepare_playback(
     scale: float = 1.0,
     clip: bool = False,
     keys: Mapping[str, object] | None = None,
+    joints: Mapping[str, str] | None = None,
+    unit: str | None = None,
+    topic: str | None = None,
+    episode: int | None = None,
 ) -> PlaybackRun:
     """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
+
+    ``joints``, ``unit``, ``topic`` and ``episode`` answer what a file of joint angles does not
+    state, as the keys of ``[playback]`` do.
 
     Raises:
         InputError: no such recording, joints that do not bend so far, too fast for them.
@@ -352,7 +359,10 @@ def prepare_playback(
         "world": world or "flat",
         "track": track,
         "motion": "playback",
-        "playback": {"speed": speed, "scale": scale, "clip": clip},
+        "playback": {
+            **{"speed": speed, "scale": scale, "clip": clip, "joints": dict(joints or {})},
+            **{"unit": unit, "topic": topic, "episode": episode},
+        },
     }
     _reject_legs(body)
     run, ground = assemble(fields, keys, body)

@@ -10,7 +10,7 @@ PLUGINS = (
     ("command", "init", "Write run.toml, robot.toml and world.toml for editing, with schemas for editors.", "snakewalk.controller.run.commands.init:init", "The job"),
     ("command", "list", "List shipped and installed items: runs, robots, worlds, recordings, policies, plug-ins.", "snakewalk.controller.run.commands.list:list_", "The job"),
     ("command", "plan", "Check a run without servos or simulator: library of states, path and joint limits.", "snakewalk.controller.run.commands.plan:plan", "The job"),
-    ("command", "play", "Play a recording on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.play:play", "Motion"),
+    ("command", "play", "Play a recording or joint angles on servos or in the simulator; leaves a log and a film.", "snakewalk.controller.run.commands.play:play", "Motion"),
     ("command", "pose check", "Show position, axes, rate, delay and noise of an external pose; exit code 1 on a fault.", "snakewalk.controller.run.commands.pose_check:check", ""),
     ("command", "run", "Run a job on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.run:run", "The job"),
     ("command", "schema", "Print the JSON Schema of a TOML file; editors use it to complete and check the file.", "snakewalk.controller.run.commands.schema:schema", "The job"),

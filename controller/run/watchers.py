@@ -54,8 +54,8 @@ class Watchers:
         self.page = page
         """The page of the run, which may also command it; None without a page."""
         self._watchers: list[Watcher] = [one for one in (page, *others) if one is not None]
-        self._with_waypoints: list[OffersWaypoints] = [
-            one for one in others if isinstance(one, OffersWaypoints)
+        self._with_waypoints = [
+            one for one in self._watchers if one is not page and isinstance(one, OffersWaypoints)
         ]
         self._with_stop = [one for one in self._watchers if isinstance(one, OffersStop)]
 

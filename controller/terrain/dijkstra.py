@@ -32,7 +32,6 @@ def shortest_tree(
     keys, nodes = np.empty(len(ends) + 1), np.empty(len(ends) + 1, np.int64)
     settled, size = np.zeros(count, np.bool_), np.array([1])
     distance[source], keys[0], nodes[0] = 0.0, 0.0, source
-    starts, ends = np.asarray(starts, np.int64), np.asarray(ends, np.int64)
     while size[0] > 0:
         yield _UNITS
         _settle(starts, ends, weights, distance, before, settled, keys, nodes, size)

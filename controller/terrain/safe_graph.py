@@ -111,7 +111,9 @@ class SafeGraph:
         if target in self._trees:
             return
         edges = self._edges
-        found = yield from shortest_tree(edges.indptr, edges.indices, edges.data, target)
+        found = yield from shortest_tree(
+            edges.indptr.astype(np.int64), edges.indices.astype(np.int64), edges.data, target
+        )
         self._trees[target] = found
 
     def costs_to(self, target: int) -> Floats:

@@ -46,7 +46,7 @@ _SLOW_S = 1.0
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
 _HOLD_READS = 2
-"""Reads in which the servos may tell where they are before they hold (ours)."""
+"""Reads in which the servos may report their positions before they hold (ours)."""
 STILL_RAD = 0.1
 """A joint that is read farther from where it was just set to hold is not the one that holds
 (ours)."""
@@ -138,7 +138,7 @@ class ServoChain:
 
     @property
     def counters(self) -> CycleCounters:
-        """What went wrong on the wire so far."""
+        """Faults on the wire so far."""
         return self._cycle.counters
 
     @property
@@ -182,7 +182,7 @@ class ServoChain:
         return self._begin()
 
     def recheck(self, believed_rad: Floats) -> Recheck:
-        """Compare the chain after an interruption with what it was; moves nothing.
+        """Compare the chain after an interruption with its earlier state; moves nothing.
 
         Args:
             believed_rad: (J,) where its joints were when their readings could last be believed.
@@ -200,10 +200,10 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        A joint that is elsewhere than ``found``, or whose servo does not tell that it is this
-        joint's, is not gone on with: two servos with one ID reply in turn. Servos that lost their
-        torque or their settings (rebooted) are set up again. The others get their watchdog cleared
-        and, right behind it, goal = present.
+        A joint that is elsewhere than ``found``, or whose servo does not identify itself, is not
+        resumed: two servos with one ID reply in turn. Servos that lost their torque or their
+        settings (rebooted) are set up again. The others get their watchdog cleared and, right
+        behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -257,9 +257,8 @@ class ServoChain:
     def hold(self) -> None:
         """Set the goals to where the joints are.
 
-        A joint whose servo does not tell both in one reply, where it is and that it is this
-        joint's, keeps its goal: it does not reply, or two servos have one ID, or IDs were
-        exchanged.
+        A joint keeps its goal if its servo does not report its position and its identity in one
+        reply: it does not reply, or two servos have one ID, or IDs were exchanged.
 
         Raises:
             PortError: the port is gone.
@@ -350,7 +349,7 @@ class ServoChain:
             self.on_event(losses)
         measured_at_s = self._take(reply)
         imu = None
-        if read > 0:  # else what is asked beside it waits, too, and the state grows stale
+        if read > 0:  # else the additional reads wait, too, and the state grows stale
             self._reads += 1
             is_alone = not self._read_slow(measured_at_s)
             self._has_time = is_alone and reply.complete
@@ -380,7 +379,7 @@ class ServoChain:
         return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
-        """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
+        """Decode a group read of the state, or one more in this cycle; returns its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
         for line in self._alarms.update(alerted):
@@ -390,7 +389,7 @@ class ServoChain:
     def check_servos(self) -> None:
         """Check torque, watchdogs and settings of the servos, one register in a cycle.
 
-        After a read without a reply there is no check.
+        After a read without a reply nothing is checked.
 
         Raises:
             BusError: a servo has lost its torque or a setting (it has rebooted, or another program
@@ -403,7 +402,7 @@ class ServoChain:
             self._check(self._liveness.check, has_time)
 
     def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> None:
-        """Make a check; an alarm of a servo is the reason for what the check finds.
+        """Make a check; an alarm of a servo is the reason of the check's fault.
 
         An alarm that switches a servo off may come between the group read and the check.
         """
@@ -473,7 +472,7 @@ class ServoChain:
         return goals
 
     def _expect(self, name: str, values: Sequence[int]) -> None:
-        """Compare a register of all servos with what was written to it.
+        """Compare a register of all servos with the values written to it.
 
         Raises:
             BusError: a servo holds something else, or does not reply.

@@ -85,6 +85,8 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
         return time_s, points
     track = load_track(source)
     flat = even_points(track)
+    if not track.places_recorded:
+        flat = flat - flat.mean(axis=1, keepdims=True)  # the images were cropped: no travel
     belly_m = _belly_m(skin, 1.0 if track.length_m is None else track.length_m)
     height_m = np.full(flat.shape[:2], belly_m)
     held = read_arrays(path, {"height_m"})[0] if path.suffix == ".npz" else {}

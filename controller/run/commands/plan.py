@@ -138,7 +138,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
-    warnings = list(prepared.warnings)
+    warnings = [*prepared.warnings, *prepared.climb_warnings]
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
         found |= facts
@@ -158,6 +158,14 @@ def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "up_slope_max_deg": _deg(relief.max_up_slope_rad),
         "side_slope_max_deg": _deg(relief.max_side_slope_rad),
         "climb_m": round(relief.climb_m, 3),
+        "too_steep": [
+            {
+                "begin_m": round(section.begin_m, 2),
+                "end_m": round(section.end_m, 2),
+                "slope_deg": _deg(section.slope_rad),
+            }
+            for section in prepared.steep_sections
+        ],
         "safe_nodes": f"{relief.safe_node_share:.0%}",
     }
     return facts, list(path_warnings(prepared.planner, relief, prepared.run.waypoints_m))

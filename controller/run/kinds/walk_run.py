@@ -21,6 +21,7 @@ from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
+from snakewalk.controller.terrain.climb import CLIMBED_RAD, SteepSection, steep_sections
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.map_planner import MapPlanner
 from snakewalk.controller.track.readers.load import load_track
@@ -214,6 +215,8 @@ class WalkRun(PathRun):
         """Return a fresh pilot; it warns where the recording has no part in the walk."""
         for line in self.warnings:
             on_event("shapes", line)
+        for line in self.climb_warnings:
+            on_event("climb", line)
         if self.ground_map is not None:
             return self._map_walk(self.ground_map)
         chooser = self._chooser()
@@ -301,6 +304,32 @@ class WalkRun(PathRun):
         if not self.library.recorded:
             lines.append(self._no_recorded)
         return tuple(lines)
+
+    @cached_property
+    def steep_sections(self) -> list[SteepSection]:
+        """Sections of the path that the body cannot climb, as far as the ground is known."""
+        if self.ground_ahead is None:
+            return []
+        return steep_sections(self.path, self.ground_ahead, self.robot.length_m, self._climbed_rad)
+
+    @property
+    def climb_warnings(self) -> tuple[str, ...]:
+        """One line for each of the ``steep_sections``."""
+        return tuple(self._too_steep(section) for section in self.steep_sections)
+
+    @property
+    def _climbed_rad(self) -> float:
+        """Steepest slope that a body climbs; where friction along it holds more, that."""
+        return max(CLIMBED_RAD, float(np.arctan(self.world.friction.along)))
+
+    def _too_steep(self, section: SteepSection) -> str:
+        x_m, y_m = self.path.position(section.begin_m)
+        slope, known = np.degrees(section.slope_rad), np.degrees(self._climbed_rad)
+        return (
+            f"the path climbs {slope:.1f} deg from {section.begin_m:.1f} to {section.end_m:.1f} m, "
+            f"beginning at ({x_m:.2f}, {y_m:.2f}): this body is known to climb {known:.1f} deg; "
+            "move the waypoints, or expect it to stay there"
+        )
 
     @property
     def _no_recorded(self) -> str:

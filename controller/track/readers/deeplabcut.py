@@ -17,6 +17,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.markers import MISSING
 from snakewalk.controller.track.track import frame_numbers
 
 PCUTOFF = 0.6
@@ -58,7 +59,7 @@ def load_rows(
         for k, cell in enumerate(row[first : first + len(columns)]):
             text = cell.strip()
             try:
-                values[line, k] = float(text) if text else np.nan
+                values[line, k] = np.nan if text.lower() in MISSING else float(text)
             except ValueError:
                 raise InputError(
                     f"{file}: line {line + depth + 1}: {columns[k][1]} {columns[k][2]}: expected a "

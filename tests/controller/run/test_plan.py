@@ -51,6 +51,25 @@ def test_a_plan_tells_the_slopes_under_the_body_and_warns() -> None:
     assert climb == "the path climbs 15.0 deg; the world's climb limit is 11.5 deg"
 
 
+def test_a_section_that_the_body_cannot_climb_is_reported_by_plan_and_run() -> None:
+    keys = {"world.ground.slope_deg": 18.0, "world.planner.variance_limit_m2": 0.01}
+    words = [word for key, value in keys.items() for word in ("--set", f"{key}={value}")]
+    done = snakewalk("plan", "ramp-10-up", "--motion", "serpenoid", *words, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    (section,) = found["too_steep"]
+    assert section["slope_deg"] == 18.0
+    assert section["end_m"] - section["begin_m"] > 2.0
+    line = found["warnings"][0]
+    assert line.startswith("the path climbs 18.0 deg from 0.8 to 4.0 m, beginning at (-1.56, ")
+    assert ": this body is known to climb 15.5 deg; " in line
+
+    events = list[tuple[str, str]]()
+    prepared = prepare_walk("ramp-10-up", motion="serpenoid", keys=keys)
+    prepared.make_source(lambda kind, text: events.append((kind, text)))
+    assert events == [("climb", line)]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -175,7 +175,9 @@ def test_a_tree_in_steps_has_the_distances_of_scipy() -> None:
     from scipy.sparse.csgraph import dijkstra
 
     graph = random_array((1500, 1500), density=0.004, rng=np.random.default_rng(3), format="csr")
-    found, before = at_once(shortest_tree(graph.indptr, graph.indices, graph.data, 17))
+    found, before = at_once(
+        shortest_tree(graph.indptr.astype(np.int64), graph.indices.astype(np.int64), graph.data, 17)
+    )
     expected, _ = dijkstra(graph, indices=[17], return_predecessors=True)
     np.testing.assert_allclose(found, expected[0], rtol=1e-12)
     reached = np.flatnonzero(np.isfinite(found))
