@@ -35,7 +35,7 @@ _DEEP_RANGE = (16.0, 240.0)
 """Grey levels between which the values of deep images are put."""
 _DEEP_SAMPLE = 9
 _EVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
-_ALIKE = 0.005  # of the rate: what the times say beside what the file states
+_ALIKE = 0.005  # share of the rate: difference between the times and the rate that the file states
 _MISSING = 0.02  # of the frames that a file declares may be absent: some codecs count wrongly
 
 
@@ -64,7 +64,7 @@ class Footage:
     decoded_by_av: bool = False
     """Whether PyAV reads the video, as this OpenCV lacks its codec."""
     deep: GreyScale | None = None
-    """Of images of 16 bit; None for all others."""
+    """Scale of images of 16 bit; None for all others."""
     pages: tuple[int, ...] = ()
     """The page of each of ``files``, from 0: a stack is among them once for each page."""
     numbers: tuple[int, ...] = ()
@@ -163,7 +163,7 @@ def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
                 whole = None if number % every else frame.to_ndarray(format="bgr24")
                 yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
-        return  # what is missing is counted by the caller
+        return  # missing frames are counted by the caller
 
 
 def _av() -> ModuleType:

@@ -3,7 +3,7 @@
 from typing import Final
 
 import numpy as np
-import scipy  # its modules load when they are first used: signal takes 23 MB
+import scipy  # its modules load when they are first used: signal needs 23 MB
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord

@@ -55,7 +55,7 @@ class SummarizedFriction:
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """A run in numbers, SI units, six digits; None where the log cannot tell."""
+    """A run in numbers, SI units, six digits; None for values that the log lacks."""
 
     run: str
     motion: str
@@ -71,7 +71,7 @@ class RunSummary:
     log_complete: bool
     """Whether the log was closed properly."""
     log_note: str
-    """What the log lacks; empty if nothing."""
+    """Parts that the log lacks; empty if it is complete."""
     outcome: str
     """How the run ended, in words."""
     waypoints: int
@@ -106,7 +106,8 @@ class RunSummary:
     peak_torque_n_m: float | None
     """Peak current times the torque constant."""
     electrical_energy_j: float | None
-    """Taken in by the motors in the whole run; what they give back is lost, electronics not in."""
+    """Consumed by the motors in the whole run; returned energy is lost, electronics not
+    included."""
     mechanical_energy_j: float | None
     """Net work at the shafts."""
     energy_source: str
@@ -126,7 +127,7 @@ class RunSummary:
     yield_max_rad: float | None
     """Largest angle by which compliance moved a goal; None if nothing yields."""
     lifted_by_current: float | None
-    """Mean share of links that the currents of the pitch joints tell to be lifted."""
+    """Mean share of lifted links, from the currents of the pitch joints."""
     clamps: int
     vetoes: int
     trip: str | None
@@ -139,7 +140,7 @@ class RunSummary:
     """Share of the cycle that bytes were on the wire."""
     wire_use_max: float | None
     decisions: int
-    """Of the walk over the state library."""
+    """Decisions of the walk over the state library."""
     states_visited: int
     decisions_without_candidates: int
     carrier_share: float | None
@@ -147,7 +148,7 @@ class RunSummary:
     state_library: dict[str, int]
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
-    """What the run found at last; None where it did not look for it."""
+    """Last result of the run; None if it did not estimate it."""
     battery: SummarizedBattery | None
     """Supply and load over the run; None in older logs."""
     pose_evidence: str
