@@ -308,7 +308,7 @@ def _decoded(file: Path, how: int, page: int = 0) -> NDArray[np.uint8 | np.uint1
     if page:
         done, mats = cv2.imreadmulti(str(file), page, 1, flags=how)
         if not done:
-            raise InputError(f"{file}: page {page + 1} is no image that can be read")
+            raise InputError(f"{file}: page {page + 1} is not a readable image")
         return np.asarray(mats[0])
     try:
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
