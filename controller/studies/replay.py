@@ -1,7 +1,7 @@
 """A log run again: the commands that were sent, at their times, to simulated servos.
 
-Nothing decides anew: no pilot, no safety. What differs from the log is the servos, the body and the
-ground; for a log of the simulator nothing may.
+Nothing decides again: no pilot, no safety. Differences from the log come from the servos, the body
+and the ground; a log of the simulator must not differ.
 """
 
 from collections.abc import Callable

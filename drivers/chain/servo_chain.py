@@ -46,7 +46,7 @@ _SLOW_S = 1.0
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
 _HOLD_READS = 2
-"""Reads in which the servos may tell where they are before they hold (ours)."""
+"""Reads in which the servos may report their positions before they hold (ours)."""
 STILL_RAD = 0.1
 """A joint that is read farther from where it was just set to hold is not the one that holds
 (ours)."""
@@ -136,7 +136,7 @@ class ServoChain:
 
     @property
     def counters(self) -> CycleCounters:
-        """What went wrong on the wire so far."""
+        """Faults on the wire so far."""
         return self._cycle.counters
 
     @property
@@ -180,7 +180,7 @@ class ServoChain:
         return self._begin()
 
     def recheck(self, believed_rad: Floats) -> Recheck:
-        """Compare the chain after an interruption with what it was; moves nothing.
+        """Compare the chain after an interruption with its earlier state; moves nothing.
 
         Args:
             believed_rad: (J,) where its joints were when their readings could last be believed.
@@ -198,10 +198,10 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        A joint that is elsewhere than ``found``, or whose servo does not tell that it is this
-        joint's, is not gone on with: two servos with one ID reply in turn. Servos that lost their
-        torque or their settings (rebooted) are set up again. The others get their watchdog cleared
-        and, right behind it, goal = present.
+        A joint that is elsewhere than ``found``, or whose servo does not identify itself, is not
+        resumed: two servos with one ID reply in turn. Servos that lost their torque or their
+        settings (rebooted) are set up again. The others get their watchdog cleared and, right
+        behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -255,9 +255,8 @@ class ServoChain:
     def hold(self) -> None:
         """Set the goals to where the joints are.
 
-        A joint whose servo does not tell both in one reply, where it is and that it is this
-        joint's, keeps its goal: it does not reply, or two servos have one ID, or IDs were
-        exchanged.
+        A joint keeps its goal if its servo does not report its position and its identity in one
+        reply: it does not reply, or two servos have one ID, or IDs were exchanged.
 
         Raises:
             PortError: the port is gone.
@@ -348,7 +347,7 @@ class ServoChain:
             self.on_event(losses)
         measured_at_s = self._take(reply)
         imu = None
-        if read > 0:  # else what is asked beside it waits, too, and the state grows stale
+        if read > 0:  # else the additional reads wait, too, and the state grows stale
             self._reads += 1
             has_time = not self._read_slow(measured_at_s) and reply.complete
             if self._liveness is not None and self._check(self._liveness.check_goals, has_time):
@@ -377,7 +376,7 @@ class ServoChain:
         return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
-        """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
+        """Decode a group read of the state, or one more in this cycle; returns its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
         for line in self._alarms.update(alerted):
@@ -475,7 +474,7 @@ class ServoChain:
         return goals
 
     def _expect(self, name: str, values: Sequence[int]) -> None:
-        """Compare a register of all servos with what was written to it.
+        """Compare a register of all servos with the values written to it.
 
         Raises:
             BusError: a servo holds something else, or does not reply.

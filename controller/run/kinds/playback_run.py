@@ -10,7 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.playback import PlaybackConfig
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.run.joint_file import foreign_joints
+from snakewalk.controller.run.kinds.joint_file import foreign_joints
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
@@ -82,7 +82,7 @@ class PlaybackRun(PathlessRun):
 
     @property
     def clipped(self) -> str | None:
-        """What clipping took away, in words; None where it took nothing away."""
+        """Result of clipping, in words; None if nothing was clipped."""
         past = np.abs(self._as_recorded[1]) - np.array(self.robot.limit_rad)
         if not (past > 0.0).any():
             return None

@@ -163,7 +163,7 @@ def _scaled(values: Floats, factor: float) -> Floats:
 
 
 def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
-    """Least and greatest factor of ``_scaled`` that the recordings do not tell from 1."""
+    """Least and greatest factor of ``_scaled`` that the recordings do not separate from 1."""
 
     def cost(of: Floats) -> float:
         errors = _errors(of, logs, squares, FINE_S) / _OUTLIER_RAD
@@ -190,8 +190,8 @@ def _intervals(
     """Ends of the 95 % intervals, by blocks of errors (a sandwich), within the ranges.
 
     A model that is wrong leaves errors that last: within a block they count as one, so that the
-    intervals grow with the blocks' sums, not shrink with the number of samples. What the logs do
-    not tell has an interval as wide as its range.
+    intervals grow with the blocks' sums, not shrink with the number of samples. Values that the
+    logs do not determine have an interval as wide as their range.
     """
     width = _HIGH - _LOW
     steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
@@ -218,7 +218,7 @@ def _intervals(
             for at in (blocks == block for block in np.unique(blocks))
         ]
     )
-    # a prior as wide as the range keeps what the logs do not tell from blowing the rest up
+    # a prior as wide as the range keeps undetermined values from inflating the rest
     curvature = (jacobian * weight[:, None]).T @ jacobian
     noise = float((weight * errors**2).mean())
     bread = np.linalg.inv(curvature + noise * np.eye(len(values)))
