@@ -468,7 +468,7 @@ def test_a_joint_whose_servo_tells_another_joint_is_not_gone_on_with(
     found = chain.recheck(state.position_rad)
     line.bank[IDENTITY][2] = 1  # what a servo tells that had another ID when it was set up
     with pytest.raises(
-        ChainError, match=r"joint yaw_03 \(ID 3\): its servo does not tell that it is"
+        ChainError, match=r"joint yaw_03 \(ID 3\): its servo.s reply does not identify it"
     ):
         chain.resume(found)
     assert line.bank["Torque Enable"].tolist() == [0] * 4
@@ -494,7 +494,7 @@ def test_torque_does_not_come_on_where_ids_were_exchanged_or_joints_moved_behind
 
     chain._send_goals = send_and_disturb  # type: ignore[method-assign]
     with pytest.raises(
-        ChainError, match=r"joint yaw_01 \(ID 1\): (its servo does not tell|read \+0.30)"
+        ChainError, match=r"joint yaw_01 \(ID 1\): (its servo.s reply does not|read \+0.30)"
     ):
         chain.enable()
     assert (64, b"\x01") not in [(address, data) for address, _, data in line.writes()]
