@@ -1,4 +1,4 @@
-"""What an animal is: its skin, and of one with legs these and one cycle of its gait ([KP] 4)."""
+"""Description of an animal: its skin, and with legs also one cycle of its gait ([KP] 4)."""
 
 from typing import Annotated, Literal, Self
 
@@ -141,5 +141,5 @@ class AnimalConfig(Strict):
 
     @property
     def speed_m_s(self) -> float:
-        """Of the prototype."""
+        """Speed of the prototype."""
         return self.stride * self.length_m / self.cycle_s

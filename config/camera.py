@@ -14,7 +14,7 @@ Place = tuple[float, float]
 
 
 class CameraConfig(Strict):
-    """A camera that looks down on a level floor (docs/overhead-camera.md)."""
+    """A camera above known ground, or one that sees tags (docs/overhead-camera.md)."""
 
     width_px: int = Field(640, ge=64, le=4096)
     height_px: int = Field(480, ge=64, le=4096)
@@ -113,7 +113,7 @@ class CameraConfig(Strict):
 
     @property
     def marker_places_m(self) -> dict[int, Place]:
-        """``markers_m`` by number; empty where there are none."""
+        """``markers_m`` by number; empty without markers."""
         return {int(name): place for name, place in (self.markers_m or {}).items()}
 
 

@@ -232,7 +232,7 @@ def _kind(annotation: Any) -> str:
 
 
 def value_kind(field: FieldInfo) -> str:
-    """What a key takes, in words, with its bounds."""
+    """Kind of value that a key accepts, in words, with its bounds."""
     return f"{_kind(field.annotation)}{_bounds(field)}"
 
 

@@ -115,8 +115,8 @@ def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
 def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     """Data of a robot with the records of the models that its file describes by files.
 
-    Each `model` that names a file, or a model of the folder `servos` beside the robot's file,
-    becomes the name of the model; its record goes into `described_models`, so that a log is
+    A `model` may name a file, or a model of the folder `servos` next to the robot's file. It is
+    replaced by the name of the model, and its record goes into `described_models`, so that a log is
     complete without the file.
 
     Raises:
@@ -144,7 +144,7 @@ def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
 
 
 def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
-    """Load a world by shipped name or path; its ground's file is looked for beside it.
+    """Load a world by shipped name or path; its ground's file is searched in the world's folder.
 
     Raises:
         ConfigError: no such file, world or ground; each fault of it.

@@ -1,4 +1,4 @@
-"""What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
+"""Description of a run: robot, world, recording, waypoints, motion and safety."""
 
 from typing import Annotated, Final, Literal, Self
 
@@ -31,7 +31,7 @@ MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)
 
 
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
-"""Of a waypoint or of the start, m."""
+"""Coordinate of a waypoint or of the start, m."""
 
 
 class StatesConfig(Strict):
@@ -118,7 +118,7 @@ class WalkConfig(Strict):
 
 
 class BehaviourConfig(Strict):
-    """[PT] 2.6.6: settings of the motion."""
+    """Behaviour that a user may change ([PT] 2.6.6)."""
 
     pulse_body_lengths_s: float = Field(0.25, gt=0.0, le=3.0)
     sliding: float = Field(0.0, ge=0.0, lt=1.0, description="w_d")
@@ -208,10 +208,10 @@ class SafetyConfig(Strict):
     def following_limits_rad(self, robot: RobotConfig) -> tuple[float, ...]:
         """How far each joint may be from its goal, rad, head first.
 
-        A yaw joint may lag by the error at which its P gain gives full output, which is all that
-        an honest lag can need; twice of it is the limit, but at least ``following_limit_rad``; so
-        may a leg's joint. A pitch joint has ``following_limit_rad``: its current tells whether the
-        ground holds it off.
+        A yaw joint may lag by the error at which its P gain gives full output, which is the largest
+        lag without a fault. Twice of it is the limit, but at least ``following_limit_rad``; the
+        same holds for a leg's joint. A pitch joint has ``following_limit_rad``: its current shows
+        whether the ground holds it off.
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
         columns = robot.all_axes, robot.position_p_gains, robot.servo_records

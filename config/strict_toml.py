@@ -85,7 +85,7 @@ def _plain(value: Any) -> Any:
 
 
 def _check_keys(text: str) -> None:
-    """Refuse keys of hundreds of tables, for which ``tomllib`` takes minutes.
+    """Reject keys of hundreds of tables: ``tomllib`` needs minutes for them.
 
     Raises:
         ValueError: there is one.
@@ -100,7 +100,7 @@ def _check_keys(text: str) -> None:
 
 _MOST_BYTES: Final = 4_000_000
 _MOST_TABLES: Final = 100
-"""Of a TOML file, and of a dotted key in it (ours)."""
+"""Limit of tables in a TOML file, and in a dotted key (ours)."""
 _NO_KEY: Final = re.compile(r"[^\w.\s\"'-]+")
 _PLACE: Final = re.compile(r" ?\(at line (\d+), column \d+\)")
 _TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")

@@ -44,7 +44,7 @@ def _some(along: Along) -> Along:
 
 
 Knots = AfterValidator(_knots)
-"""Of a ``Curve``: its times must increase."""
+"""Knots of a ``Curve``: its times must increase."""
 _Along = AfterValidator(_some)
 _Share = Annotated[Curve, Knots, _within(0.0, 1.0)]
 

@@ -21,14 +21,13 @@ _LIMIT_SHARE = 2.0 / 2.3
 class RobotConfig(JointValues):
     """A chain of links joined by servos, with or without legs; metres, index 0 is the head.
 
-    The order of the joints is that of the servos on the bus: first those of the spine from head to
-    tail, then those of the legs, pair by pair from tail to head, left before right, hip before
-    foot.
+    The order of the joints is that of the servos on the bus. The spine comes first, from head to
+    tail. Then follow the legs, pair by pair from tail to head, left before right, hip before foot.
     """
 
     @model_validator(mode="after")
     def _axes_of_the_joints(self) -> Self:
-        """Take ``joint_axes`` from the joints if the file does not give it."""
+        """Derive ``joint_axes`` from the joints if the file does not give it."""
         if not self.joint_axes:
             axes = [joint.axis for joint in self.joints]
             known = "".join(axis for axis in axes if axis is not None)

@@ -1,4 +1,4 @@
-"""The host's side of the cable: device, who may open it, how long it holds bytes back."""
+"""The host's side of the cable: device, permission to open it, and its latency."""
 
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ def permission(device: str) -> Finding:
     """Whether this user may open the device.
 
     Raises:
-        PortError: there is no such device.
+        PortError: the device does not exist.
 
     """
     if is_url(device):

@@ -1,4 +1,4 @@
-"""What comes over the line: who else talks, how late replies are, how many get lost."""
+"""Findings on the line: other masters, late replies, lost replies."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ _COMPARED = 3
 _LOST = 2
 """Lost replies of one servo beyond chance (ours)."""
 _STRAY_REPLIES = 3
-"""So many replies to somebody else show another master: one may be a late one to ourselves."""
+"""This number of foreign replies shows another master; a single one may be a late one to us."""
 
 
 def second_master(overheard: Overheard) -> Finding:
@@ -52,7 +52,7 @@ def second_master(overheard: Overheard) -> Finding:
 
 
 def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) -> Finding | None:
-    """Damage that no single servo is the cause of; None: there is none, or one ID has it all.
+    """Damage that does not come from a single servo; None if one ID has all or nothing is damaged.
 
     Two servos with one ID damage their own replies: either all of a kind, or, where they differ by
     little, some. Noise spares nobody, and hits now this reply, now that. So it is noise if bytes
@@ -159,7 +159,7 @@ def line_quality(
 
     """
     reads, lost, longest_s = 0, 0, 0.0
-    while reads < _TEST_READS and lost <= _BAD_SHARE * _TEST_READS:  # a bad line takes its time
+    while reads < _TEST_READS and lost <= _BAD_SHARE * _TEST_READS:  # a bad line needs time
         began_s = port.clock.now_s()
         complete = bool(cycle.read().valid.all())
         reads += 1

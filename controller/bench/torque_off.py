@@ -38,8 +38,8 @@ def torque_off(
 ) -> StopOutcome:
     """Switch torque off on every servo of a port.
 
-    The bytes go out first; then those who answer are asked whether their torque is off, and told
-    once more by their model's control table.
+    The bytes go out first. Then each servo that replies reports its torque, and gets the command
+    once more by its model's control table.
 
     Raises:
         PortError: it is not there, or a program that has no stop button holds it.
@@ -80,7 +80,7 @@ def torque_off(
 
 
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
-    """Read a servo's torque, switch it off once more where it is on; what is wrong, if anything."""
+    """Read a servo's torque, switch it off again if it is on; returns the fault, if any."""
     try:
         bus = DynamixelBus(port, model, latency_s=port.latency_s, tries=_TRIES)
         bus.write_verified(servo_id, "Torque Enable", 0)

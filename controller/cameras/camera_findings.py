@@ -1,4 +1,4 @@
-"""What a check of the overhead camera found, as the doctor writes it."""
+"""Results of a check of the overhead camera as findings, like those of the doctor."""
 
 from collections.abc import Mapping
 from typing import Final, Literal

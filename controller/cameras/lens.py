@@ -60,7 +60,8 @@ class Lens:
         """Read the file of ``snakewalk camera calibrate``, or another of OpenCV's calibration.
 
         Raises:
-            InputError: there is none, it is of another kind, or its numbers describe no lens.
+            InputError: it does not exist, is of another kind, or its numbers do not describe a
+                lens.
 
         """
         if file.suffix.lower() not in _ENDINGS:

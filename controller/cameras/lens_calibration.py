@@ -15,12 +15,12 @@ from snakewalk.controller.cameras.lens import Lens
 FEWEST_VIEWS: Final = 5
 _OUTLIER: Final = 3.0  # times the usual view's residual: a blurred or misread picture (ours)
 _CELLS: Final = 6  # each way, in which corners are counted
-_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, where alone k3 can be told
+_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, which alone determine k3
 
 
 @dataclass(frozen=True, slots=True)
 class LensCalibration:
-    """A lens, and what its pictures say of it."""
+    """A lens, and the quality of its pictures."""
 
     lens: Lens
     rms_px: float
@@ -38,7 +38,7 @@ class LensCalibration:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What would make it better; empty where nothing stands out."""
+        """Proposals for improvement; empty if all is well."""
         focal = float(self.lens.matrix[0, 0])
         found = []
         if self.rms_px > 1.0:

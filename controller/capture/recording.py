@@ -68,6 +68,10 @@ class RecordingFacts:
     states_kept: int
     states_refused: dict[str, int]
     """Shapes refused, by reason, each counted for the first reason only."""
+    places_recorded: bool
+    """False where the images were cropped to the animal: they contain no travel."""
+    head_sure: float | None
+    """How surely the first point is the head, 0 to 1; None where the file does not say."""
     pace: PaceFacts
     every_nth_frame: int = 1
     """Frames of the camera from one row of the file to the next."""
@@ -135,6 +139,8 @@ def examine(
         robot=robot.name,
         states_kept=len(kept),
         states_refused=refused,
+        places_recorded=track.places_recorded,
+        head_sure=None if track.head_sure is None else round(track.head_sure, 3),
         pace=_pace(track, shapes, wave.frequency_hz, robot),
         every_nth_frame=track.every,
         notes=track.notes,

@@ -64,13 +64,15 @@ class CommandGroup(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command with its options, a family, or None."""
-        here = [e for e in _listed(self.prefix) if _next_word(e, self.prefix) == cmd_name]
-        if not here:
+        entries = [e for e in _listed(self.prefix) if _next_word(e, self.prefix) == cmd_name]
+        if not entries:
             return None
         path = f"{self.prefix} {cmd_name}".strip()
-        if here[0].name != path:
-            return _family(path, here)
-        return _stub(cmd_name, here[0]) if self._is_listing else _whole(cmd_name, here[0])
+        if entries[0].name != path:
+            return _family(path, entries)
+        return (
+            _stub(cmd_name, entries[0]) if self._is_listing else _full_command(cmd_name, entries[0])
+        )
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the list of commands from their manifests."""
@@ -151,11 +153,11 @@ def _listed(prefix: str) -> list[Plugin]:
         place = _GROUPS.index(group) if group in _GROUPS else len(_GROUPS)
         return place, first, each.name
 
-    found: dict[str, Plugin] = {}
+    commands: dict[str, Plugin] = {}
     for each in plugins("command"):
         if not prefix or each.name.startswith(f"{prefix} "):
-            found.setdefault(each.name, each)
-    return sorted(found.values(), key=order)
+            commands.setdefault(each.name, each)
+    return sorted(commands.values(), key=order)
 
 
 def _next_word(each: Plugin, prefix: str) -> str:
@@ -187,7 +189,7 @@ def _stub(name: str, listed: Plugin) -> Any:
     )
 
 
-def _whole(name: str, listed: Plugin) -> Any:
+def _full_command(name: str, listed: Plugin) -> Any:
     """Build the options of a command; its module is imported when it is called."""
     declared = declaration(listed.target) if listed.is_own else None
     function: Callable[..., Any] = declared or listed.load()

@@ -1,4 +1,4 @@
-"""What the commands share: options, and how a result is shown."""
+"""Parts that the commands share: options, and the display of a result."""
 
 import json
 import sys
@@ -230,7 +230,7 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
     """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
 
     Raises:
-        InputError: there is no key, or no value, or a key stands twice.
+        InputError: key or value is missing, or a key occurs twice.
 
     """
     values: dict[str, Any] = {}

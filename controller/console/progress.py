@@ -15,7 +15,7 @@ T = TypeVar("T")
 EVERY = 10
 """Cycles of a run between two updates."""
 REFRESH_HZ = 4.0
-"""Rate at which a terminal shows the bar (ours): drawing it takes as much CPU time as a cycle."""
+"""Rate at which a terminal shows the bar (ours): drawing it uses as much CPU time as a cycle."""
 
 
 class ProgressBar:
@@ -70,7 +70,7 @@ class ProgressBar:
         self._progress.advance(self._task)
 
     def hide(self) -> None:
-        """Take the bar away, and its line: what it stood for failed."""
+        """Remove the bar and its line, because its task failed."""
         self._progress.live.transient = True
         self._progress.console.quiet = not self._progress.console.is_interactive
         self._progress.update(self._task, visible=False)
@@ -121,10 +121,10 @@ class PathBar(RunBar):
 
 
 class TimeBar(RunBar):
-    """How much of its time a gait, or anything else that takes a known time, has gone.
+    """Share of the time of a gait, or of any task of known duration, that has passed.
 
-    ``name_at`` takes the time gone by, in seconds, and returns what then moves: a run may change
-    its gait.
+    ``name_at`` receives the elapsed time in seconds and returns the present motion: a run may
+    change its gait.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind people tell apart, thin grey frames."""
+"""One look for all figures: colours that colour-blind people can distinguish, thin grey frames."""
 
 import base64
 from collections.abc import Iterator, Sequence

@@ -29,7 +29,7 @@ class Needs:
     yaw: bool = False
     pitch: bool = False
     legs: bool = False
-    """Whether two pairs of legs take part."""
+    """Whether two pairs of legs are used."""
     leg_axes: str = ""
     """Axes of each of these legs from the hip; empty: whatever they are."""
     wheels: bool = False
@@ -90,9 +90,9 @@ class Gait(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    """One line: what the body does."""
+    """Motion of the body in one line."""
     source: ClassVar[str]
-    """Who described it."""
+    """Author of the description."""
     needs: ClassVar[Needs]
     world: ClassVar[str] = "isotropic"
     """Shipped world of its runs, where none is given."""
@@ -175,7 +175,7 @@ class Range:
 
     @property
     def step(self) -> float:
-        """What one press of a key changes: a fortieth of the range, 1 for whole numbers."""
+        """Change by one press of a key: a fortieth of the range, 1 for whole numbers."""
         return (self.high - self.low) / 40.0 if self.kind is float else 1.0
 
 

@@ -1,4 +1,4 @@
-"""Policies beside gaits: how fast and at what cost each moves, over seeds that move the start.
+"""Comparison of policies with gaits: speed and cost of each, over seeds that move the start.
 
 Each seed draws the start's heading, the ground's friction and the supply, the same for all motions.
 """
@@ -45,7 +45,7 @@ class PolicyTrialResult:
     """A run's numbers at full rate; NaN where it tripped."""
 
     speed_m_s: float
-    """Of the centre of mass, along the straight line from where it was to where it came."""
+    """Speed of the centre of mass, along the straight line from its start to its end."""
     body_lengths_cycle: float
     energy_j_m: float
     """Electrical energy of the motors, integrated in every physics step, for a metre of it."""

@@ -2,8 +2,8 @@
 
 Energy is integrated where something adds it up in every step: in the simulation. A real servo has
 no such counter. Its Present Current is a sample at the moment of the reading, just before the next
-goal arrives, when the error of position that the last goal made has mostly decayed: power from such
-samples is too low (``docs/gaits.md`` has the factor, measured on the same runs).
+goal arrives. The error of position that the last goal made has mostly decayed by then, so power
+from such samples is too low (``docs/gaits.md`` has the factor, measured on the same runs).
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class EnergyTrack:
     time_s: Floats
     """(T,)"""
     electrical_j: Floats
-    """(T,) taken in; what a motor gives back is lost. Without the servos' electronics."""
+    """(T,) consumed; energy that a motor returns is lost. Without the servos' electronics."""
     mechanical_j: Floats
     """(T,) net work at the shafts."""
     source: EnergySource
@@ -89,7 +89,7 @@ class Effort:
     """Means over the time at full rate; NaN where the log does not hold what is needed."""
 
     power_w: float
-    """Electrical, all motors, mean; what they give back is lost."""
+    """Electrical, all motors, mean; returned energy is lost."""
     cost_of_transport: float
     """Power over weight times net speed; without the servos' own electronics."""
     mechanical_cost: float

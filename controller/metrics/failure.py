@@ -1,4 +1,4 @@
-"""Failure of a run along waypoints: what ended it, told from its log."""
+"""Failure of a run along waypoints: its cause, from its log."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -55,7 +55,7 @@ class SummarizedFriction:
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """A run in numbers, SI units, six digits; None where the log cannot tell."""
+    """A run in numbers, SI units, six digits; None for values that the log lacks."""
 
     run: str
     motion: str
@@ -71,7 +71,7 @@ class RunSummary:
     log_complete: bool
     """Whether the log was closed properly."""
     log_note: str
-    """What the log lacks; empty if nothing."""
+    """Parts that the log lacks; empty if it is complete."""
     outcome: str
     """How the run ended, in words."""
     waypoints: int
@@ -88,6 +88,7 @@ class RunSummary:
     paths_replanned: int
     """How often the path was replanned."""
     travelled_m: float | None
+    """Length of the track of the centre of mass, on a way to waypoints while the shape moves."""
     path_error_mean_m: float | None
     path_error_max_m: float | None
     speed_m_s: float | None
@@ -105,7 +106,8 @@ class RunSummary:
     peak_torque_n_m: float | None
     """Peak current times the torque constant."""
     electrical_energy_j: float | None
-    """Taken in by the motors in the whole run; what they give back is lost, electronics not in."""
+    """Consumed by the motors in the whole run; returned energy is lost, electronics not
+    included."""
     mechanical_energy_j: float | None
     """Net work at the shafts."""
     energy_source: str
@@ -125,7 +127,7 @@ class RunSummary:
     yield_max_rad: float | None
     """Largest angle by which compliance moved a goal; None if nothing yields."""
     lifted_by_current: float | None
-    """Mean share of links that the currents of the pitch joints tell to be lifted."""
+    """Mean share of lifted links, from the currents of the pitch joints."""
     clamps: int
     vetoes: int
     trip: str | None
@@ -138,7 +140,7 @@ class RunSummary:
     """Share of the cycle that bytes were on the wire."""
     wire_use_max: float | None
     decisions: int
-    """Of the walk over the state library."""
+    """Decisions of the walk over the state library."""
     states_visited: int
     decisions_without_candidates: int
     carrier_share: float | None
@@ -146,7 +148,7 @@ class RunSummary:
     state_library: dict[str, int]
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
-    """What the run found at last; None where it did not look for it."""
+    """Last result of the run; None if it did not estimate it."""
     battery: SummarizedBattery | None
     """Supply and load over the run; None in older logs."""
     pose_evidence: str
@@ -255,7 +257,7 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         duration_s=_digits(record.duration_s),
         path_length_m=_digits(length_m(header.plan.path_m)),
         paths_replanned=len(record.paths) - 1,
-        travelled_m=_digits(travelled_m(pose)),
+        travelled_m=_digits(_distance_m(record, moved)),
         path_error_mean_m=_digits(_mean(off_path)),
         path_error_max_m=_digits(_peak(off_path)),
         speed_m_s=_digits(moved.speed_m_s),
@@ -311,6 +313,12 @@ def _evidence(header: Header) -> dict[str, Any]:
         "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
         "assumptions": _assumptions(header),
     }
+
+
+def _distance_m(record: RunRecord, moved: Travel) -> float:
+    """Return the distance travelled; the start into the first shape is not part of a walk."""
+    walks = len(record.header.plan.waypoints_m) > 0 and np.isfinite(moved.distance_m)
+    return moved.distance_m if walks else travelled_m(record.pose)
 
 
 def _assumptions(header: Header) -> dict[str, dict[str, object]]:

@@ -16,7 +16,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """Displacement of the centre of mass between two times; NaN where the log does not tell."""
+    """Displacement of the centre of mass between two times; NaN if the log lacks it."""
 
     distance_m: float
     """Along the path, or along the axis of the gait; negative for a climber that falls."""

@@ -1,4 +1,4 @@
-"""What another program may command the joints of a robot to do."""
+"""Commands of another program to the joints of a robot."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -9,7 +9,7 @@ from snakewalk.controller.gaits.gait import Gait
 TIMEOUT_S: Final = 1.0
 """How long joints go on towards goals that nobody renews (ours)."""
 POINTS_MAX: Final = 500
-"""Of a trajectory, which is splined and checked within a cycle."""
+"""Largest number of points of a trajectory, which is splined and checked within a cycle."""
 JOINTS_MAX: Final = 256
 """Joints that a command may name (ours): a robot has at most 200."""
 LINE_BYTES: Final = 1 << 20

@@ -45,7 +45,7 @@ _TRIED_S: Final = 0.02
 
 
 class _Mode(Protocol):
-    """What moves the joints now."""
+    """Present motion of the joints."""
 
     def now(self) -> JointsNow:
         """Angles and speeds."""
@@ -114,7 +114,7 @@ class _Through:
 
 
 class _BySource:
-    """Joints move by a gait, joined to what they did before."""
+    """Joints move by a gait, joined to their earlier motion."""
 
     def __init__(self, blend: Blend) -> None:
         self._blend = blend
@@ -186,11 +186,11 @@ class Commanded:
         return self._mode.now().speed_rad_s
 
     def pace(self) -> Pace:
-        """The robot's limits: what will be commanded is not known."""
+        """The robot's limits: later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Take what has been commanded, then go on by ``dt_s``."""
+        """Execute the commands that have arrived, then go on by ``dt_s``."""
         self._time_s += dt_s
         if self._first is not None:
             self._take(StartGait(self._first))

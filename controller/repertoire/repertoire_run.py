@@ -163,7 +163,7 @@ class RouteRun:
 
     @property
     def follower(self) -> RouteFollower:
-        """Follower of the route, with what it predicted and measured."""
+        """Follower of the route, with its predicted and measured poses."""
         source = self.finished.source
         assert isinstance(source, RouteMotion), "a repertoire run has no other motion"
         return source.follower

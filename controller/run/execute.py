@@ -86,7 +86,7 @@ class RunObserver(CycleObserver, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """What a run left behind."""
+    """Results of a run."""
 
     outcome: Outcome
     log: Path
@@ -94,9 +94,9 @@ class Finished:
     """The log, read back once: for the summary, the report and whoever asks more of it."""
     summary: RunSummary
     pose: PoseProvider
-    """What measured the pose, and how well where this is known."""
+    """Source of the pose, and its accuracy if this is known."""
     map: MapProvider
-    """What mapped the ground on the way, and how well, where something did."""
+    """Source of the map, and its accuracy, for a run that maps its ground."""
     source: MotionSource
     """The motion that ran, at its end."""
     travel: Travel
@@ -126,20 +126,19 @@ def execute(
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
-    the simulated runs of a study have none. ``view`` looks on: a page that shows the run, a ROS
-    node that tells of it. With ``shadow`` a simulated chain follows the same goals, and log and
-    ``on_event`` tell what differs.
-    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
-    ``stop_requested``, asked in every read and write, why torque goes off, or None;
-    ``waypoint_commands``, asked in every cycle, what a person sets of the waypoints, as
-    ``LiveCourse`` takes it: the run then holds at the last one until it is ended;
-    ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
-    a slower rate, an operator's change.
+    the simulated runs of a study have none. ``view`` observes the run: a page that shows it, a ROS
+    node that publishes it. With ``shadow`` a simulated chain follows the same goals, and log and
+    ``on_event`` report the differences. ``confirm`` asks an operator whether an interrupted chain
+    may go on (``safety.recovery``). ``stop_requested`` is called in every read and write and
+    returns why torque goes off, or None. ``waypoint_commands`` is called in every cycle and returns
+    a person's changes of the waypoints, as ``LiveCourse`` accepts them: the run then holds at the
+    last one until it is ended. ``on_progress`` is called after each cycle, ``on_event`` with
+    decisions of the motion: a slower rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
             the folder holds a run, or a shadow is asked for on ground where it means nothing.
-        KeyboardInterrupt: of an operator; its notes tell what became of torque, and the log's path.
+        KeyboardInterrupt: of an operator; its notes report the state of torque, and the log's path.
 
     """
     refuse_another_run(folder, force)
@@ -338,8 +337,9 @@ def _second_body(
     """Let a bare snake that walks ground that is known use a second body, where there is one.
 
     Returns:
-        What finds the friction under a walk: on a level floor on paper, elsewhere on that body.
-        None where the pose tells nothing of it: by the joints or an IMU it takes friction as known.
+        The estimator of the friction under a walk: on a level floor on paper, elsewhere on that
+            body.
+        None if the pose does not depend on it: the joints or an IMU assume the friction.
 
     """
     run, world, robot = prepared.run, prepared.world, prepared.robot
@@ -385,7 +385,7 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
 
 
 def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
-    """Read the log of a run that is over, and write its summary beside it."""
+    """Read the log of a run that is over, and write its summary next to it."""
     try:
         record = read_log(log)
         moved = travel(record)

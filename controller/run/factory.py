@@ -75,7 +75,7 @@ def _extension(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepar
     """Prepare a run whose motion is a plug-in: a kind of run, or a motion source.
 
     Raises:
-        InputError: there is no such motion.
+        InputError: the motion does not exist.
 
     """
     kind = find("run", run.motion)
@@ -99,7 +99,7 @@ def prepare_walk(
     on_paper: bool = False,
     **changes: object,
 ) -> WalkRun:
-    """Load a walk's run: as ``prepare_job``, which takes gaits along waypoints, too.
+    """Load a walk's run: as ``prepare_job``, which also accepts gaits along waypoints.
 
     Raises:
         ConfigError: every fault of a file at once.
@@ -133,8 +133,8 @@ def prepare_job(
     itself.
 
     Raises:
-        ConfigError: every fault of a file at once.
-        InputError: what the configuration asks cannot be made, or does not fit the wire.
+        ConfigError: every fault of a file at once. InputError: the configuration cannot be
+        realised, or does not fit the wire.
 
     """
     keys = checked_keys(keys)
@@ -184,7 +184,7 @@ def prepare_job(
 
 
 def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
-    """Return keys of run, robot and world that a gait's run takes, angles in rad.
+    """Return keys of run, robot and world that a gait's run accepts, angles in rad.
 
     Raises:
         InputError: a key is of none of the files, or has an option of its own; one line each.
@@ -386,8 +386,8 @@ def prepare_source(
 ) -> SourceRun:
     """Prepare a run of your own motion source, of at most ``seconds``; it ends earlier when done.
 
-    ``make`` takes the robot and returns a fresh source at each call: one is stepped on paper before
-    torque is on, another one in the run; ``keys`` as of ``prepare_walk``.
+    ``make`` receives the robot and returns a fresh source at each call: one is stepped on paper
+    before torque is on, another one in the run. ``keys`` as for ``prepare_walk``.
 
     Raises:
         InputError: the robot lacks joints that the source needs, or its cycle does not fit the

@@ -21,7 +21,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Artifacts:
-    """Files of a run beside its log; None for what is not there, and why in ``notes``."""
+    """Files of a run next to its log; None for missing ones, with the reason in ``notes``."""
 
     report: Path | None
     film: Path | None

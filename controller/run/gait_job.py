@@ -134,7 +134,7 @@ def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
 
 
 def _names(prepared: GaitRun, hands: Hands | None) -> Callable[[float], str]:
-    """What moves at a time of the run: gaits change by keys or as planned."""
+    """Return the motion at a time of the run: gaits change by keys or as planned."""
     name = prepared.run.name
     if hands is not None:
         return lambda gone_s: hands.gait or name

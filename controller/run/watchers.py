@@ -95,7 +95,7 @@ def open_observer(name: str, argument: str = "") -> AbstractContextManager[Any]:
     """Return the observer that a plug-in opens.
 
     Raises:
-        InputError: there is no such observer.
+        InputError: the observer does not exist.
 
     """
     opened: AbstractContextManager[Any] = require("observer", name, "--observe").load()(argument)
@@ -121,7 +121,7 @@ def watched(
         live: let page and ROS node command the waypoints of the run.
 
     Raises:
-        InputError: there is no such observer, or it cannot be opened.
+        InputError: the observer does not exist, or it cannot be opened.
 
     """
     with ExitStack() as stack:

@@ -37,14 +37,14 @@ Rows = dict[str, list[dict[str, Any]]]
 
 
 class LogError(InputError):
-    """A log is missing, of another program, or breaks off before it says what ran."""
+    """A log is missing, is another kind of file, or breaks off before its header ends."""
 
 
 def read_log(path: Path) -> RunRecord:
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
 
     Raises:
-        LogError: there is no such file, it is no log of ours, or not even its start is left.
+        LogError: the file does not exist, is not a log of ours, or its start is missing.
         InputError: it would expand too far (``archive.check_expansion``).
 
     """
@@ -53,7 +53,7 @@ def read_log(path: Path) -> RunRecord:
     try:
         with path.open("rb") as file:
             data = file.read(len(_MAGIC))
-            if data == _MAGIC:  # a device that has no end is no log
+            if data == _MAGIC:  # a device without an end is not a log
                 data += file.read()
     except OSError as error:
         part = part_path(path)
@@ -186,7 +186,7 @@ def _unpacked(chunk: Chunk) -> Chunk:
 
 
 def _said_bytes(chunk: bytes) -> int:
-    """Bytes that a chunk says it takes unpacked; the lesser, where its frame says otherwise."""
+    """Unpacked bytes that a chunk states; the lesser, if its frame states otherwise."""
     said, name_length = _CHUNK_HEAD.unpack_from(chunk)
     frame = _CHUNK_HEAD.size + name_length + _CHUNK_LENGTH
     try:
@@ -197,7 +197,7 @@ def _said_bytes(chunk: bytes) -> int:
 
 
 def _whole_records(data: bytes) -> tuple[int, bool, int]:
-    """Bytes of whole records, whether the footer ends them, and their bytes unpacked, as told."""
+    """Bytes of complete records, whether the footer ends them, and their stated unpacked bytes."""
     at, opcode, unpacked = len(_MAGIC), 0, 0
     while at + _HEAD.size <= len(data) and opcode != _FOOTER:
         opcode, length = _HEAD.unpack_from(data, at)

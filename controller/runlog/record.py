@@ -36,9 +36,14 @@ class MotorEnergy(NamedTuple):
     """Energy of all motors since they were switched on; NaN where nothing adds it up."""
 
     electrical_j: float = float("nan")
-    """Taken in; what a motor gives back is lost, not deducted. Without the servos' electronics."""
+    """Consumed energy; energy that a motor returns is lost, not deducted. Without the servos'
+    electronics."""
     mechanical_j: float = float("nan")
     """Net work at the shafts."""
+
+
+POSE_CHECK: Final = "pose check"
+"""Backend of a log that contains only the poses of a source, before torque."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,7 @@ class Winding:
 
 @dataclass(frozen=True, slots=True)
 class PlanSummary:
-    """What the plan promises."""
+    """Figures of the plan."""
 
     path_m: Floats
     """(n, 2) or (n, 3) points of the path that the run starts with."""
@@ -71,14 +76,14 @@ class InitialPose:
     """Pose in which a simulated robot was put on the ground."""
 
     heading_rad: float
-    """Of the head link."""
+    """Heading of the head link."""
     joint_rad: Floats
     """(J,)"""
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What ran, with what."""
+    """Software and configuration of a run."""
 
     software: str
     backend: str
@@ -92,7 +97,7 @@ class Header:
     """Thinned; None on a flat floor."""
     torque_constant_n_m_a: float
     winding: Winding | None
-    """Of the robot's servos; None where the log does not say it."""
+    """Winding of the robot's servos; None if the log does not state it."""
     initial_pose: InitialPose | None
     """None on servos."""
     pose_evidence: PoseEvidence
@@ -212,7 +217,7 @@ class RunRecord:
     complete: bool
     """Whether the file was closed properly."""
     note: str
-    """What is missing, if it was not; empty otherwise."""
+    """Missing part, if the plan was incomplete; empty otherwise."""
 
     def tables(self) -> tuple[Table, ...]:
         """Tables of all topics but ``ConfigTable``; those of the plan begin at 0 s."""

@@ -192,7 +192,7 @@ class ImuTable(Table):
             "(9,) rows of the rotation matrix of the link of the IMU; any heading", shape=(3, 3)
         ),
     ]
-    """Of the IMU's link; the heading has an unknown offset and drifts."""
+    """Rotation of the IMU's link; the heading has an unknown offset and drifts."""
     rate_rad_s: Annotated[
         Floats, Column("(3,) about the link's forward, left and up axes", shape=(3,))
     ]

@@ -46,7 +46,7 @@ _CHUNK_BYTES: Final = 1 << 20
 class RunLog:
     """One run's log; a context manager. Writes ``<path>.part``, renamed to ``path`` on leaving.
 
-    Times must not be negative. Any method raises OSError when the disk does not take the bytes.
+    Times must not be negative. Any method raises OSError when the disk does not accept the bytes.
     ``on_row`` gets the topic and the JSON of every row as well, at once; without it the rows of
     fast topics are printed in batches, within ``_FLUSH_S``.
     """
@@ -93,7 +93,7 @@ class RunLog:
         """Finish the file also when the run ends with an error: the log says how it came to it.
 
         Nothing is left of a run that was refused before its first cycle. A log that the disk does
-        not take stays what it is, ``.part``, and the error says its name.
+        not accept stays ``.part``, and the error names it.
         """
         try:
             try:
@@ -129,7 +129,7 @@ class RunLog:
         pose_evidence: PoseEvidence | None = None,
         port_is_pseudo_terminal: bool | None = None,
     ) -> None:
-        """Log the configuration, once and first; the ground is thinned to what a report draws."""
+        """Log the configuration, once and first; the ground is thinned for reports."""
         header = Header(
             software=version("snakewalk"),
             backend=backend,
@@ -172,7 +172,7 @@ class RunLog:
         state: JointState,
         **values: Any,
     ) -> None:
-        """Log a control cycle with what the servos and the IMU reported.
+        """Log a control cycle with the readings of the servos and the IMU.
 
         ``values`` are the other fields of ``CycleTable``.
         """
@@ -239,7 +239,7 @@ class RunLog:
             self._writer.add_message(self._channels[table], stamp_ns, data, publish_time=stamp_ns)
 
     def _report_deletion(self) -> None:
-        """Warn once if the file has no name any more: somebody deleted it or its folder."""
+        """Warn once if the file has no name any more, because it or its folder was deleted."""
         if self._is_deleted or os.fstat(self._file.fileno()).st_nlink > 0:
             return
         self._is_deleted = True

@@ -92,7 +92,7 @@ class Progress(NamedTuple):
     reached: int
     """Number of waypoints reached."""
     along_m: float
-    """Arc length on the path; NaN where there is no path."""
+    """Arc length on the path; NaN without a path."""
     done: bool
     """Whether the motion has come to its end and rests."""
     waypoints: int = 0
@@ -101,7 +101,7 @@ class Progress(NamedTuple):
 
 OnProgress = Callable[[Progress], None]
 OnEvent = Callable[[str, str], None]
-"""Takes the kind of an event, and a line of text."""
+"""Receives the kind of an event, and a line of text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ class CycleObserver(Protocol):
         ...
 
     def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
-        """Take a cycle: when it was due, the goals (J,) that safety let through, what was read."""
+        """Process a cycle: its due time, the goals (J,) that safety passed, and the readings."""
         ...
 
 

@@ -121,5 +121,5 @@ def varied(prepared: P, rng: np.random.Generator) -> P:
 
 
 def _digits(value: float | None) -> float | None:
-    """Five digits, and None for what is not known: a table is read by people too."""
+    """Five digits, and None for unknown values: a table is also read by people."""
     return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

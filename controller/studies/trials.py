@@ -38,7 +38,7 @@ _START_DRAWS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What distinguishes one row of the table; None leaves the run's own."""
+    """Parameters of one row of the table; None leaves the run's own."""
 
     run: str
     motion: str
@@ -74,7 +74,7 @@ class Trial:
     """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
     duration_s: float = math.nan
     slope_median_deg: float = math.nan
-    """Of the surface in the strip along the path that the body stands on."""
+    """Slope of the surface in the strip along the path that the body lies on."""
     path_error_m: float = math.nan
     """Mean."""
     path_error_max_m: float = math.nan
@@ -85,7 +85,7 @@ class Trial:
     lead_max_rad: float = math.nan
     """Largest difference between an asked and a measured joint angle."""
     speed_m_s: float = math.nan
-    """Of a gait over the ground, net, at full rate."""
+    """Speed of a gait over the ground, net, at full rate."""
     current_max_a: float = math.nan
     roll_max_deg: float = math.nan
     in_air: float = math.nan
@@ -100,7 +100,7 @@ class Trial:
     alarms: int = 0
     """For missing advance."""
     cause: str = ""
-    """Of a run that is not complete: that of ``metrics.failure``, or ``refused`` or ``error``."""
+    """Cause of an incomplete run: that of ``metrics.failure``, or ``refused`` or ``error``."""
     why: str = ""
     """The same in a sentence."""
 

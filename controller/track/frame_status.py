@@ -25,6 +25,9 @@ class FrameStatus(StrEnum):
     PART = "a part is missing: something goes on beyond its end"
     GHOST = "the background shows the animal"
     BLOB = "not a long body"
+    EMPTY = "rejected: the body does not stand out from the ground along the line"
+    KNOT = "rejected: a bend or a loop is tighter than the body's width allows"
+    LENGTH = "rejected: the length lies outside the film's range"
     LEFT_OUT = "left out by a person"
 
     @property

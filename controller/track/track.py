@@ -53,6 +53,11 @@ class Track:
     """(T,) of the kept frames; empty where the file says nothing of them."""
     source: str = "not stated"
     licence: str = "not stated"
+    places_recorded: bool = True
+    """Whether the points of different frames share one origin; not of images cropped to the animal,
+    nor of a camera that moves: they contain no travel."""
+    head_sure: float | None = None
+    """How surely the first point is the head, 0 to 1; None where the file does not say."""
 
     @property
     def frames(self) -> int:
@@ -77,6 +82,10 @@ class Track:
         flipped = 1.0 - np.cos(after[:, ::-1] + np.pi - before).mean(axis=1)
         joined = np.diff(self.time_s) < 1.5 / self.rate_hz
         return int(np.count_nonzero((flipped < same) & joined))
+
+
+UNSURE_HEAD = 0.3
+"""``head_sure`` below which head and tail may be exchanged."""
 
 
 def track_from_points(

@@ -24,8 +24,11 @@ class Undulation:
 def even_points(track: Track) -> Floats | None:
     """Points (T, 101, 2) at equal arc lengths, body lengths; None where places are not recorded.
 
-    Files of joint angles, and figures without travel, put every head at the same place.
+    Files of joint angles, and figures without travel, put every head at the same place; images that
+    are cropped to the animal share no origin.
     """
+    if not track.places_recorded:
+        return None
     heads = track.points[:, 0]
     if np.ptp(heads, axis=0).max() <= 1e-9:
         return None

@@ -1,6 +1,6 @@
 """Wire time of a control cycle, computed before a run, and the rate that it allows.
 
-A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte takes ten
+A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte lasts ten
 bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
@@ -25,12 +25,12 @@ STATE_BYTES = 10
 SLOW_STATE_BYTES = 3
 """Slow state block, read in every 16th cycle: Present Input Voltage, Present Temperature."""
 CHECK_BYTES = 4
-"""Longest register that is compared with what was set, in cycles without the slow state."""
+"""Longest register that is compared with its setting, in cycles without the slow state."""
 
 
 @dataclass(frozen=True, slots=True)
 class WireBudget:
-    """Bytes and seconds that one cycle takes on the wire."""
+    """Bytes and seconds of one cycle on the wire."""
 
     servos: int
     baud: int

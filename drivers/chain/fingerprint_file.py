@@ -44,7 +44,7 @@ class FingerprintFile:
         self.path = fingerprint_path(robot_file)
 
     def read(self) -> dict[int, dict[str, int]] | None:
-        """Fingerprints by servo ID; None if there is no file.
+        """Fingerprints by servo ID; None without a file.
 
         Raises:
             ConfigError: the file is broken.

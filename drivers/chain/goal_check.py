@@ -102,7 +102,7 @@ class GoalCheck:
             raise BusError(self._fault(sorted(over), sent, explain))
 
     def explain(self, joint: int) -> str | None:
-        """Read the goals once; what is wrong with that of a joint, or None.
+        """Read the goals once; returns the fault of a joint's goal, or None.
 
         Raises:
             PortError: the port is gone.

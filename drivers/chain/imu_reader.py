@@ -14,7 +14,7 @@ from snakewalk.drivers.protocol.imu_table import BLOCK_BYTES, IMU_TABLES, ImuSam
 from snakewalk.drivers.types import ImuState
 
 SILENT_S = 1.0
-"""After so long without a reading this is told (ours)."""
+"""A pause without a reading of this length is reported (ours)."""
 
 
 class ImuReader:

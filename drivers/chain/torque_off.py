@@ -65,7 +65,7 @@ class TorqueOff:
         self._report(sorted(silent), faults, ports=len(joints_on))
 
     def _report(self, silent: Sequence[int], faults: Sequence[PortError], ports: int) -> None:
-        """Raise the error of what could not be switched off; nothing if all servos are off."""
+        """Raise the error of servos that are not off, if any."""
         names = ", ".join(map(self._robot.joint_label, silent))
         if faults:
             text = (

@@ -86,7 +86,7 @@ class SerialPort(LinePort):
         try:
             sent = 0
             while True:
-                # a device that polls as writable may still take nothing when it is full
+                # a device that polls as writable may still accept nothing when it is full
                 with suppress(BlockingIOError):
                     sent += os.write(fd, data[sent:])
                 if sent == len(data):
@@ -116,7 +116,7 @@ class SerialPort(LinePort):
             raise self._lost(error) from error
         return got
 
-    # what the SDK calls
+    # calls of the SDK
 
     def closePort(self) -> None:
         self.descriptor = None

@@ -31,7 +31,7 @@ _PIECE = 64
 _TIMER_SLACK_NS = 50_000
 """Linux ends a sleep up to this much late, so that it can end several at once (prctl(2))."""
 _GAIN = 8
-"""A reply moves the latency estimate by one part in so many (ours)."""
+"""A reply moves the latency estimate by one part in this number (ours)."""
 _LONGEST_STREAK = 16
 _RAW = types.Array(uint8, 1, "C", readonly=True)
 LATE, STREAK = 0, 1

@@ -1,4 +1,4 @@
-"""The looks of the body and its ground in pictures; nothing here takes part in the physics."""
+"""The looks of the body and its ground in pictures; they have no effect on the physics."""
 
 import itertools
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ class FloorPrint:
     """A printed sheet on level ground, its upper edge to the north."""
 
     place_m: tuple[float, float]
-    """Of its middle."""
+    """Position of its middle."""
     side_m: float
     picture: Image
     """(N, N) grey."""

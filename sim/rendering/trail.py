@@ -12,13 +12,13 @@ from snakewalk.config.heightfield import HeightField
 
 Rgba = tuple[float, float, float, float]
 PATH: Final[Rgba] = (0.98, 0.98, 0.95, 1)
-"""Of the path in force."""
+"""Colour of the path in force."""
 FORMER: Final[Rgba] = (0.98, 0.98, 0.95, 0.35)
-"""Of a path that another one replaced."""
+"""Colour of a path that another one replaced."""
 TRAIL: Final[Rgba] = (0.20, 0.33, 0.62, 1)
-"""Of the head."""
+"""Colour of the trail of the head."""
 CENTRE: Final[Rgba] = (0.85, 0.30, 0.10, 1)
-"""Of the body's centre."""
+"""Colour of the trail of the body's centre."""
 AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
 """The world's x and y."""
 AXES_GEOMS: Final = 5
@@ -54,22 +54,22 @@ class TrailLine:
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """What the lines of each frame are made of."""
+    """Dots and lines of the frames."""
 
     starts_s: Floats
     """(K,) from when on each path is in force, increasing."""
     dots_m: tuple[Floats, ...]
     """K times (D, 3), on the ground."""
     lines: tuple[TrailLine, ...]
-    """Of the head, and of the body's centre."""
+    """Lines of the head and of the body's centre."""
 
     @property
     def most(self) -> int:
-        """Most geoms that a frame takes."""
+        """Largest number of geoms of a frame."""
         return max((len(dots) for dots in self.dots_m), default=0) * 2 + MOST * len(self.lines)
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
-        """Append dots and lines to a scene that was just updated and has room for them.
+        """Append dots and lines to a scene that was just updated and has enough free geoms.
 
         Drawn are the path in force, pale the one before it, and the trails.
         """

@@ -137,7 +137,9 @@ def test_the_source_of_a_ground_stands_beside_the_world_that_names_it(
     with pytest.raises(ConfigError, match=r"is not an \.npz with an array 'elevation'"):
         build_ground(load_world("../w.toml"))
     (tmp_path / "hill.npz").unlink()
-    with pytest.raises(ConfigError, match=r"ground\.source: hill\.npz: no such file beside"):
+    with pytest.raises(
+        ConfigError, match=r"ground\.source: hill\.npz: no such file in the folder of"
+    ):
         load_world("../w.toml")
 
 

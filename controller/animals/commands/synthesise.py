@@ -37,7 +37,7 @@ from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
-"""Of the files, by what is in them."""
+"""Endings of the files, by content."""
 
 
 @command(

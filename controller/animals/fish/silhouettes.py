@@ -18,7 +18,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _FOR_BACKGROUND = 25
 _LEAST_WHOLE = 0.5
 """Share of those frames that must show a whole body on the ground that was found (ours)."""
-_THIN = 0.5  # of the silhouette's threshold: what is connected to the body down to it belongs to it
+_THIN = 0.5  # share of the silhouette's threshold: connected pixels above it belong to the body
 _SURE = 12.0  # grey values above the ground at least
 
 
@@ -28,7 +28,7 @@ class FishFilm:
 
     footage: Footage
     detector: BodyDetector
-    """Of the ground, or of the way to find it in each frame."""
+    """Detector of the ground, or of the body in each frame."""
     size_px: tuple[int, int]
     """Rows and columns of a frame."""
 

@@ -1,9 +1,8 @@
 """A skin of PDE patches: a tube through many closed curves, and fins that grow out ([GC] 1.3).
 
 The paper cuts many curves into fours, each of which makes one patch. Two such patches meet in a
-curve, but not in a tangent plane: the skin has a crease there. Here a patch spans two
-curves, and is also told the slope along the body at both, which its neighbour is told as well; of
-order 3, the curvature too.
+curve, but not in a tangent plane: the skin has a crease there. Here a patch spans two curves, and
+shares the slope along the body at both with its neighbour; of order 3, the curvature too.
 
 A fin is a patch of its own: its first curve is drawn on the tube, three more stand above it.
 """
@@ -38,7 +37,7 @@ class Tube:
         """Join curves (K, C, 3) at rising stations (K,); a tip is a curve of one place.
 
         Raises:
-            InputError: too few curves for the slopes, an order that is none, curves that make none.
+            InputError: too few curves for the slopes, an unknown order, or curves that coincide.
 
         """
         if not 1 <= order <= 3:

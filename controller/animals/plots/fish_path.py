@@ -31,7 +31,7 @@ def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOption
     """Draw a synthesis to ``file``.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)

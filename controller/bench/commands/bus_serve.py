@@ -216,13 +216,13 @@ def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
     if output_flushes:
         LOGGER.warning(
             "a client flushed its output at least %d times: bytes that it sent less than 5 ms "
-            "before may be lost, which no UART does (docs/bus.md)",
+            "before may be lost, which no UART does (docs/how-to/serve-a-bus.md)",
             output_flushes,
         )
 
 
 def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served]") -> "Served":
-    """What is served, its line, who looks at it, what puts its packets into words, its faults."""
+    """Name of the line, the line, its taps, the decoder of its packets, and its faults."""
     if play is None:
         return simulated()
     line = RecordedLine.of(play, baud or 1_000_000)

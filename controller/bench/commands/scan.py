@@ -1,4 +1,4 @@
-"""``snakewalk scan``: who is on the bus."""
+"""``snakewalk scan``: the servos on the bus."""
 
 import json
 from typing import Annotated

@@ -22,7 +22,7 @@ Squares = Annotated[
 ]
 SquareMm = Annotated[float, typer.Option(help="side of a square in mm, as measured on the print")]
 DOTS = 300.0
-"""Per inch of what is printed."""
+"""Resolution of the print, dots per inch."""
 
 
 def read_squares(text: str) -> tuple[int, int]:

@@ -35,6 +35,7 @@ from snakewalk.controller.track.readers.generated import EMBEDDED
 from snakewalk.controller.track.readers.keypoints import ALL, choice_of
 from snakewalk.controller.track.readers.load import check_rate
 from snakewalk.controller.track.readers.writers import SUFFIXES, write_track
+from snakewalk.controller.track.track import UNSURE_HEAD
 
 
 @command(
@@ -137,8 +138,15 @@ def _show(facts: "RecordingFacts") -> None:
         f"acceleration {pace.slowed_by_for_acceleration}); "
         f"{pace.longer_if_slowed_where_needed} times longer if only where needed",
     }
+    if not facts.places_recorded:
+        rows["places"] = "not recorded: the images were cropped to the animal or the camera moved"
     if facts.head_and_tail_swapped:
         rows["warning"] = f"head and tail change places {facts.head_and_tail_swapped} times"
+    elif facts.head_sure is not None and facts.head_sure < UNSURE_HEAD:
+        rows["warning"] = (
+            f"head and tail may be exchanged (sure by {facts.head_sure:.2f}); capture the film "
+            "again with --head X,Y, or correct it on the page of capture --review"
+        )
     elif facts.time_towards_head is not None and facts.time_towards_head > 0.5:
         rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
     if facts.every_nth_frame > 1:

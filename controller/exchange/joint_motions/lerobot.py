@@ -61,7 +61,7 @@ class LeRobotEpisode:
             likely = "deg" if largest > 2.0 * np.pi else "rad"
             raise InputError(
                 f"{path}: {feature} does not state its unit; its values go to {largest:.3g}; say "
-                f"--unit {likely} (motors normalized to -100..100 are no angles)"
+                f"--unit {likely} (motors normalized to -100..100 are not angles)"
             )
         if not np.isfinite(time_s).all():
             time_s = np.arange(len(values)) / rate_hz

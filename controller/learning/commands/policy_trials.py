@@ -52,7 +52,7 @@ def policy_trials(
     """Compare policies with gaits: each seed varies start, friction and supply equally for all."""
     require_extra("trials need", "mujoco")
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
-    rows = list(dict.fromkeys(rows))  # what is given twice is run once
+    rows = list(dict.fromkeys(rows))  # repeated rows run once
     planned = [
         PolicyTrial(motion, ground, seed, seconds)
         for motion, ground in rows

@@ -1,4 +1,4 @@
-"""``snakewalk list``: what is shipped and installed."""
+"""``snakewalk list``: shipped and installed items."""
 
 import json
 

@@ -22,7 +22,7 @@ KINDS: Final = (
     *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal", "schedule"),
     *("faults", "servo", "policy"),
 )
-"""Of ``models``, known before they are built."""
+"""Names of ``models``, known before they are built."""
 
 
 @command("schema", group=JOB, examples=("schema run", "schema robot -o robot.json"))

@@ -82,7 +82,7 @@ class PlaybackRun(PathlessRun):
 
     @property
     def clipped(self) -> str | None:
-        """What clipping took away, in words; None where it took nothing away."""
+        """Result of clipping, in words; None if nothing was clipped."""
         past = np.abs(self._as_recorded[1]) - np.array(self.robot.limit_rad)
         if not (past > 0.0).any():
             return None

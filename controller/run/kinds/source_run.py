@@ -37,9 +37,9 @@ class SourceRun(PathlessRun):
     def check_plan(self) -> PlanSummary:
         """Check range, speed and acceleration of every joint over the whole run.
 
-        The source is stepped at the run's rate with the head at rest and the joints on their
-        goals: one that reacts to the measured body may move otherwise in the run, where the
-        safety link still vets every command.
+        The source is stepped at the run's rate with the head at rest and the joints on their goals.
+        A source that reacts to the measured body may move otherwise in the run, where the safety
+        link still vets every command.
 
         Raises:
             InputError: one line for each fault.

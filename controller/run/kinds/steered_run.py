@@ -32,7 +32,7 @@ class SteeredRun(PathRun, GaitRun):
         """Check that the gait can be steered, and within the joints' ranges; lay the path.
 
         Raises:
-            InputError: it cannot, or the run asks for what belongs to a gait without waypoints.
+            InputError: it cannot, or the run has keys of a gait without waypoints.
 
         """
         if self.ground is not None and not self.robot.limbs:

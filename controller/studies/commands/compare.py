@@ -64,7 +64,7 @@ def compare(
 
 
 def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> None:
-    """What differs in the configurations, then the numbers that at least one run has."""
+    """Print the differences of the configurations, then the numbers that at least one run has."""
     settings = Table(
         "setting", *_columns(runs), box=None, title="What differs", title_justify="left"
     )

@@ -52,14 +52,14 @@ if TYPE_CHECKING:
 
 
 class _RobotFile(NamedTuple):
-    """A robot to be written with what is found of it."""
+    """A robot to write with the results."""
 
     before: "RobotConfig"
     out: Path
 
 
 class _Outs(NamedTuple):
-    """Files for what logs of runs tell: of the ground, and of the robot."""
+    """Files for the results from logs of runs: ground and robot."""
 
     world: Path | None
     robot: Path | None

@@ -1,4 +1,4 @@
-"""``snakewalk shadow``: what differs between a robot, by its log, and the simulator."""
+"""``snakewalk shadow``: differences between a robot, by its log, and the simulator."""
 
 import json
 from pathlib import Path

@@ -41,7 +41,7 @@ def read_pendulum_log(path: Path) -> PendulumLog:
     """Read a raw log of BAM: mass, length, kp, and entries of position, goal, volts and torque.
 
     Raises:
-        InputError: it is no such file; says what is missing.
+        InputError: it is not such a file, with its missing parts.
 
     """
     data = read_json(path)

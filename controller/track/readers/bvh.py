@@ -53,7 +53,7 @@ def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     notes = []
     if choice.keypoints is None and len(longest) < len(joints):
         beside = [joints[k].name for k in range(len(joints)) if k not in longest]
-        notes.append(f"{len(beside)} joints beside the longest chain are left out: "
+        notes.append(f"{len(beside)} joints outside the longest chain are left out: "
                      f"{', '.join(beside)}; --keypoints uses them")  # fmt: skip
     kept = longest if choice.keypoints is None else list(range(len(joints)))
     notes.append(f"{joints[0].name} is taken as the head; --keypoints gives another order")

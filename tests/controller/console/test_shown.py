@@ -107,7 +107,7 @@ def test_help_at_80_columns_loses_no_letter_and_breaks_no_sentence(
     assert [words for words, text in shown.items() if "\N{HORIZONTAL ELLIPSIS}" in text] == []
     assert [words for words, text in shown.items() if max(map(len, text.splitlines())) > 80] == []
     assert "The same files give the same run." in " ".join(shown[("trials",)].split())
-    order = ["--robot", "--port", "--set", "Display", "--view", "Results", "--out", "Messages"]
+    order = ["--robot", "--port", "--set", "Display", "--view-at", "Results", "--out", "Messages"]
     places = [shown[("run",)].index(word) for word in order]
     assert places == sorted(places)
 
