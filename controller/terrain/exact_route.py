@@ -172,4 +172,4 @@ def _tree(nodes_m: Floats, edges: _Edges, graph: SafeGraph, target: int) -> tupl
 def _distinct(points: Floats) -> Floats:
     """Return the points without those that repeat the one before."""
     apart = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-9])
-    return points[apart]
+    return np.asarray(points[apart])

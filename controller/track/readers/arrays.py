@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ def save_track(path: Path, track: Track) -> None:
     verdict = [FrameStatus.MISSING] * len(points)
     for k, status in zip(number, track.status or [FrameStatus.GOOD] * len(number), strict=True):
         verdict[k] = status
+    more: dict[str, Any] = {"notes": np.array(track.notes)} if track.notes else {}
     np.savez_compressed(
         path,
         points=points,
@@ -54,7 +56,7 @@ def save_track(path: Path, track: Track) -> None:
         licence=track.licence,
         rate_assumed=track.rate_assumed,
         verdict=np.array([str(one) for one in verdict]),
-        **({"notes": np.array(track.notes)} if track.notes else {}),
+        **more,
         places_recorded=track.places_recorded,
         head_sure=np.nan if track.head_sure is None else track.head_sure,
     )
