@@ -19,11 +19,11 @@ _BEYOND = 2.5  # widths beyond the end that is known, at most
 _ACROSS = 0.9  # widths on each side that are summed
 _RIM = 0.7  # widths: what lies further to the side is ground
 _AHEAD = 0.5  # widths over which the direction at the end is taken
-_BLUNT = 0.5  # of the usual width at the end that is known: a wider end is not pointed
+_BLUNT = 0.18  # of the usual width at the end that is known: a wider end is not pointed
 _LONGEST = 0.6  # widths: a longer extension is a trail
 _SLOWER = 1.0  # times as long as the taper before the end lets it expect
 _GROUND = 1.2  # widths beyond the end: from there on is ground
-_SLOW_PX = 1.45  # between both shares: a blunt end's profile falls faster
+_SLOW_PX = 1.7  # between both shares: a blunt end's profile falls faster
 _WORTH = 0.15  # widths: less than that is left to the end that is known
 _USUAL = (0.3, 0.6)  # of the length: where the width is the usual one
 
