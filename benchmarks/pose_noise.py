@@ -60,8 +60,9 @@ def filtered(record: RunRecord, seed: int) -> tuple[Floats, Floats]:
     estimate = ExternalPose(header.robot, config, Feed(tracker), reckoning)
     rows = np.clip(np.searchsorted(cycle.time_s, pose.time_s), 0, len(cycle.time_s) - 1)
     delay_s = TRACKER.delay_s
-    for k in range(round(delay_s / record.period_s) + 1):  # it stands before torque is on
-        time_s = float(pose.time_s[0]) - delay_s + k * record.period_s
+    before = round(delay_s / record.period_s) + 3
+    for k in range(before, -1, -1):  # it stands before torque is on
+        time_s = float(pose.time_s[0]) - k * record.period_s
         tracker.measure(BodyPose(time_s, pose.head_m[0], pose.rotation[0]), cycle.measured_rad[0])
     head_m, rotation = np.empty_like(pose.head_m), np.empty_like(pose.rotation)
     for k, row in enumerate(rows):

@@ -35,9 +35,6 @@ class LoadEstimate(Protocol):
 class CheckingLink(Protocol):
     """A link that compares the servos with the values written to them, once a cycle."""
 
-    checks_in_read: bool
-    """Whether ``read`` makes the check; False for a caller of ``check_servos``."""
-
     def check_servos(self) -> None:
         """Make the check of this cycle, once its goals are sent.
 

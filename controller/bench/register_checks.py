@@ -101,8 +101,6 @@ class _Checks:
 
     def all(self) -> list[Finding | None]:
         """Findings in the order of their weight; None where all is well."""
-        full = self._full
-        shown = " or ".join(map(str, dict.fromkeys(full)))
         return [
             self._pose(),
             self._exchanged(),
@@ -151,6 +149,19 @@ class _Checks:
                 "on, overloaded or overheated: Shutdown(63) is masked",
                 verb="stay",
             ),
+            *self._pwm(),
+            *self._limits(),
+            self._unusual("operating mode", ("Operating Mode",)),
+            self._unusual("gains", _GAINS),
+            self._unusual("profile", _PROFILE),
+            *self._watchdog(),
+        ]
+
+    def _pwm(self) -> list[Finding | None]:
+        """Limits and goals of the PWM that make a servo weak."""
+        full = self._full
+        shown = " or ".join(map(str, dict.fromkeys(full)))
+        return [
             self._bad(
                 "PWM limit",
                 "fail",
@@ -177,11 +188,6 @@ class _Checks:
                 ),
                 "a Goal PWM(100) below its limit: weak or without power",
             ),
-            *self._limits(),
-            self._unusual("operating mode", ("Operating Mode",)),
-            self._unusual("gains", _GAINS),
-            self._unusual("profile", _PROFILE),
-            *self._watchdog(),
         ]
 
     def _limits(self) -> list[Finding | None]:

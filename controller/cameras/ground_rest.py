@@ -25,7 +25,7 @@ def heights_of(ground: HeightField | None) -> Heights | None:
         return None
 
     def heights(places_m: Floats) -> Floats:
-        known = np.isfinite(places_m).all(axis=-1)
+        known = np.asarray(np.isfinite(places_m).all(axis=-1))
         at = np.where(known[..., None], places_m, 0.0)
         return np.where(known, ground.elevation_m(at[..., 0], at[..., 1]), np.nan)
 

@@ -86,6 +86,8 @@ class CaptureFacts:
     head_by: str
     head_sure: float
     frames_with_unsure_head: int
+    frames_missing: int
+    """Images whose number is missing in their folder; the times of the others keep the gaps."""
     places_recorded: bool
     """False where the images were cropped to the animal: they contain no travel."""
     frames_rejected: int
@@ -209,7 +211,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             on_progress=bar.advance,
         )
         time_s, rate_hz = captured.time_s, captured.rate_hz
-        if options.rate_hz is None:
+        if options.rate_hz is None or footage.missing:
             time_s, rate_hz = frame_times(stated_s, footage.rate_hz)
         captured = replace(
             captured, points_px=region.moved(captured.points_px), time_s=time_s, rate_hz=rate_hz
@@ -227,6 +229,12 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             save_capture(part, held)
         _write_pictures(options, footage, region, detector, held, bar, scale, in_colour)
     facts = _facts(options, footage, detector, captured, m_per_px)
+    if footage.missing:
+        LOGGER.warning(
+            "%s: %d image numbers are missing; the times of the other frames keep the gaps",
+            options.recording,
+            footage.missing,
+        )
     if facts.warning is not None:
         LOGGER.warning(facts.warning)
     return facts
@@ -364,6 +372,7 @@ def _facts(
         head_by=captured.head_by,
         head_sure=round(captured.head_sure, 3),
         frames_with_unsure_head=_unsure_heads(captured),
+        frames_missing=footage.missing,
         places_recorded=captured.places_recorded,
         frames_rejected=sum(one in REJECTED for one in captured.status),
         warning=_warning(options, captured),

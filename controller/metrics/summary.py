@@ -88,6 +88,7 @@ class RunSummary:
     paths_replanned: int
     """How often the path was replanned."""
     travelled_m: float | None
+    """Length of the track of the centre of mass, on a way to waypoints while the shape moves."""
     path_error_mean_m: float | None
     path_error_max_m: float | None
     speed_m_s: float | None
@@ -256,7 +257,7 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         duration_s=_digits(record.duration_s),
         path_length_m=_digits(length_m(header.plan.path_m)),
         paths_replanned=len(record.paths) - 1,
-        travelled_m=_digits(travelled_m(pose)),
+        travelled_m=_digits(_distance_m(record, moved)),
         path_error_mean_m=_digits(_mean(off_path)),
         path_error_max_m=_digits(_peak(off_path)),
         speed_m_s=_digits(moved.speed_m_s),
@@ -312,6 +313,12 @@ def _evidence(header: Header) -> dict[str, Any]:
         "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
         "assumptions": _assumptions(header),
     }
+
+
+def _distance_m(record: RunRecord, moved: Travel) -> float:
+    """Return the distance travelled; the start into the first shape is not part of a walk."""
+    walks = len(record.header.plan.waypoints_m) > 0 and np.isfinite(moved.distance_m)
+    return moved.distance_m if walks else travelled_m(record.pose)
 
 
 def _assumptions(header: Header) -> dict[str, dict[str, object]]:

@@ -42,6 +42,10 @@ class MotorEnergy(NamedTuple):
     """Net work at the shafts."""
 
 
+POSE_CHECK: Final = "pose check"
+"""Backend of a log that contains only the poses of a source, before torque."""
+
+
 @dataclass(frozen=True, slots=True)
 class Winding:
     """Constants of a motor that give electrical power from current and speed."""

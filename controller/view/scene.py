@@ -15,7 +15,8 @@ from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.kinematics.legs import leg_segments_m
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.controller.pose.sample import quaternion_of
+from snakewalk.controller.runlog.record import POSE_CHECK, Header, RunRecord
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.solids import Solid, solids
 
@@ -66,6 +67,7 @@ class BodyScene:
         self._reached = -1
         self._waypoints_m: Floats = np.zeros((0, 2))
         self._waypoints: list[viser.IcosphereHandle] = []
+        self._axes = self._draw_axes() if header.backend == POSE_CHECK else None
         self._scene.set_up_direction("+z")
         self._draw_ground()
         self._draw_water()
@@ -81,6 +83,15 @@ class BodyScene:
         self._legs = self._leg_links() if self._robot.limbs else None
         self._joint_of = np.minimum(np.arange(links), links - 2)
 
+    def _draw_axes(self) -> viser.FrameHandle:
+        """Draw the axes of the ground, and return those of the head: x red, y green, z blue."""
+        length_m = 0.3 * self._robot.length_m
+        for name in ("ground", "head"):
+            axes = self._scene.add_frame(
+                f"{self._root}/axes_{name}", axes_length=length_m, axes_radius=0.02 * length_m
+            )
+        return axes
+
     def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
         """Draw the body at a row of the cycles and of the poses."""
         where, rows = record.pose, record.cycle
@@ -90,6 +101,9 @@ class BodyScene:
             return
         measured = body_in_world(self._robot, head, np.nan_to_num(rows.measured_rad[cycle, :spine]))
         _place(self._body, measured)
+        if self._axes is not None:
+            self._axes.position = tuple(head.head_in_world_m)
+            self._axes.wxyz = quaternion_of(head.rotation)
         load = np.nan_to_num(np.abs(rows.current_a[cycle, :spine])) / self._limit_a
         share = np.clip(load, 0.0, 1.0)[self._joint_of, None]
         shown = self._colors + share * (np.array(_HOT) - self._colors)

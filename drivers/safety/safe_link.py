@@ -85,7 +85,7 @@ class SafeLink:
         self._check_servos: Callable[[], None] = lambda: None
         if isinstance(link, CheckingLink):
             # after the goals, so that the time from a state to its goals is the same in all cycles
-            link.checks_in_read, self._check_servos = False, link.check_servos
+            self._check_servos = link.check_servos
         self._recovery = recovery
         self._limits = limits
         self._limits_at_start = replace(limits, voltage_time_s=0.0)

@@ -23,7 +23,7 @@ def test_no_pattern_becomes_more_frequent(kind: str) -> None:
     assert not more, f"list them: python -m tests.prose {kind}"
 
 
-@pytest.mark.parametrize("kind", ["help", "messages"])
+@pytest.mark.parametrize("kind", ["help", "messages", "pages"])
 def test_few_sentences_are_long(kind: str) -> None:
     counts = count(kind)
     assert counts[LONG] < LONG_SHARE * counts["sentences"]

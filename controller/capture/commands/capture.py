@@ -17,7 +17,7 @@ from snakewalk.controller.console.options import Force, Json, show
 Footage = Annotated[
     Path,
     typer.Argument(
-        help="a video or a folder of images; with --corrections, an earlier track",
+        help="a video, a TIFF stack or a folder of images; with --corrections, an earlier track",
         metavar="VIDEO|FOLDER|TRACK.npz",
     ),
 ]

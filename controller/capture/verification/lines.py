@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -35,7 +35,7 @@ def possible_form(body: Skeleton) -> bool:
     return bool((np.abs(loops[:, 1] - loops[:, 0]) * chord >= _SMALL_LOOP * wide).all())
 
 
-def crossings(points: Floats) -> Floats:
+def crossings(points: Floats) -> Ints:
     """(K, 2) numbers of the chords of a line (P, 2) that cross each other."""
     step = np.diff(points, axis=0)
     first = points[:-1]
@@ -47,4 +47,4 @@ def crossings(points: Floats) -> Floats:
     number = np.arange(len(step))
     far = number[None] - number[:, None] > 1
     hit = far & (one > 0.0) & (one < 1.0) & (other > 0.0) & (other < 1.0)
-    return np.argwhere(hit)
+    return np.asarray(np.argwhere(hit), dtype=np.int64)

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.verification.frame_store import CutOut
@@ -81,7 +83,7 @@ def _own(places: Floats, line: Floats, half: Floats) -> Floats:
     return np.asarray((near & other[:, None]).any(axis=-1))
 
 
-def _rings(image: Floats, line: Floats, half: Floats, outward: Floats) -> Floats:
+def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floats) -> Floats:
     """(rings, angles, C) ground minus picture beyond the first point of a line."""
     wide = 2.0 * float(half[_AT_TIP].mean())
     low, high = _RING_FROM[0] * wide + _RING_FROM[1], _RING_TO[0] * wide + _RING_TO[1]
@@ -92,20 +94,21 @@ def _rings(image: Floats, line: Floats, half: Floats, outward: Floats) -> Floats
     seen = _seen(image, places)
     square = ((places[:, :, None] - line[_AT_TIP.stop :][None, None]) ** 2).sum(axis=-1)
     seen[(square < (half[_AT_TIP.stop :] + _OWN_PX) ** 2).any(axis=-1)] = np.nan
-    known = np.isfinite(seen).all(axis=-1)
+    known = np.asarray(np.isfinite(seen).all(axis=-1))
     out = np.full(seen.shape, np.nan)
     for k, ring in enumerate(seen):
         if known[k].sum() > len(_FAN) // 2:
-            smooth = cv2.blur(np.where(known[k][:, None], ring, np.nanmedian(ring, axis=0)), (1, 3))
-            out[k] = np.nanmedian(ring, axis=0) - smooth.reshape(ring.shape)
+            usual = np.nanmedian(ring, axis=0)
+            whole = np.where(known[k][:, None], ring, usual)
+            out[k] = usual - uniform_filter1d(whole, 3, axis=0, mode="nearest")
     return out
 
 
-def _seen(image: Floats, places: Floats) -> Floats:
+def _seen(image: NDArray[np.float32], places: Floats) -> Floats:
     """(..., C) grey values at places (A, B, 2); NaN outside the image."""
     x, y = np.moveaxis(places, -1, 0).astype(np.float32)
-    found = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    found = np.asarray(found, dtype=float).reshape(*places.shape[:-1], image.shape[2])
+    shown = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    found: Floats = np.asarray(shown, dtype=np.float64).reshape(*places.shape[:-1], image.shape[2])
     rows, columns = image.shape[:2]
     outside = (x < 0) | (y < 0) | (x > columns - 1) | (y > rows - 1)
     found[outside] = np.nan

@@ -4,6 +4,7 @@ Needs pyarrow. Versions 2.0 and 2.1 have one Parquet file for each episode; vers
 episodes in one file.
 """
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -87,24 +88,23 @@ def _names(feature: Any) -> list[str] | None:
 
 def _rows(path: Path, feature: str, episode: int) -> tuple[Floats, Floats]:
     """Times (T,) and values (T, K) of an episode."""
-    import pyarrow.parquet  # noqa: PLC0415  an extra
-
+    parquet, arrow_fault = import_module("pyarrow.parquet"), import_module("pyarrow").ArrowException
     files = sorted((path / "data").glob(f"*/episode_{episode:06d}.parquet"))
     files = files or sorted((path / "data").glob("*/file-*.parquet"))
     times, rows = [], []
     for file in files:
         try:
-            about = pyarrow.parquet.read_metadata(file)
+            about = parquet.read_metadata(file)
             if about.num_rows > MOST_CELLS:
                 raise InputError(f"{file}: {about.num_rows} rows; at most {MOST_CELLS} are read")
-            table = pyarrow.parquet.read_table(
+            table = parquet.read_table(
                 file,
                 columns=["timestamp", feature],
                 filters=[("episode_index", "=", episode)],
             )
             times += table["timestamp"].to_pylist()
             rows += table[feature].to_pylist()
-        except (pyarrow.ArrowException, KeyError, OSError) as error:
+        except (arrow_fault, KeyError, OSError) as error:
             reason = (str(error).splitlines() or [type(error).__name__])[0]
             raise InputError(f"{file}: is not a Parquet file of LeRobot: {reason}") from None
     if not rows:

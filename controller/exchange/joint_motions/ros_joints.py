@@ -1,6 +1,7 @@
 """Joint angles of a ROS 2 bag or an MCAP: JointState or JointTrajectory messages. Needs rosbags."""
 
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,12 +34,10 @@ class RosJoints:
     def read(self, path: Path, request: JointRequest) -> JointMotion:
         """Read the messages of one topic; see ``JointReader.read``."""
         require_extra(f"{path}: ROS 2 bags need", "rosbags")
-        from rosbags.highlevel import AnyReader  # noqa: PLC0415  an extra
-        from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  an extra
-
-        store = get_typestore(Stores.ROS2_JAZZY)
+        bags, types = (import_module(f"rosbags.{part}") for part in ("highlevel", "typesys"))
+        store = types.get_typestore(types.Stores.ROS2_JAZZY)
         try:
-            with AnyReader([path], default_typestore=store) as bag:
+            with bags.AnyReader([path], default_typestore=store) as bag:
                 topic, kind = _topic(path, bag, request)
                 using = [each for each in bag.connections if each.topic == topic]
                 messages = (

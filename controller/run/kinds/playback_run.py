@@ -10,7 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.playback import PlaybackConfig
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.run.joint_file import foreign_joints
+from snakewalk.controller.run.kinds.joint_file import foreign_joints
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent

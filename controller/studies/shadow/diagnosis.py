@@ -1,10 +1,10 @@
-"""Which cause explains how a robot's joints differ from those of its shadow.
+"""Cause that explains the differences between a robot's joints and those of its shadow.
 
-For each possible fault (the ground's friction, a load on a link, a weaker servo, a slipped horn)
-the simulator computes the change of angles and currents of all joints. A robot that is well differs
-in all of them a little, as no servo is its data sheet; a cause differs much, alone. The causes are
-compared by their evidence, the small differences of all else integrated out (Bayesian model
-comparison: MacKay, "Information Theory, Inference, and Learning Algorithms", ch. 28).
+For each possible fault (friction of the ground, a load on a link, a weaker servo, a slipped horn)
+the simulator computes the change of angles and currents of all joints. A sound robot differs a
+little in all of them, because no servo equals its data sheet; a fault differs much in one. The
+causes are compared by their evidence, with the small differences of all others integrated out
+(MacKay, "Information Theory, Inference, and Learning Algorithms", ch. 28).
 """
 
 import math
@@ -31,8 +31,7 @@ Cause = Literal["friction", "load", "weaker servo", "slipped horn"]
 NAMED_FROM: Final = 3.0
 """Log of the evidence over that of a healthy robot from which on a cause is named (ours)."""
 _BIN_S: Final = 0.1
-"""Angles and currents are averaged over this: their steps average out, and the noise of a bin is
-nearly that of its own (ours)."""
+"""Angles and currents are averaged over this, so that their steps average out (ours)."""
 _CURRENT_STEP_A: Final = 2.69e-3
 _ANGLE_STEP_RAD: Final = 1.5e-3
 """Units of the two: a step of the registers of most models."""

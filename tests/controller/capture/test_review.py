@@ -220,6 +220,9 @@ def test_a_person_flips_drops_drags_and_saves(
         page.keyboard.press("]")
         page.keyboard.press("x")
         page.get_by_text("1 flipped, 3 left out, 1 redrawn, not saved").wait_for()
+        page.get_by_role("button", name="in the whole film").click()
+        page.get_by_text("14 flipped, 3 left out, 1 redrawn, not saved").wait_for()
+        page.keyboard.press("Control+z")
         page.keyboard.press("Control+z")
         page.get_by_text("1 flipped, 1 left out, 1 redrawn, not saved").wait_for()
         with page.expect_download() as waiting:

@@ -77,7 +77,7 @@ def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> N
     metrics = metric_errors(truth, first.record, first.summary)
     assert metrics is not None
     assert metrics.distance_m == first.summary.travelled_m
-    assert metrics.true_distance_m == pytest.approx(found.travelled_m, abs=0.02)
+    assert metrics.true_distance_m == pytest.approx(found.travelled_m, abs=0.1)
     assert metrics.distance_m == pytest.approx(metrics.true_distance_m, abs=0.1)
     assert metrics.eta == pytest.approx(metrics.true_eta, rel=0.2)
     assert metrics.alarms == metrics.true_alarms == 0

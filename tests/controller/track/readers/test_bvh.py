@@ -43,7 +43,9 @@ def test_a_skeleton_gives_back_its_wave(jaw: bool, tmp_path: Path) -> None:
     assert track.rate_hz == pytest.approx(RATE_HZ)
     assert np.abs(track.angles_rad - wave_angles())[:, 5:-5].max() < 0.06
     assert track.points[-1, 0, 0] == pytest.approx(0.1 * (FRAMES - 1) / 100.0, rel=1e-2)
-    left_out = "2 joints beside the longest chain are left out: jaw, jaw_end; --keypoints uses them"
+    left_out = (
+        "2 joints outside the longest chain are left out: jaw, jaw_end; --keypoints uses them"
+    )
     assert (left_out in track.notes) is jaw
     assert "head is taken as the head; --keypoints gives another order" in track.notes
 
