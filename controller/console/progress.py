@@ -165,5 +165,9 @@ def show_progress(
     with ProgressBar(description, total, transient=transient) as bar:
         bar.update(done)
         for number, item in enumerate(items, start=done + 1):
-            yield item
+            try:
+                yield item
+            except GeneratorExit:  # the caller failed, and reports it
+                bar.hide()
+                raise
             bar.update(number)

@@ -54,3 +54,11 @@ def _run(cycles: int, error: OSError | None) -> None:
             bar.on_progress(Progress(0.02 * cycle, 0.1, 0, 0.2, cycle == cycles - 1, waypoints=1))
         if error is not None:
             raise error
+
+
+def test_a_caller_that_rejects_an_item_leaves_no_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with suppress(ValueError):
+        for number in show_progress([1, 2], "recordings", 2):
+            if number == 2:
+                raise ValueError("no such recording")
+    assert capsys.readouterr().err == ""
