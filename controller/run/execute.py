@@ -27,6 +27,7 @@ from snakewalk.controller.run.backend import (
     simulated,
     split,
 )
+from snakewalk.controller.run.external.second_body import second_body, use_worker
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.run.observer_watch import ObserverWatch, Watcher
 from snakewalk.controller.run.pose_provider import (
@@ -36,7 +37,6 @@ from snakewalk.controller.run.pose_provider import (
     pose_provider,
 )
 from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
-from snakewalk.controller.run.second_body import second_body, use_worker
 from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.run.watchers import SHADOW
 from snakewalk.controller.runlog.reader import read_log

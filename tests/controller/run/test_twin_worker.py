@@ -10,16 +10,16 @@ import pytest
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.run.factory import prepare_job
-from snakewalk.controller.run.kinds.walk_run import WalkRun
-from snakewalk.controller.run.second_body import use_worker
-from snakewalk.controller.run.twin_worker import (
+from snakewalk.controller.run.external.second_body import use_worker
+from snakewalk.controller.run.external.twin_worker import (
     LARGEST_BYTES,
     PIECE_S,
     ProcessTwin,
     RehearsedTwin,
     TwinTrial,
 )
+from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.walk.pilot import Pilot
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.twin_answers import Coasting, TwinAnswer, TwinAsker, TwinQuestion

@@ -9,9 +9,9 @@ from typing import cast
 from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import Backend
+from snakewalk.controller.run.external.twin_worker import ProcessTwin, RehearsedTwin, TwinTrial
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.twin_worker import ProcessTwin, RehearsedTwin, TwinTrial
 from snakewalk.controller.runtime.friction_monitor import (
     FrictionMonitor,
     OnPaper,
