@@ -204,7 +204,7 @@ def real(minutes: float) -> list[Window]:
             raise SystemExit("soak: the chain could not be enabled again in 20 tries")
 
         with link:
-            link.enable()
+            mend()  # a busy machine may serve the first reads too late
             return soak(link, port.clock, 60.0 * minutes, mend, process)
 
 

@@ -1,4 +1,4 @@
-"""What the robot, the ground, the motion and the run *are*.
+"""Descriptions of robot, ground, motion and run.
 
 Schemas (pydantic, unknown keys refused), one strict loader that reports every fault of a file at
 once, the height-field type, and the shipped TOML files and recordings. Data flows out of here and

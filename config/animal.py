@@ -1,4 +1,4 @@
-"""What an animal is: its skin, and of one with legs these and one cycle of its gait ([KP] 4)."""
+"""Description of an animal: its skin, and with legs also one cycle of its gait ([KP] 4)."""
 
 from typing import Annotated, Literal, Self
 
@@ -113,7 +113,9 @@ class AnimalConfig(Strict):
 
     name: str
     source: str = Field(description="where the figures come from")
-    skin: str = Field(description="of the body: a shipped skin, or a .toml beside this file")
+    skin: str = Field(
+        description="skin of the body: a shipped skin, or a .toml in the folder of this file"
+    )
     length_m: float = Field(gt=0.0, le=20.0, description="from the head's tip to the tail's")
     height: float = Field(gt=0.0, le=1.5, description="of the body's axis, over its length")
     stride: float = Field(gt=0.0, le=3.0, description="way of a cycle, body lengths")
@@ -139,5 +141,5 @@ class AnimalConfig(Strict):
 
     @property
     def speed_m_s(self) -> float:
-        """Of the prototype."""
+        """Speed of the prototype."""
         return self.stride * self.length_m / self.cycle_s

@@ -1,8 +1,8 @@
 """Files that come from outside: how much of them is read, and how far they may expand.
 
-A few kilobytes of zeros, well packed, fill the memory of a robot's computer. What a file says it
-expands to is compared with its size before anything is unpacked, and no more than that is unpacked.
-A device has no end: of what is text no more is read than such a text can be long.
+A few kilobytes of zeros, well packed, fill the memory of a robot's computer. The size that a file
+states is compared with its own size before it is unpacked, and no more than that is unpacked. A
+device has no end, so text is read up to a limit.
 """
 
 import json
@@ -27,11 +27,11 @@ MOST_BYTES: Final = 1_000_000_000
 """Above ``FREE_BYTES``: unpacked over packed, and unpacked, at most (ours)."""
 MOST_TEXT_RATIO: Final = 20
 MOST_TEXT_BYTES: Final = 500_000_000
-"""The same of JSON (ours): it takes several times its size in memory."""
+"""The same limit for JSON (ours): parsing needs several times its size in memory."""
 MOST_JSON_BYTES: Final = 64_000_000
-"""Of a JSON that is read at once (ours)."""
+"""Limit of a JSON file that is read at once (ours)."""
 MOST_STORAGE_BYTES: Final = 1_000_000
-"""Of a calibration (ours)."""
+"""Limit of a calibration file (ours)."""
 _MOST_NESTED, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
 _NESTING: Final = re.compile(r"[\[\]{}]|<\w|</|/>")
 _ENDS: Final = ("]", "}", "</", "/>")
@@ -46,7 +46,7 @@ DAMAGE: Final = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What reading a damaged archive raises, besides ``OSError``."""
+"""Exceptions, besides ``OSError``, that reading a damaged archive raises."""
 
 
 def why_no_file(path: Path, missing: str = "no such file") -> str:
@@ -54,7 +54,7 @@ def why_no_file(path: Path, missing: str = "no such file") -> str:
     if path.is_dir():
         return f"{path}: is a folder"
     if path.exists():
-        return f"{path}: is no file but a pipe or a device: put what it gives into a file"
+        return f"{path}: is a pipe or a device; copy its contents into a file"
     return f"{path}: {missing}"
 
 
@@ -74,7 +74,7 @@ def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
 
 
 def read_text(file: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
-    """Text in UTF-8 of a file, up to a size; an editor's byte order mark is no content.
+    """Text of a UTF-8 file, up to a size, without an editor's byte order mark.
 
     Raises:
         InputError: it is larger.
@@ -89,7 +89,7 @@ def parse_json(text: str | bytes) -> Any:
     """Value of a JSON text.
 
     Raises:
-        ValueError: it is none, or is nested too deeply to be one of ours.
+        ValueError: it is not JSON, or is nested too deeply.
 
     """
     try:
@@ -101,7 +101,7 @@ def parse_json(text: str | bytes) -> Any:
 def check_matrices(file: Path) -> None:
     """Check a file of OpenCV's FileStorage before OpenCV reads it.
 
-    OpenCV takes the memory that a matrix says it needs, and deep nesting ends the process.
+    OpenCV allocates the memory that a matrix states, and deep nesting ends the process.
 
     Raises:
         InputError: it is too large, holds too many or too large matrices, or is nested too deeply.
@@ -114,7 +114,10 @@ def check_matrices(file: Path) -> None:
         depth += -1 if mark in _ENDS else 1
         deepest = max(deepest, depth)
     if deepest > _MOST_NESTED:
-        raise InputError(f"{file}: is no file of a calibration: nested {deepest} deep")
+        raise InputError(
+            f"{file}: is not a calibration file: its values are nested {deepest} "
+            "deep; choose another file"
+        )
     matrices = [
         [int(side[:9]) for side in said.replace(",", " ").split()] for said in _SIDES.findall(text)
     ]
@@ -122,8 +125,8 @@ def check_matrices(file: Path) -> None:
         len(sides) > 2 or max(sides, default=0) > _MOST_SIDE for sides in matrices
     ):
         raise InputError(
-            f"{file}: is no file of a calibration: its matrices have {_MOST_SIDE} rows and columns "
-            "at most"
+            f"{file}: is not a calibration file: its matrices have more than {_MOST_SIDE} rows "
+            "or columns; choose another file"
         )
 
 

@@ -5,6 +5,8 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
+from snakewalk.config.pose import Metres3
+from snakewalk.config.tags import FixedTag
 
 PoseName = Annotated[str, Field(min_length=1, max_length=500)]
 """A pose source, with an argument after a colon where the source accepts one."""
@@ -12,7 +14,7 @@ Place = tuple[float, float]
 
 
 class CameraConfig(Strict):
-    """A camera that looks down on a level floor (docs/overhead-camera.md)."""
+    """A camera above known ground, or one that sees tags (docs/overhead-camera.md)."""
 
     width_px: int = Field(640, ge=64, le=4096)
     height_px: int = Field(480, ge=64, le=4096)
@@ -43,18 +45,32 @@ class CameraConfig(Strict):
     marker_side_m: float = Field(
         0.15, gt=0.005, le=2.0, description="side of a printed marker, without its white margin"
     )
+    place_m: Metres3 | None = Field(
+        None, description="of the lens in the world, for `--pose tags`; with aim_m"
+    )
+    aim_m: Metres3 | None = Field(
+        None, description="place in the world that the middle of the picture shows"
+    )
+    roll_deg: float = Field(
+        0.0, ge=-360.0, le=360.0, description="turn of the picture about the line of sight"
+    )
+    fixed_tags: tuple[FixedTag, ...] = Field(
+        (),
+        description="tags at known places, by which a camera for `--pose tags` finds its own "
+        "place; in place of place_m",
+    )
     lens: str | None = Field(
         None,
         description="file of `snakewalk camera calibrate`: the distortion of a real camera is "
         "undone; default: none",
     )
     shade: float = Field(
-        0.5, ge=0.0, le=0.9, description="part of the floor's light that a shadow may take away"
+        0.5, ge=0.0, le=0.9, description="largest share of the floor's light that a shadow removes"
     )
     learn_s: float = Field(
         60.0, ge=0.0, le=86_400.0,
-        description="time constant with which the floor beside the body is learnt, so that what "
-        "stays there becomes floor; 0: it stays as it was pictured",
+        description="time constant for learning the floor around the body, so that objects "
+                    "that stay there become floor; 0: the floor stays as in its picture",
     )  # fmt: skip
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"
@@ -75,6 +91,14 @@ class CameraConfig(Strict):
         return self
 
     @model_validator(mode="after")
+    def _place_and_aim(self) -> Self:
+        if (self.place_m is None) != (self.aim_m is None):
+            raise ValueError("place_m and aim_m are given together")
+        if self.place_m is not None and self.place_m == self.aim_m:
+            raise ValueError("aim_m must not be the place of the lens")
+        return self
+
+    @model_validator(mode="after")
     def _markers_fix_a_floor(self) -> Self:
         if self.markers_m is None:
             return self
@@ -89,7 +113,7 @@ class CameraConfig(Strict):
 
     @property
     def marker_places_m(self) -> dict[int, Place]:
-        """``markers_m`` by number; empty where there are none."""
+        """``markers_m`` by number; empty without markers."""
         return {int(name): place for name, place in (self.markers_m or {}).items()}
 
 

@@ -1,4 +1,4 @@
-"""How the goals of joints yield to the load that the measured current tells."""
+"""Lets the goals of joints yield to the load that the measured current indicates."""
 
 from typing import Literal
 

@@ -83,9 +83,9 @@ mine/run.toml` runs them as they are.
 **In an editor.** `snakewalk schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
 `skin`, `animal`, `schedule`, `faults`, `servo`, `policy`) prints the JSON Schema of such a file.
 `init` writes those of its three files into `mine/schema/` and names them in each file's first line,
-`#:schema schema/run.json`: that is all that the extension *Even Better TOML* of VS Code needs,
-and `taplo check run.toml` on a command line, to complete keys, show their meaning and mark what
-is wrong. For files elsewhere a `.taplo.toml` says it:
+`#:schema schema/run.json`. With it the extension *Even Better TOML* of VS Code completes keys,
+shows their meaning and marks errors, and so does `taplo check run.toml` on a command line.
+For files elsewhere write a `.taplo.toml`:
 
 ```
 [[rule]]
@@ -93,7 +93,7 @@ include = ["robots/*.toml"]
 schema.path = "schema/robot.json"
 ```
 
-What holds between keys (a walk needs waypoints, IDs differ) only `snakewalk plan` tells.
+`snakewalk plan` checks rules that involve several keys (a walk needs waypoints, IDs differ).
 
 Units are in the names: `_m`, `_rad`, `_s`, `_a` (ampere), `_v`, `_c` (Celsius), `_kg`, `_n_m`.
 This page is written from the schema by `python -m snakewalk.config.document`; a test keeps it true.
@@ -232,7 +232,7 @@ def _kind(annotation: Any) -> str:
 
 
 def value_kind(field: FieldInfo) -> str:
-    """What a key takes, in words, with its bounds."""
+    """Kind of value that a key accepts, in words, with its bounds."""
     return f"{_kind(field.annotation)}{_bounds(field)}"
 
 

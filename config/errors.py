@@ -1,8 +1,8 @@
 """Faults of input, reported all at once.
 
-``ConfigError`` carries one line per fault, each saying where, what, and what would be right.
-The command line prints the lines and ends with exit code 2. ``Assumptions`` holds the answers to
-questions about a file.
+``ConfigError`` carries one line per fault, with its place, the fault and the remedy. The command
+line prints the lines and ends with exit code 2. ``Assumptions`` holds the answers to questions
+about a file.
 """
 
 import math
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 
 class InputError(Exception):
-    """What a user gave cannot be used; ``faults`` holds one line each."""
+    """A user's input cannot be used; ``faults`` holds one line each."""
 
     def __init__(self, faults: str | Sequence[str]) -> None:
         self.faults: tuple[str, ...] = (faults,) if isinstance(faults, str) else tuple(faults)
@@ -22,7 +22,7 @@ class ConfigError(InputError):
 
 
 class Assumptions:
-    """Values that a user gives for what a foreign file does not state: ``--assume KEY=VALUE``.
+    """Values that a user gives if a foreign file does not state them: ``--assume KEY=VALUE``.
 
     A reader asks for a value with ``number``. If it is not given, the question is an ``InputError``
     that names the option and the likely value. Values that are used are listed in ``lines``, which
@@ -50,7 +50,7 @@ class Assumptions:
         """Value of a key as a number between two limits; None if it is not given.
 
         Raises:
-            InputError: the value is no number, or is beyond the limits.
+            InputError: the value is not a number, or is beyond the limits.
 
         """
         text = self._values.get(key)

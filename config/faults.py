@@ -1,4 +1,4 @@
-"""Schema of a fault file: what goes wrong on a simulated bus, and when.
+"""Schema of a fault file: faults of a simulated bus, and their times.
 
 A file has a ``seed`` and any number of ``[[fault]]`` tables. Every fault has a ``kind``, begins
 ``at_s`` seconds after the start, and most last ``for_s`` seconds (to the end, if not given).
@@ -54,7 +54,7 @@ class ServoFault(_Lasting):
 
 
 class ClashFault(_Lasting):
-    """One servo takes the ID of another, which keeps it or gets that of the first."""
+    """One servo changes to the ID of another, which keeps it or gets that of the first."""
 
     kind: Literal["clash", "exchange"]
     id: ServoId
@@ -119,7 +119,7 @@ class UnplugFault(_Lasting):
 
 
 class StallFault(_Fault):
-    """The host does not run for a while: what it was going to send goes out later."""
+    """The host does not run for a while; its packets go out later."""
 
     kind: Literal["stall"]
     for_s: float = Field(gt=0.0)

@@ -58,7 +58,7 @@ def build_ground(world: WorldConfig) -> HeightField | None:
 
 
 def water_surface_m(world: WorldConfig, ground: HeightField | None) -> tuple[Floats, Floats] | None:
-    """Middle (3,) and size (2,) of the water's surface; None where there is none.
+    """Middle (3,) and size (2,) of the surface of the water; None if it is dry.
 
     A shore's reaches to the waterline.
     """
@@ -108,7 +108,8 @@ def _random(ground: RandomGround) -> Floats:
     width = ground.correlation_m / 2.0 / ground.spacing_m
     z = gaussian_filter(noise, width, mode="wrap", truncate=5.0)
     along_x, along_y = np.diff(z, axis=1), np.diff(z, axis=0)
-    # Of a cell's two triangles one has the gradient of its lower and right edge, the other that of
+    # Each cell has two triangles: one has the gradient of its lower and right edge, the other that
+    # of
     # its left and upper edge.
     square = (along_x[:-1] ** 2 + along_x[1:] ** 2).mean()
     square += (along_y[:, :-1] ** 2 + along_y[:, 1:] ** 2).mean()

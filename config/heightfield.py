@@ -16,7 +16,7 @@ from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 
 MOST_SAMPLES: Final = 4_000_000
-"""Of a map (ours): planner and simulator hold several arrays of its size."""
+"""Limit of a map (ours): planner and simulator hold several arrays of its size."""
 _NUMBERS: Final = ("spacing_m", "x0_m", "y0_m")
 
 
@@ -122,7 +122,7 @@ def read_map(file: Path) -> HeightField:
     """Read a map's file.
 
     Raises:
-        InputError: it cannot be read, lacks an array, or holds what is no map.
+        InputError: it cannot be read, lacks an array, or is not a map.
 
     """
     try:

@@ -95,7 +95,9 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
             if table.get(name) is None:  # a table left out, or an unknown one: the schema says
                 table[name] = {}
             if not isinstance(table[name], dict):
-                raise ConfigError(f"{source}: {key}: {name} is no table of it")
+                raise ConfigError(
+                    f"{source}: {key}: {name} is not a table; remove the key or correct it"
+                )
             table = table[name]
         table[last] = value
     if "servo" in data:
@@ -113,8 +115,8 @@ def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
 def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     """Data of a robot with the records of the models that its file describes by files.
 
-    Each `model` that names a file, or a model of the folder `servos` beside the robot's file,
-    becomes the name of the model; its record goes into `described_models`, so that a log is
+    A `model` may name a file, or a model of the folder `servos` next to the robot's file. It is
+    replaced by the name of the model, and its record goes into `described_models`, so that a log is
     complete without the file.
 
     Raises:
@@ -142,7 +144,7 @@ def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
 
 
 def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
-    """Load a world by shipped name or path; its ground's file is looked for beside it.
+    """Load a world by shipped name or path; its ground's file is searched in the world's folder.
 
     Raises:
         ConfigError: no such file, world or ground; each fault of it.
@@ -159,7 +161,10 @@ def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
             ground = world.ground.model_copy(update={"source": str(source)})
             return world.model_copy(update={"ground": ground})
         if named.endswith(".npz") and not Path(named).is_file():
-            raise ConfigError(f"{path}: ground.source: {named}: no such file beside it, nor here")
+            raise ConfigError(
+                f"{path}: ground.source: {named}: no such file in the folder of "
+                f"{path} or in the working folder; correct the path"
+            )
     return world
 
 

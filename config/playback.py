@@ -1,6 +1,6 @@
 """How recordings (table ``playback`` of a run) and recorded actions (``repertoire``) are played."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -20,6 +20,14 @@ class PlaybackConfig(Strict):
     clip: bool = Field(
         False, description="joints are held within their limits, where the recording bends further"
     )
+    joints: dict[str, str] = Field(
+        {}, description="joint of the file for joints of the robot; rest keeps a joint at 0"
+    )
+    unit: Literal["rad", "deg"] | None = Field(
+        None, description="of joint angles, where the file does not state it"
+    )
+    topic: str | None = Field(None, description="of a ROS 2 bag that has several")
+    episode: int | None = Field(None, ge=0, description="of a LeRobot dataset")
 
 
 class ScheduleConfig(Strict):
@@ -36,7 +44,7 @@ class ScheduleConfig(Strict):
 class RepertoireConfig(ScheduleConfig):
     """Recorded actions in place of a walk ([YT])."""
 
-    file: str = Field(description="what `snakewalk repertoire record` wrote")
+    file: str = Field(description="file that `snakewalk repertoire record` wrote")
     patience: int | None = Field(
         None,
         ge=1,

@@ -95,11 +95,11 @@ class TrackerConfig(Strict):
         0.0, ge=0.0, lt=1.0, description="share of the datagrams that are lost, at random"
     )
     dropout_every_s: float = Field(
-        0.0, ge=0.0, description="mean time between dropouts; 0: there are none"
+        0.0, ge=0.0, description="mean time between dropouts; 0: no dropouts"
     )
     dropout_s: float = Field(0.3, ge=0.0, le=600.0, description="length of a dropout")
     swap_every_s: float = Field(
-        0.0, ge=0.0, description="mean time between swaps of markers; 0: there are none"
+        0.0, ge=0.0, description="mean time between swaps of markers; 0: no swaps"
     )
     swap_s: float = Field(0.2, ge=0.0, le=60.0, description="length of a swap")
     swap_m: float = Field(

@@ -1,4 +1,4 @@
-"""What a shipped recording is: figures measured on a real animal, from which it is generated."""
+"""Description of a shipped recording: figures of a real animal from which it is generated."""
 
 from pydantic import Field, model_validator
 

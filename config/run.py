@@ -1,4 +1,4 @@
-"""What a run is: robot, world, recording, waypoints, motion and safety, by name or by path."""
+"""Description of a run: robot, world, recording, waypoints, motion and safety."""
 
 from typing import Annotated, Final, Literal, Self
 
@@ -31,7 +31,7 @@ MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)
 
 
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
-"""Of a waypoint or of the start, m."""
+"""Coordinate of a waypoint or of the start, m."""
 
 
 class StatesConfig(Strict):
@@ -73,9 +73,14 @@ class WalkConfig(Strict):
 
     decision_fraction: float = Field(1.0, gt=0.05, le=1.0, description="of a state that is walked")
     proposals: int = Field(
-        120, ge=1, le=1000, description="first states in the order of W: the smoothest of them ..."
+        120,
+        ge=1,
+        le=1000,
+        description="first states in the order of W, from which the candidates come",
     )
-    candidates: int = Field(6, ge=1, le=50, description="... so many, are rolled out")
+    candidates: int = Field(
+        6, ge=1, le=50, description="number of candidates to simulate: the smoothest"
+    )
     climb_progress: float = Field(
         0.65, ge=0.0, le=1.0, description="under this predicted progress states ride on wide waves"
     )
@@ -103,8 +108,8 @@ class WalkConfig(Strict):
     )
     finds_friction: bool = Field(
         True,
-        description="rollouts and tries reckon with the friction that the motion so far tells of, "
-        "where the file's is out; false: always with the file's",
+        description="use the friction estimated during the run if the file's value is wrong; "
+        "false: always use the file's value",
     )
     pitch: PitchConfig = PitchConfig()
     fallback: bool = Field(
@@ -113,7 +118,7 @@ class WalkConfig(Strict):
 
 
 class BehaviourConfig(Strict):
-    """[PT] 2.6.6: what a user may turn."""
+    """Behaviour that a user may change ([PT] 2.6.6)."""
 
     pulse_body_lengths_s: float = Field(0.25, gt=0.0, le=3.0)
     sliding: float = Field(0.0, ge=0.0, lt=1.0, description="w_d")
@@ -203,10 +208,10 @@ class SafetyConfig(Strict):
     def following_limits_rad(self, robot: RobotConfig) -> tuple[float, ...]:
         """How far each joint may be from its goal, rad, head first.
 
-        A yaw joint may lag by the error at which its P gain gives full output, which is all that
-        an honest lag can need; twice of it is the limit, but at least ``following_limit_rad``; so
-        may a leg's joint. A pitch joint has ``following_limit_rad``: its current tells whether the
-        ground holds it off.
+        A yaw joint may lag by the error at which its P gain gives full output, which is the largest
+        lag without a fault. Twice of it is the limit, but at least ``following_limit_rad``; the
+        same holds for a leg's joint. A pitch joint has ``following_limit_rad``: its current shows
+        whether the ground holds it off.
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
         columns = robot.all_axes, robot.position_p_gains, robot.servo_records
@@ -229,7 +234,7 @@ class SafetyConfig(Strict):
 
 
 class DeviationConfig(Strict):
-    """In what a simulated robot and its ground differ from what plan and motion take them to be."""
+    """Differences of a simulated robot and its ground from the values that plan and motion use."""
 
     friction_along: float = Field(
         1.0, gt=0.0, le=10.0, description="along the body over the world's, forward and backward"
@@ -282,7 +287,7 @@ class RunConfig(Strict):
     )
     pose: PoseName | None = Field(
         None,
-        description="what measures the head; default: the simulator, on servos the robot's IMU, "
+        description="source of the head's pose; default: the simulator, on servos the robot's IMU, "
         "or the joints",
     )
     deviation: DeviationConfig = Field(
@@ -307,7 +312,7 @@ class RunConfig(Strict):
         if self.motion == "gait" and self.gait is None:
             raise ValueError("motion gait needs a table [gait] with its name")
         if self.gait is not None and self.gait.ashore is not None and not self.waypoints_m:
-            raise ValueError("gait.ashore: belongs to a gait along waypoints_m; there are none")
+            raise ValueError("gait.ashore: needs waypoints; add waypoints_m or remove ashore")
         planned = self.motion == "repertoire" and not self.repertoire
         if (planned or self.motion in WALKS) and not self.waypoints_m:
             raise ValueError("waypoints_m: at least one is needed")

@@ -50,7 +50,7 @@ def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
 
 
 def model_file(name_or_path: str, beside: Path | None = None) -> Path | None:
-    """File of a model, as ``servo_model`` finds it; None if there is none."""
+    """File of a model, as ``servo_model`` finds it; None if it does not exist."""
     folders = [] if beside is None else [beside]
     if name_or_path.endswith(".toml"):
         found = [folder / name_or_path for folder in folders] + [Path(name_or_path)]
@@ -91,7 +91,7 @@ def models_by_number(folder: Path | None = None) -> Mapping[int, str]:
 
 @cache
 def _shipped_by_number() -> Mapping[int, str]:
-    models = {name: _shipped_data(name)[0] for name in shipped_models()}  # schemas take longer
+    models = {name: _shipped_data(name)[0] for name in shipped_models()}  # schemas are slower
     numbers = {m["model_number"]: name for name, m in models.items() if m.get("protocol", 2) == 2}
     return MappingProxyType(numbers)
 

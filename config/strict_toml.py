@@ -78,11 +78,14 @@ def _plain(value: Any) -> Any:
     """
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no value of a configuration")
+    raise TypeError(
+        f"{type(value).__name__} cannot be a value of a configuration; use a "
+        "number, text, list or table"
+    )
 
 
 def _check_keys(text: str) -> None:
-    """Refuse keys of hundreds of tables, for which ``tomllib`` takes minutes.
+    """Reject keys of hundreds of tables: ``tomllib`` needs minutes for them.
 
     Raises:
         ValueError: there is one.
@@ -97,7 +100,7 @@ def _check_keys(text: str) -> None:
 
 _MOST_BYTES: Final = 4_000_000
 _MOST_TABLES: Final = 100
-"""Of a TOML file, and of a dotted key in it (ours)."""
+"""Limit of tables in a TOML file, and in a dotted key (ours)."""
 _NO_KEY: Final = re.compile(r"[^\w.\s\"'-]+")
 _PLACE: Final = re.compile(r" ?\(at line (\d+), column \d+\)")
 _TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
@@ -185,7 +188,7 @@ def _line(
         "float_type": "must be a number",
         "bool_type": "must be true or false",
         "finite_number": "must be a finite number",
-        "union_tag_invalid": f"kind {tag!r} is none of {known}",
+        "union_tag_invalid": f"kind {tag!r} is unknown; use one of {known}",
         "union_tag_not_found": "needs a key kind, which says what it is",
         "literal_error": f"must be {context.get('expected')}",
         "greater_than": f"must be over {bounds.get('gt', 0):g}",

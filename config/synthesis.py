@@ -44,7 +44,7 @@ def _some(along: Along) -> Along:
 
 
 Knots = AfterValidator(_knots)
-"""Of a ``Curve``: its times must increase."""
+"""Knots of a ``Curve``: its times must increase."""
 _Along = AfterValidator(_some)
 _Share = Annotated[Curve, Knots, _within(0.0, 1.0)]
 
@@ -96,7 +96,7 @@ class SynthesisConfig(Strict):
         description="states that the robot can make and that push; else all but self-contact",
     )
     target_spacing_m: float = Field(
-        0.6, gt=0.05, description="between targets on the path, beside the waypoints"
+        0.6, gt=0.05, description="between targets on the path, in addition to the waypoints"
     )
     length_unit_m: float = Field(0.1, gt=0.0, description="in which the four constants are")
     viscous: float = Field(1.0, gt=0.0, description="c1")
@@ -108,7 +108,7 @@ class SynthesisConfig(Strict):
         (1.0,), description="factors of w_d, head to tail"
     )
     pulse_m_s: Annotated[Curve, Knots, _within(-10.0, 10.0)] = Field(
-        0.0, description="g: pulse beside the body's speed"
+        0.0, description="g: pulse in addition to the body's speed"
     )
     pulse_along: Annotated[Along, _Along] = Field((1.0,), description="factors of g, head to tail")
     pulse_spread_m_s: float = Field(

@@ -89,7 +89,7 @@ def _kind_of(choices: list[type[BaseModel]], values: Mapping[str, Any]) -> type[
 
 
 def _rows(model: type[BaseModel], rows: Sequence[Mapping[str, Any]], where: str) -> Iterator[str]:
-    """Tables of which there may be several; one as comments where there is none."""
+    """Repeated tables; one table of comments if there are no rows."""
     for row in rows or ({},):
         yield ""
         yield f"[[{where}]]" if row else f"# [[{where}]]"
@@ -105,7 +105,7 @@ def _line(key: str, value: Any, field: FieldInfo, is_given: bool) -> str:
 
 
 def robot_toml(robot: RobotConfig, comment: str = "") -> str:
-    """Text of a robot's file: what is as by default is left out; ``comment`` stands at the head."""
+    """Text of a robot's file without values that equal the defaults; ``comment`` is at the head."""
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     lines += _plain_table(robot.model_dump(exclude_defaults=True), "")
     return "\n".join(lines) + "\n"

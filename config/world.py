@@ -1,4 +1,4 @@
-"""What the ground is: shape, friction, and how steep a path may be."""
+"""Description of the ground: shape, friction, and largest slope of a path."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -338,7 +338,7 @@ class PlannerConfig(Strict):
 ReliefGround = (
     ElevationGround | MapGround | RampGround | RandomGround | StepsGround | GapsGround | ShoreGround
 )
-"""What makes a height field; the others are level."""
+"""Grounds with a height field; the others are level."""
 
 
 class WorldConfig(Strict):

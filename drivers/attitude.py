@@ -18,7 +18,7 @@ CORRECTION_1_S: Final = 0.5
 _AT_REST: Final = 0.15
 """A force that differs from gravity by a greater part says nothing of up (ours)."""
 _LONGEST_S: Final = 0.2
-"""After a longer pause without a reading a correction counts as one of so long (ours)."""
+"""After a longer pause without a reading a correction counts as one of this length (ours)."""
 
 
 def rotations() -> Any:
@@ -45,7 +45,7 @@ class AttitudeFilter:
         self._rotation: Floats | None = None
 
     def update(self, rate_rad_s: Floats, force_m_s2: Floats, step_s: float) -> Floats:
-        """Take a reading that is ``step_s`` later than the last; returns the axes (3, 3), columns.
+        """Process a reading, ``step_s`` after the last; returns the axes (3, 3), columns.
 
         Args:
             rate_rad_s: (3,) mean rate since the last reading, in the device's axes.

@@ -23,6 +23,8 @@ class LoadEstimate(Protocol):
     """Drawn by the chain now."""
     charge_ah: float
     """Drawn since the start."""
+    hottest_c: float
+    """Temperature of the hottest winding; -inf before one is known."""
 
     def winding_c(self, state: JointState) -> Floats:
         """(J,) temperatures of the windings."""
@@ -32,9 +34,6 @@ class LoadEstimate(Protocol):
 @runtime_checkable
 class CheckingLink(Protocol):
     """A link that compares the servos with the values written to them, once a cycle."""
-
-    checks_in_read: bool
-    """Whether ``read`` makes the check; False for a caller of ``check_servos``."""
 
     def check_servos(self) -> None:
         """Make the check of this cycle, once its goals are sent.

@@ -9,17 +9,17 @@ RAISE = 10
 processor (Linux, ``sched(7)``), but only among the programs of one terminal where the system
 groups them (autogroup)."""
 LOWER = 10
-"""Niceness of what may wait."""
+"""Niceness of work that may wait."""
 
 
 @contextmanager
 def raised_priority() -> Iterator[None]:
     """Put the calling thread, and what it starts, before others for as long as the context lasts.
 
-    Who keeps servos waiting at the wrong time drops or stops them. On Linux it is a real-time
-    priority (``SCHED_RR``, the least), on other systems niceness. Only a superuser, or who is
-    granted ``rtprio`` (``limits.conf(5)``), may have it: for others nothing changes. The system
-    leaves a twentieth of the time to all others.
+    A late command drops or stops the servos. On Linux it is a real-time priority (``SCHED_RR``, the
+    least), on other systems niceness. Only a superuser, or who is granted ``rtprio``
+    (``limits.conf(5)``), may have it: for others nothing changes. The system leaves a twentieth of
+    the time to all others.
     """
     restore = _real_time() or _nicer()
     try:
@@ -41,7 +41,7 @@ def give_way() -> None:
 
 
 def _real_time() -> Callable[[], None] | None:
-    """Take the least real-time priority; how to give it back, None where it is not to be had."""
+    """Set the least real-time priority; returns a function that restores it, or None."""
     try:
         before = os.sched_getscheduler(0), os.sched_getparam(0)
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -51,7 +51,7 @@ def _real_time() -> Callable[[], None] | None:
 
 
 def _nicer() -> Callable[[], None] | None:
-    """Likewise with niceness."""
+    """Do the same with niceness."""
     try:
         before = os.getpriority(os.PRIO_PROCESS, 0)
         os.setpriority(os.PRIO_PROCESS, 0, before - RAISE)

@@ -1,6 +1,6 @@
 """Commands, states and poses between controller and servos: read-only arrays, SI units, head first.
 
-Named tuples: several are made in every cycle, and a frozen dataclass takes five times as long.
+Named tuples: several are made in every cycle, and a frozen dataclass needs five times as long.
 """
 
 from typing import NamedTuple

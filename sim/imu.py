@@ -23,7 +23,7 @@ _UP = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 class Imu:
-    """The device of ``config`` on a line of ``baud``, in the link whose motion ``motion`` tells."""
+    """The device of ``config`` on a line of ``baud``; ``motion`` returns the motion of its link."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class Imu:
 
     @property
     def model_number(self) -> int:
-        """What a ping tells; 0 where the device's number is not published."""
+        """Model number in a ping; 0 if the device's number is not published."""
         return self._public.model_number or 0
 
     def block(self, address: int, length: int) -> bytes | None:
@@ -60,7 +60,7 @@ class Imu:
         return self._table[address : address + length].tobytes()
 
     def _look(self) -> None:
-        """Take a reading, unless the last one is of just now."""
+        """Measure, unless the last measurement was just made."""
         now, last = self._motion(), self._last
         step_s = 0.0 if last is None else now.time_s - last.time_s
         if last is not None and step_s < _SHORTEST_S:

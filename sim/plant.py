@@ -18,14 +18,14 @@ _ENERGIES = ("drawn_j", "returned_j", "heat_j", "work_j")
 
 @dataclass(frozen=True, slots=True)
 class ServoDrive:
-    """What the plant needs of J servos in every step; contiguous float64 arrays (J,).
+    """Quantities of J servos that the plant needs in every step; contiguous float64 arrays (J,).
 
     The arrays are written in place and never exchanged: compiled steps keep their addresses.
 
     Position control as the firmware does it: ``pwm = clip(p_gain * (goal - q), +-pwm_limit)``,
-    ``volts = pwm * supply``, ``i = (volts - k_e w) / R``, clipped to ``+-current_limit_a`` in
-    current-based mode, ``torque = k_t i``; an unpowered bridge (``torque_on`` 0) is open: no
-    current.
+    ``volts = pwm * supply``, ``i = (volts - k_e w) / R``, ``torque = k_t i``. The current is
+    clipped to ``+-current_limit_a`` in current-based mode. An unpowered bridge (``torque_on`` 0) is
+    open: no current.
     """
 
     torque_on: Floats
@@ -47,7 +47,7 @@ class ServoDrive:
     pwm: Floats = field(init=False)
     # added up by the plant over all its steps
     drawn_j: Floats = field(init=False)
-    """Electrical energy ``volts i`` that the motor took in; what it gave back is not deducted."""
+    """Electrical energy ``volts i`` that the motor consumed; returned energy is not deducted."""
     returned_j: Floats = field(init=False)
     """Electrical energy that the motor gave back."""
     heat_j: Floats = field(init=False)

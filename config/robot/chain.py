@@ -21,14 +21,13 @@ _LIMIT_SHARE = 2.0 / 2.3
 class RobotConfig(JointValues):
     """A chain of links joined by servos, with or without legs; metres, index 0 is the head.
 
-    The order of the joints is that of the servos on the bus: first those of the spine from head to
-    tail, then those of the legs, pair by pair from tail to head, left before right, hip before
-    foot.
+    The order of the joints is that of the servos on the bus. The spine comes first, from head to
+    tail. Then follow the legs, pair by pair from tail to head, left before right, hip before foot.
     """
 
     @model_validator(mode="after")
     def _axes_of_the_joints(self) -> Self:
-        """Take ``joint_axes`` from the joints if the file does not give it."""
+        """Derive ``joint_axes`` from the joints if the file does not give it."""
         if not self.joint_axes:
             axes = [joint.axis for joint in self.joints]
             known = "".join(axis for axis in axes if axis is not None)
@@ -137,6 +136,11 @@ class RobotConfig(JointValues):
     def _tracked_body_is_on_the_spine(self) -> Self:
         if self.pose is not None and self.pose.link >= self.link_count:
             raise ValueError(f"pose: link {self.pose.link} of {self.link_count}: 0 is the head")
+        for tag in () if self.tags is None else self.tags.on:
+            if tag.link >= self.link_count:
+                raise ValueError(
+                    f"tags: tag {tag.id}: link {tag.link} of {self.link_count}: 0 is the head"
+                )
         return self
 
     @model_validator(mode="after")
@@ -189,10 +193,9 @@ class RobotConfig(JointValues):
         for model, facts in records.items():
             if facts.protocol == 1:
                 raise ValueError(
-                    f"servo: model {model} speaks Protocol 1.0, which has no group read and no "
-                    "watchdog that a run could rely on; a run needs a servo of Protocol 2.0, such "
-                    "as XL430-W250 (for programs of your own: snakewalk bus serve --servos "
-                    "1-4:AX-12A)"
+                    f"servo: model {model} speaks Protocol 1.0, which lacks group reads and a "
+                    "watchdog; choose a servo of Protocol 2.0, such as XL430-W250 (for your "
+                    "own programs: snakewalk bus serve --servos 1-4:AX-12A)"
                 )
             missing = facts.missing_for_a_run()
             if missing:
@@ -267,8 +270,9 @@ class RobotConfig(JointValues):
         data: dict[str, Any] = handler(self)
         if not self.described_models:
             data.pop("described_models", None)
-        if self.pose is None:
-            data.pop("pose", None)
+        for key in ("pose", "ros", "tags"):
+            if data[key] is None:
+                data.pop(key)
         return data
 
     if not TYPE_CHECKING:

@@ -19,7 +19,9 @@ from snakewalk.config.robot.links import BellyConfig, LinkConfig
 from snakewalk.config.robot.ports import PortConfig
 from snakewalk.config.robot.power import PowerConfig
 from snakewalk.config.robot.servo import ServoConfig
+from snakewalk.config.ros import RosConfig
 from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.tags import TagsConfig
 
 
 class RobotKeys(Strict):
@@ -51,9 +53,9 @@ class RobotKeys(Strict):
     link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="of each link")
     yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
     pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
-    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="what a plan may ask")
-    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="what a plan may ask")
-    torque_limit_n_m: float = Field(2.0, gt=0.0, description="what a plan may ask of a joint")
+    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="limit of a plan")
+    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="limit of a plan")
+    torque_limit_n_m: float = Field(2.0, gt=0.0, description="torque limit of a joint in a plan")
     limbs: tuple[LimbsConfig, ...] = Field(
         (), description="pairs of legs, from the tail to the head: tables [[limbs]]"
     )
@@ -63,17 +65,25 @@ class RobotKeys(Strict):
         description="records of models that are not shipped; loading a robot fills it from the "
         "files that `model` names",
     )
-    imu: ImuConfig | None = Field(None, description="a table [imu]; default: there is none")
+    imu: ImuConfig | None = Field(None, description="a table [imu]; default: no IMU")
     stereo_head: StereoHeadConfig | None = Field(
-        None, description="a table [stereo_head]; default: there is none"
+        None, description="a table [stereo_head]; default: no stereo head"
     )
     pose: PoseConfig | None = Field(
         None,
         description="a table [pose]: the tracked body of an external pose source; default: the "
         "head link's centre in the world of the run",
     )
+    tags: TagsConfig | None = Field(
+        None, description="a table [tags]: printed tags on the links; default: no tags"
+    )
+    ros: RosConfig | None = Field(
+        None,
+        description="a table [ros]: frames that the ROS node publishes; default: the defaults of "
+        "that table",
+    )
     power: PowerConfig | None = Field(
-        None, description="a table [power]; default: the cables between servos take nothing"
+        None, description="a table [power]; default: no voltage drop in the cables between servos"
     )
     ports: tuple[PortConfig, ...] = Field(
         (),

@@ -14,7 +14,7 @@ class PortConfig(Strict):
     port: str = Field(
         min_length=1,
         description="a device such as /dev/ttyUSB0, a URL such as socket://host:5000, or sim: "
-        "these servos are simulated, beside real ones",
+        "these servos are simulated, and the others are real",
     )
     ids: tuple[int, ...] = Field(
         min_length=1, description="of all servos on it, and of the IMU where it is on it"

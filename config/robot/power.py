@@ -8,7 +8,7 @@ from snakewalk.config.base import Strict
 
 
 class PowerConfig(Strict):
-    """Cables from servo to servo, where leads of the supply end, and its fuse (docs/bus.md)."""
+    """Cables between servos, leads of the supply, and its fuse (docs/how-to/chain-voltage.md)."""
 
     inject_ids: tuple[int, ...] = Field(
         (), description="servos at which a lead of the supply ends; default: the first of the chain"

@@ -3,12 +3,12 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "body", "Make the body's mesh, or a skin that moves: a textured, animated glTF (--animate).", "snakewalk.controller.animals.commands.body:body", "Recordings"),
-    ("command", "fish film", "Render a fish whose every angle is known, with marks, shadow, blur and noise.", "snakewalk.controller.animals.commands.fish_film:film", ""),
-    ("command", "fish match", "Lay a deformable fish over every frame: head, spine angles, and from the side its pitch.", "snakewalk.controller.animals.commands.fish_match:match", ""),
-    ("command", "fish synthesise", "Put segments of a film together anew, at random or through control points.", "snakewalk.controller.animals.commands.fish_synthesise:synthesise", ""),
+    ("command", "body", "Make the body's mesh (.obj, .glb), or an animated, textured skin with --animate.", "snakewalk.controller.animals.commands.body:body", "Recordings"),
+    ("command", "fish film", "Render a film of a fish with known angles, marks, shadow, blur and noise.", "snakewalk.controller.animals.commands.fish_film:film", ""),
+    ("command", "fish match", "Fit a deformable fish to every frame: head, spine angles, and from the side its pitch.", "snakewalk.controller.animals.commands.fish_match:match", ""),
+    ("command", "fish synthesise", "Join segments of a film in a new order, at random or through control points.", "snakewalk.controller.animals.commands.fish_synthesise:synthesise", ""),
     ("command", "stride", "Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends.", "snakewalk.controller.animals.commands.stride:stride", "Recordings"),
-    ("command", "synthesise", "Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP]).", "snakewalk.controller.animals.commands.synthesise:synthesise", "Motion"),
+    ("command", "synthesise", "Make an animal's motion over a world: a snake from states ([PT]), or legs ([KP]).", "snakewalk.controller.animals.commands.synthesise:synthesise", "Motion"),
     ("look", "animal", "The animal of the run's recording, or a plain snake.", "snakewalk.controller.animals.mesh.body_look:AnimalLook", ""),
     ("look", "body", "The skin of a named body, or of a body's file.", "snakewalk.controller.animals.mesh.body_look:BodyLook", ""),
 )

@@ -1,4 +1,4 @@
-"""The host's side of the cable: device, who may open it, how long it holds bytes back."""
+"""The host's side of the cable: device, permission to open it, and its latency."""
 
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ def permission(device: str) -> Finding:
     """Whether this user may open the device.
 
     Raises:
-        PortError: there is no such device.
+        PortError: the device does not exist.
 
     """
     if is_url(device):
@@ -48,7 +48,7 @@ def latency_timer(timer_ms: int | None, device: str) -> Finding:
         "fail",
         f"{timer_ms} ms: every answer may come that much later",
         f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{tty}/latency_timer "
-        "(and a udev rule, so that it stays: docs/driver.md)",
+        "(and a udev rule, so that it stays: docs/how-to/examine-a-bus.md)",
     )
 
 
@@ -56,8 +56,8 @@ def wire(budget: WireBudget, rate_hz: float) -> Finding:
     """Whether the cycle fits the wire."""
     kind = "fast sync read" if budget.fast else "sync read"
     found = (
-        f"{budget.servos} servos, {budget.baud} baud, {kind}: {budget.cycle_s * 1e3:.2f} ms a "
-        f"cycle, at most {budget.limit_hz:.0f} Hz; {rate_hz:g} Hz take "
+        f"{budget.servos} servos, {budget.baud} baud, {kind}: {budget.cycle_s * 1e3:.2f} ms per "
+        f"cycle, at most {budget.limit_hz:.0f} Hz; {rate_hz:g} Hz use "
         f"{budget.share(rate_hz):.0%} of the wire"
     )
     if budget.share(rate_hz) > 1.0:

@@ -1,7 +1,7 @@
-"""What the cables along a chain take of the voltage, and where another lead of the supply helps.
+"""Voltage drop of the cables along a chain, and the best place for another lead of the supply.
 
-The voltages that the servos measure under load tell the resistance of each cable between them; a
-ladder of such cables tells what another place to inject power would change.
+The voltages that the servos measure under load give the resistance of each cable between them. A
+ladder of such cables predicts the effect of another place to inject power.
 """
 
 from collections.abc import Sequence
@@ -21,23 +21,23 @@ from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling
 
 CHECK: Final = "cables"
 CONTACT_LIMIT_A: Final = 3.0
-"""Of a contact of the JST EH connector of the X series with AWG 22 (JST's data sheet)."""
+"""Limit of a contact of the JST EH connector of the X series with AWG 22 (JST's data sheet)."""
 DROP_SHARE: Final = 0.04
-"""Share of the supply that cables may take along the chain (ours): 0.5 V of 12 V."""
+"""Share of the supply that may drop along the chain (ours): 0.5 V of 12 V."""
 _BLOCKS: Final = 8
 """Parts of a measurement whose scatter is the error of the whole."""
 _SIDES: Final = 2.4
 """Half an interval in standard errors: Student's t for 8 blocks, 95 %."""
 _BAD_TIMES: Final = 3.0
-"""A cable is bad that has so many times what the others have and a new one may have (ours)."""
+"""A cable is bad if its resistance is this multiple of the others' and of a new one's (ours)."""
 _BAD_DROP_V: Final = 0.1
-"""... and takes so much more than they do: two servos may measure differently by less (ours)."""
+"""... and if its drop exceeds theirs by this: two servos may measure differently by less (ours)."""
 _BAD_ERRORS: Final = 3.0
-"""... which is so many standard errors (ours)."""
+"""... which is this number of standard errors (ours)."""
 _LINE: Final = 5
 """Cables between two leads from which on it is asked how those share the current (ours)."""
 _LEAST_A: Final = 1e-3
-"""Less current than this tells nothing of a cable."""
+"""A smaller current does not allow an estimate of a cable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class CableEstimate:
     """Resistance of the cables of a chain of S servos, with 95 % intervals, ohm."""
 
     cable_ohm: Floats
-    """(S - 1,) of each; NaN where no current has told."""
+    """(S - 1,) of each; NaN if no current allowed an estimate."""
     low_ohm: Floats
     high_ohm: Floats
     usual_ohm: float
@@ -64,7 +64,7 @@ class CableEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Injection:
-    """Places of leads beside those that there are, and the lowest voltage of a servo with them."""
+    """Places of additional leads, and the lowest voltage of a servo with them."""
 
     servo_ids: tuple[int, ...]
     lowest_v: float
@@ -74,8 +74,9 @@ def estimate_cables(voltage_v: Floats, drawn_a: Floats, leads: Cabling) -> Cable
     """Estimate the cables from T readings of S servos under load.
 
     The mean step of the voltage over a cable is the mean current in it times its resistance. The
-    current follows from what the servos draw (Kirchhoff). A bad cable is told by the median of all,
-    which it does not move; what the others have is their mean, weighted by the current.
+    current follows from the currents of the servos (Kirchhoff). A bad cable is detected against the
+    median of all, which it does not move. The others' resistance is their mean, weighted by the
+    current.
 
     Args:
         voltage_v: (T, S) in steps of 0.1 V.
@@ -123,9 +124,9 @@ def _flow(
 ) -> tuple[Floats, Floats]:
     """Current in each cable, positive away from the first servo, and its standard error, (S - 1,).
 
-    Outside the leads it is what the servos beyond draw. How two leads share what is between them,
-    their cables decide: if most are alike, the step falls from cable to cable by what the servo
-    between them draws times their resistance, and where it is 0 no current flows. Line and slope
+    Outside the leads it is what the servos beyond draw. Between two leads, the cables decide how
+    the current divides. If most are alike, the step falls from cable to cable by the current of the
+    servo between them times their resistance; no current flows where the step is 0. Line and slope
     are medians (Theil, Sen), so that a bad cable does not move them.
     """
     passed_a = np.cumsum(drawn_a)[:-1]  # of all servos up to the cable
@@ -189,7 +190,7 @@ class Drop(NamedTuple):
 
 
 def drop_along(robot: RobotConfig, power: PowerConfig, current_a: float) -> Drop:
-    """Voltages where each servo takes ``current_a`` from the supply, beside its electronics."""
+    """Voltages if each servo draws ``current_a``, in addition to its electronics."""
     cabling = Cabling.of(robot, power)
     load_a = current_a + _standby_a(robot)
     servo_v = cabling.servo_v(robot.servo.supply_v, SOURCE_OHM, load_a)
@@ -270,7 +271,7 @@ def advice(cabling: Cabling, servo_ids: Sequence[int], source_v: float, drawn_a:
 
 
 def drawn_a(robot: RobotConfig, duty: Floats, current_a: Floats) -> Floats:
-    """What servos take from the supply, A: the bridges' share, and what the electronics need.
+    """Supply current of servos, A: the share of the bridges, and that of the electronics.
 
     Args:
         robot: its models.

@@ -37,7 +37,8 @@ from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, ServoUnits
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
 _PINGED = 6
-"""So many missing servos are pinged at each baud rate; for more a broadcast is quicker (ours)."""
+"""Up to this number of missing servos are pinged at each baud rate; for more a broadcast is quicker
+(ours)."""
 _STILL_POSITIONS = 20
 """Positions, 1.8 degrees, by which a joint at rest may differ between two reads (ours)."""
 _STILL_S = 0.1
@@ -79,7 +80,7 @@ def examine(
         expected = tuple(each for each in expected if each in on_it)
         imu = imu if imu is not None and imu.id in on_it else None
     on_progress("other programs")
-    port.drain_until_quiet(latency_s)  # what an earlier program has asked for
+    port.drain_until_quiet(latency_s)  # replies to an earlier program
     overheard = overhear(port, line_checks.OVERHEAR_S)
     findings.append(line_checks.second_master(overheard))
     echo = transmit_echo(port, expected)
@@ -110,7 +111,7 @@ def examine(
         findings += _servo_findings(bus, robot, safety, reports, noise)
         on_progress("group reads")
         fast = all(s.fast_reads for s in reports)
-        port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to what was asked so far
+        port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to earlier requests
         patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
         ids = [s.servo_id for s in reports for _ in range(_ASKED)]
@@ -255,7 +256,7 @@ def _readable(
     noise: Finding | None,
     findings: list[Finding],
 ) -> list[int]:
-    """Who replies to reads, alone under its ID; adds a finding of those who do not reply."""
+    """Return the servos that reply to reads, alone under their ID; adds a finding on the others."""
     probes = (*pings, *reads)
     shared = {p.servo_id for p in probes if p.doubled}
     if noise is None:

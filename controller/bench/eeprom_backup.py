@@ -1,7 +1,7 @@
-"""What outlives the power of servos, as a file: read from a bus, compared, written back.
+"""The persistent settings of servos as a file: read from a bus, compared, written back.
 
-ID, baud rate and protocol stay as they are: with them a servo is found, and a servo that takes
-another's place has been given its ID before.
+ID, baud rate and protocol stay as they are: they are needed to find a servo, and a replacement has
+received its ID before.
 """
 
 import json
@@ -95,7 +95,7 @@ def load_backup(path: Path) -> BackupFile:
     """Read a file of ``backup_text``.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: it is another kind of file.
         OSError: it cannot be read.
 
     """
@@ -135,7 +135,7 @@ def plan_restore(bus: DynamixelBus, backup: ServoBackup) -> tuple[SettingChange,
 
 
 def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
-    """Raw values of what a person or a program may have set, by address."""
+    """Raw values that a person or a program may have set, by address."""
     registers = sorted((bus.table[name] for name in bus.table), key=lambda each: each.address)
     values = {}
     for register in registers:

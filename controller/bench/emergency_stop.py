@@ -1,8 +1,8 @@
 """Emergency stop: has the runs of other programs latch. It imports little, to be quick.
 
-A run is asked through its stop button, and latches within a control cycle. One that does not
-answer is terminated (its safe link switches torque off on the way out), and if it does not end
-either it is killed; the bus watchdogs stop the servos then, and ``torque_off`` does the rest.
+A run is asked through its stop button, and latches within a control cycle. A run that does not
+answer is terminated (its safe link switches torque off at the exit). If it does not end either, it
+is killed; then the bus watchdogs stop the servos, and ``torque_off`` does the rest.
 """
 
 import os
@@ -18,21 +18,21 @@ from snakewalk.drivers.safety.stop_button import PressedButton, resolved, stoppa
 
 How = Literal["latched", "terminated", "killed", "torque off"]
 LATCH_S: Final = 1.0
-"""How long a run may take to latch (ours): a cycle lasts some 10 ms, the set-up longer."""
+"""Longest time of a run until it latches (ours): a cycle lasts some 10 ms, the set-up longer."""
 END_S: Final = 3.0
-"""How long a run that was terminated may take to switch torque off: it asks for 2 s (ours)."""
+"""Longest time of a terminated run until torque is off: it asks for 2 s (ours)."""
 _LOOK_S: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class StopOutcome:
-    """What was stopped, and how."""
+    """A stopped run or port, and the method."""
 
     what: str
     """Name of a run, or a port."""
     how: How
     text: str
-    """What is known of torque, for people."""
+    """State of torque, for people."""
     safe: bool
     """Whether torque is known to be off."""
     after_s: float | None = None

@@ -66,7 +66,7 @@ def read_all(lines: PortLines, robot: RobotConfig) -> dict[int, Fingerprint]:
 def fingerprint_finding(
     file: FingerprintFile, robot: RobotConfig, found: Mapping[int, Fingerprint]
 ) -> Finding | None:
-    """What the comparison with the file shows; None if there is no file.
+    """Result of the comparison with the file; None without a file.
 
     Raises:
         ConfigError: the file is broken.

@@ -68,7 +68,7 @@ def homing_written(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> Iterat
     If that, or what is done in the context, fails, all servos get their old offsets again.
 
     Raises:
-        BusError: a servo does not do as it is told, and which of them may have its new offset.
+        BusError: a servo does not obey; names those that may have their new offset.
 
     """
     tried: list[HomingOffset] = []
@@ -104,7 +104,7 @@ def _write(bus: DynamixelBus, offset: HomingOffset) -> None:
 
 
 def _put_back(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> str:
-    """Write the old offsets again, and tell how that went."""
+    """Write the old offsets again, and report the result."""
     faults = []
     for offset in offsets:
         try:

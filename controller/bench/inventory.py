@@ -30,7 +30,7 @@ class InventoryEntry:
 
     @property
     def fault(self) -> str:
-        """What is wrong with it, in words; empty: nothing."""
+        """Fault of the servo in words; empty: no fault."""
         if self.report is None:
             return "answers pings, but its registers cannot be read"
         alarm = alarm_names(self.report.hardware_error)

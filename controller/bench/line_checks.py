@@ -1,4 +1,4 @@
-"""What comes over the line: who else talks, how late replies are, how many get lost."""
+"""Findings on the line: other masters, late replies, lost replies."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ _COMPARED = 3
 _LOST = 2
 """Lost replies of one servo beyond chance (ours)."""
 _STRAY_REPLIES = 3
-"""So many replies to somebody else show another master: one may be a late one to ourselves."""
+"""This number of foreign replies shows another master; a single one may be a late one to us."""
 
 
 def second_master(overheard: Overheard) -> Finding:
@@ -52,7 +52,7 @@ def second_master(overheard: Overheard) -> Finding:
 
 
 def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) -> Finding | None:
-    """Damage that no single servo is the cause of; None: there is none, or one ID has it all.
+    """Damage that does not come from a single servo; None if one ID has all or nothing is damaged.
 
     Two servos with one ID damage their own replies: either all of a kind, or, where they differ by
     little, some. Noise spares nobody, and hits now this reply, now that. So it is noise if bytes
@@ -103,12 +103,12 @@ def _usual_response(late_s: Sequence[float], latency_s: float) -> Finding:
     usual_ms = float(np.quantile(late_s, 0.25)) * 1e3
     found = f"replies come {usual_ms:.1f} ms later than the wire needs"
     if usual_ms * 1e-3 > latency_s:
-        found += f", the driver waits {latency_s * 1e3:.0f} ms: a run takes all of them for lost"
+        found += f", the driver waits {latency_s * 1e3:.0f} ms: a run loses all of them"
         remedy = "lower the adapter's latency timer to 1 ms, or connect it without a hub or server"
         return Finding("response time", "fail", found, remedy)
     if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
         return Finding("response time", "ok", found)
-    found += ": each cycle of a run takes that much longer"
+    found += ": each cycle of a run is longer by that time"
     remedy = (
         "the adapter's latency timer, a USB hub, a serial server in between; or a busy computer"
     )
@@ -129,7 +129,7 @@ def _slow_servos(probes: Sequence[Probe]) -> Finding | None:
     if not slow:
         return None
     found = ", ".join(f"servo {i} by {late_s * 1e3:.1f} ms" for i, late_s in slow.items())
-    remedy = "update its firmware, exchange it: each cycle of a run takes that much longer"
+    remedy = "update its firmware or exchange it: each cycle of a run is longer by that time"
     return Finding("response time", "warn", f"slower than the others: {found}", remedy)
 
 
@@ -159,7 +159,7 @@ def line_quality(
 
     """
     reads, lost, longest_s = 0, 0, 0.0
-    while reads < _TEST_READS and lost <= _BAD_SHARE * _TEST_READS:  # a bad line takes its time
+    while reads < _TEST_READS and lost <= _BAD_SHARE * _TEST_READS:  # a bad line needs time
         began_s = port.clock.now_s()
         complete = bool(cycle.read().valid.all())
         reads += 1

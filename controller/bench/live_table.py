@@ -1,7 +1,7 @@
 """The live table of a served bus, drawn by a process of its own.
 
-Drawing takes longer than a servo may take to reply. A thread would not help: while it draws it
-holds the interpreter for 5 ms at a time, at each byte that the serving thread waits for.
+Drawing is slower than a servo's reply may be. A thread would not help: while it draws it holds the
+interpreter for 5 ms at a time, at each byte that the serving thread waits for.
 """
 
 import sys
@@ -29,12 +29,12 @@ MakeDecoder = Callable[[], Decoder | Decoder1]
 _SHOWN: Final = 8
 """Packets in words below the table."""
 _END_S: Final = 2.0
-"""How long the drawing process may take to end."""
+"""Longest time until the drawing process ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """What one drawing shows."""
+    """Content of one drawing."""
 
     counts: str
     rows: Rows

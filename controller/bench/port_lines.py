@@ -24,11 +24,11 @@ class PortLines:
     port: str
     """As it was asked for."""
     lines: tuple[tuple[Line, tuple[int, ...] | None], ...]
-    """Each with the IDs that are on it; None: whoever answers."""
+    """Each with the IDs that are on it; None: any servo."""
 
     @property
     def several(self) -> bool:
-        """Whether a servo is to be told with its port."""
+        """Whether messages name a servo with its port."""
         return len(self.lines) > 1
 
     def open_servo(self, servo_id: int) -> DynamixelBus:

@@ -1,7 +1,7 @@
-"""What other programs have left in the servos' registers, against what a run expects.
+"""Settings that other programs left in the servos' registers, against those that a run expects.
 
-A value that a factory or a run sets is no finding. Most others a run sets by itself, and says so;
-the doctor names them for whoever uses the bus with another program.
+A value that a factory or a run sets gives no finding. A run sets most others by itself and reports
+it; the doctor names them for users of other programs.
 """
 
 import math
@@ -101,13 +101,15 @@ class _Checks:
 
     def all(self) -> list[Finding | None]:
         """Findings in the order of their weight; None where all is well."""
-        full = self._full
-        shown = " or ".join(map(str, dict.fromkeys(full)))
         return [
             self._pose(),
             self._exchanged(),
             self._secondary(),
-            self._current_limit(),
+            self._weak(
+                *("current limit", "fail", "Current Limit"),
+                "a Current Limit(38) below the robot's current limit",
+                "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+            ),
             self._bad(
                 "status return level",
                 "warn",
@@ -147,6 +149,19 @@ class _Checks:
                 "on, overloaded or overheated: Shutdown(63) is masked",
                 verb="stay",
             ),
+            *self._pwm(),
+            *self._limits(),
+            self._unusual("operating mode", ("Operating Mode",)),
+            self._unusual("gains", _GAINS),
+            self._unusual("profile", _PROFILE),
+            *self._watchdog(),
+        ]
+
+    def _pwm(self) -> list[Finding | None]:
+        """Limits and goals of the PWM that make a servo weak."""
+        full = self._full
+        shown = " or ".join(map(str, dict.fromkeys(full)))
+        return [
             self._bad(
                 "PWM limit",
                 "fail",
@@ -173,16 +188,11 @@ class _Checks:
                 ),
                 "a Goal PWM(100) below its limit: weak or without power",
             ),
-            *self._limits(),
-            self._unusual("operating mode", ("Operating Mode",)),
-            self._unusual("gains", _GAINS),
-            self._unusual("profile", _PROFILE),
-            *self._watchdog(),
         ]
 
     def _limits(self) -> list[Finding | None]:
         """Limits, goals and sensors that other programs and faults leave behind."""
-        units, robot = self._units, self._robot
+        units = self._units
         return [
             self._bad(
                 "position limits",
@@ -204,14 +214,8 @@ class _Checks:
             self._not_factory(
                 "voltage limits", "Max Voltage Limit", "do they fit the supply? alarms come beyond"
             ),
-            self._bad(
-                "goal current",
-                "warn",
-                lambda servo: (
-                    robot.all_axes[servo.joint] == "p"
-                    and servo.values.get("Goal Current", math.inf)
-                    < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
-                ),
+            self._weak(
+                *("goal current", "warn", "Goal Current"),
                 "a Goal Current(102) below the robot's current limit: weak",
             ),
             self._bad(
@@ -272,7 +276,7 @@ class _Checks:
         verb: str = "have",
         remedy: str = _BY_A_RUN,
     ) -> Finding | None:
-        """Finding on the servos for which ``is_bad``; None if there are none."""
+        """Finding on the servos for which ``is_bad``; None if all are good."""
         bad = [servo.servo_id for servo in self._servos if is_bad(servo)]
         if not bad:
             return None
@@ -328,18 +332,21 @@ class _Checks:
         remedy = "a run sets Secondary ID(12) to 255; until then it moves with the other's goals"
         return Finding("secondary ID", "fail", "; ".join(shadows), remedy)
 
-    def _current_limit(self) -> Finding | None:
+    def _weak(
+        self, check: str, grade: Grade, register: str, what: str, remedy: str = _BY_A_RUN
+    ) -> Finding | None:
+        """Pitch joints with a register of their current below the robot's limit."""
         robot, units = self._robot, self._units
         return self._bad(
-            "current limit",
-            "fail",
+            check,
+            grade,
             lambda servo: (
                 robot.all_axes[servo.joint] == "p"
-                and servo.values.get("Current Limit", math.inf)
+                and servo.values.get(register, math.inf)
                 < units.current_raw(servo.joint, robot.current_limits_a[servo.joint])
             ),
-            "a Current Limit(38) below the robot's current limit",
-            remedy="snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+            what,
+            remedy=remedy,
         )
 
     def _homing(self) -> Finding | None:

@@ -20,16 +20,16 @@ from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, SECONDARY_
 _LOOKS = 3
 _LIKELY = (1_000_000, FACTORY_BAUD)
 _SAME = {"sound": 1, "noisy": 2, "lossy": 5}
-"""So many broadcast pings in a row bring nobody new before a line is left (ours)."""
+"""Number of broadcast pings in a row without a new servo before a line is left (ours)."""
 _NAMED = 3
-"""So many baud rates at most are named of noise."""
+"""Largest number of baud rates that are named for noise."""
 _MOST = 12
 """Broadcast pings at one rate, at most (ours)."""
 _AGAIN = 2
 """How often silent rates that are likely are asked again on a bad line, or where nobody answers;
 the noisy ones where nobody answers (ours)."""
 _TRIES = 6
-"""Of a ping or a read on a bad line (ours)."""
+"""Tries of a ping or a read on a bad line (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ def pick_port(port: str | None) -> str:
     """The port that was asked for, or the only one there is.
 
     Raises:
-        PortError: none was asked for, and there is none, or more than one; several were.
+        PortError: no port was named and none or several exist; or several were named.
 
     """
     if port is not None:
@@ -81,18 +81,18 @@ def check_bauds(bauds: Sequence[int]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ScanReport:
-    """Who answers on a line, and how good the line is."""
+    """The servos that reply on a line, and the quality of the line."""
 
     servos: tuple[ScanResult, ...]
     """By ID."""
     noise_bytes: Mapping[int, int]
     """Baud rate to the bytes that belong to no packet, where there were any."""
     lossy: bool
-    """Whether somebody who answered once did not answer each time."""
+    """Whether a servo that replied once did not reply each time."""
 
     @property
     def bad_line(self) -> str | None:
-        """What is wrong with the line, in words; None: nothing that was seen."""
+        """Fault of the line in words; None if no fault was seen."""
         if self.noise_bytes:
             shown = ", ".join(f"{count} at {baud} baud" for baud, count in self.noise_bytes.items())
             if len(self.noise_bytes) > _NAMED:
@@ -114,8 +114,8 @@ def scan(
 ) -> ScanReport:
     """Ask at each baud rate, the likely ones first; leaves the port at the one it had.
 
-    Where somebody answers, or bytes come damaged, all are asked again until nobody new answers: on
-    a bad line requests and replies get lost. Where nobody does, likely rates are asked again, if
+    If a servo replies, or bytes are damaged, all are asked again until no new servo replies: a bad
+    line loses requests and replies. Where nobody does, likely rates are asked again, if
     ``patient``.
 
     Raises:
@@ -157,7 +157,7 @@ def scan(
 def _answers(
     port: BytePort, noise: dict[int, int], *, patient: bool
 ) -> tuple[dict[int, StatusPacket], bool]:
-    """Who answers at the port's baud rate, and whether packets got lost.
+    """Servos that reply at the port's baud rate, and whether packets got lost.
 
     Adds to ``noise`` what came damaged.
     """
@@ -187,12 +187,12 @@ def _tell_once(
     before: int,
     on_progress: Callable[[str], None],
 ) -> None:
-    """Take repetitions of a servo out that answers at every rate, as on a line that has none.
+    """Remove repetitions of a servo that replies at every rate, as on a line without a baud rate.
 
-    Behind some pseudo-terminals and serial servers no baud rate counts; the servo is told at
-    ``before`` then, or at the first rate where that was not asked. On a bad line not every request
-    is answered: a servo that is found at two rates is pinged at all others. Two servos with one ID,
-    at two rates, are told at both.
+    Some pseudo-terminals and serial servers ignore the baud rate. Then the servo is reported at
+    ``before``, or at the first rate if that was not asked. On a bad line not every request is
+    answered: a servo that is found at two rates is pinged at all others. Two servos with one ID, at
+    two rates, are reported at both.
     """
     for servo_id in sorted({each for found in replies.values() for each in found}):
         at = [baud for baud, found in replies.items() if servo_id in found]
@@ -227,7 +227,7 @@ def _other(port: BytePort, device_id: int, number: int) -> str:
     published = imu_model(number)
     if published is not None:
         return published
-    # whose number is not published: known by what only it shows
+    # a device with an unpublished number is recognised by its registers
     guess = ImuConfig(model="imu_to_dxl", id=device_id)
     reader = ImuReader(DynamixelBus(port), guess)
     shown = any(reader.read(lambda line: None) is not None for _ in range(_LOOKS))

@@ -102,8 +102,8 @@ def unnamed_robot(findings: Sequence[Finding], robot: RobotConfig) -> Finding | 
 def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = False) -> Finding:
     """Two servos with one ID answer twice, or over each other.
 
-    Two that are alike reply to a ping with the same bytes at the same time, which is one good
-    reply; what they measure differs. On a ``noisy`` line damage is no sign of them.
+    Two identical servos reply to a ping with the same bytes at the same time, which is one good
+    reply; their measurements differ. On a ``noisy`` line damage does not indicate them.
     """
     check = "duplicate IDs"
     probes = (*pings, *reads)
@@ -170,8 +170,8 @@ def firmware(servos: Sequence[ServoReport]) -> Finding:
         return Finding(
             "firmware",
             "warn",
-            f"{_subject(old, 'have')} no fast sync read (version {shown}): plain reads are used, "
-            "which take longer",
+            f"{_subject(old, 'have')} no fast sync read (version {shown}): the driver uses "
+            "plain reads, which are slower",
             "update it with DYNAMIXEL Wizard 2.0",
         )
     if len(versions) > 1:
@@ -218,7 +218,7 @@ def torque(servos: Sequence[ServoReport]) -> Finding:
 
 
 def supply(servos: Sequence[ServoReport], low_v: float, high_v: float) -> Finding:
-    """Supply voltage of each servo, and what the cable takes along the chain."""
+    """Supply voltage of each servo, and the drop of the cable along the chain."""
     volts = [s.voltage_v for s in servos]
     shown = f"{min(volts):.1f} to {max(volts):.1f} V"
     if min(volts) < low_v:

@@ -22,7 +22,7 @@ from snakewalk.drivers.protocol.registers import (
 )
 
 RESTART_S, _ASK_AGAIN_S = 3.0, 0.1
-"""How long a servo may take to answer after a reboot, and between the tries (ours)."""
+"""Longest time until a servo replies after a reboot, and between the tries (ours)."""
 _LIMITS = {
     "min_position_rad": "Min Position Limit",
     "max_position_rad": "Max Position Limit",
@@ -61,7 +61,7 @@ class SettingChange:
 
 @dataclass(frozen=True, slots=True)
 class SettingsResult:
-    """What changed on a servo, or would change."""
+    """Changes on a servo, made or planned."""
 
     servo: int
     """The ID by which it was addressed."""

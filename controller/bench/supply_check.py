@@ -20,14 +20,15 @@ from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
 _AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 3.0, 6
-"""At most 2.8 rad/s: what a run may ask for (4 rad/s), and what the servos' motors can."""
+"""At most 2.8 rad/s: within the limits of a run (4 rad/s) and of the servos' motors."""
 _GROWING_CYCLES = 3
 """At first the wiggle grows: a cable that is nearly broken is measured before an alarm ends it."""
 _PERIOD_S = 0.02
 """As of a run at 50 Hz. With each step of the goal the motors draw most of their current within a
 few milliseconds."""
 _DELAYS_S = (1e-3, 2e-3, 3e-3, 5e-3, 8e-3)
-"""Of a reading behind a step, in turns: read at one phase alone, that current may always be missed.
+"""Delays of a reading behind a step, in turns: at one phase alone the readings might always miss
+the current.
 """
 _SAG_SHARE = 0.08
 """Share of the voltage at rest that the supply may lose (ours); a walk asks for more than this."""
@@ -39,7 +40,7 @@ _ENOUGH = 10
 
 @dataclass(frozen=True, slots=True)
 class Wiggle:
-    """What S servos measured in T cycles while all joints moved."""
+    """Measurements of S servos in T cycles while all joints moved."""
 
     rest_v: Floats
     """(S,) before."""
@@ -48,11 +49,11 @@ class Wiggle:
     drawn_a: Floats
     """(T, S) from the supply; NaN of servos without a current sensor."""
     fault: DriverError | None
-    """What ended it early."""
+    """Error that ended it early."""
 
 
 def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> list[Finding]:
-    """Wiggle all joints, and judge what the supply does and what the cables take of it.
+    """Wiggle all joints, and judge the supply and the drop of the cables.
 
     Raises:
         PortError: the port vanished, and torque could not be switched off.

@@ -38,8 +38,8 @@ def torque_off(
 ) -> StopOutcome:
     """Switch torque off on every servo of a port.
 
-    The bytes go out first; then those who answer are asked whether their torque is off, and told
-    once more by their model's control table.
+    The bytes go out first. Then each servo that replies reports its torque, and gets the command
+    once more by its model's control table.
 
     Raises:
         PortError: it is not there, or a program that has no stop button holds it.
@@ -57,7 +57,7 @@ def torque_off(
                 port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
         # on a bad line a request gets lost: the likely rates are asked twice
         for rate in (*rates, *(rate for rate in rates if rate in _LIKELY)):
-            on_progress(f"torque off is sent; who answers at {rate} baud?")
+            on_progress(f"torque off is sent; waiting for replies at {rate} baud")
             found = scan(port, [rate], patient=False).servos
             if found:
                 port.setBaudRate(rate)
@@ -66,21 +66,21 @@ def torque_off(
                     for servo in found
                     if (fault := _confirm(port, servo.servo_id, servo.model)) is not None
                 ]
-                text = f"torque is off: {len(found) - len(failed)} servos confirm it, {rate} baud"
+                text = f"{len(found) - len(failed)} servos confirm it at {rate} baud"
                 return StopOutcome(
                     device, "torque off", "; ".join([text, *failed]), not failed, ports=(device,)
                 )
     return StopOutcome(
         device,
         "torque off",
-        f"torque off was sent at {sent} baud rates, and nobody answers: is the power on?",
+        f"sent at {sent} baud rates, but no servo replies; check the power",
         False,
         ports=(device,),
     )
 
 
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
-    """Read a servo's torque, switch it off once more where it is on; what is wrong, if anything."""
+    """Read a servo's torque, switch it off again if it is on; returns the fault, if any."""
     try:
         bus = DynamixelBus(port, model, latency_s=port.latency_s, tries=_TRIES)
         bus.write_verified(servo_id, "Torque Enable", 0)

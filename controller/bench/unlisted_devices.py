@@ -49,7 +49,7 @@ def transmit_echo(port: BytePort, listed: Collection[int]) -> Finding | None:
     return Finding(
         "transmit echo",
         "fail",
-        "the host receives each byte that it sends: replies cannot be told from requests",
+        "the host receives each byte that it sends, so replies look like requests",
         "switch the adapter's echo off, or use one that switches its receiver off while it sends",
     )
 
@@ -112,7 +112,7 @@ def unlisted(
             "servo IDs",
             "warn",
             f"{shown_subject(list(others), 'are')} on the bus and not in the robot",
-            "name a robot that has them with --robot, or take them off the bus",
+            "name a robot that has them with --robot, or remove them from the bus",
         )
     ]
     numbers, alarms, torque, shared = model_numbers(), [], [], []
@@ -125,7 +125,7 @@ def unlisted(
                     "servo IDs",
                     "warn",
                     f"ID {servo_id} is {name}, not a known servo model",
-                    "another device on this bus: it takes time on the wire only if it is asked",
+                    "another device on this bus: it uses time on the wire only if it is asked",
                 )
             )
             continue
@@ -146,7 +146,9 @@ def unlisted(
         findings.append(Finding("alarms", "fail", found, remedy))
     if torque:
         found = f"on at {shown_ids(torque)} (not in the robot)"
-        remedy = "a run does not switch it off: switch the power off, on, or take them off the bus"
+        remedy = (
+            "a run does not switch it off: switch the power off and on, or remove them from the bus"
+        )
         findings.append(Finding("torque", "warn", found, remedy))
     return findings
 

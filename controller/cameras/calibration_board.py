@@ -12,14 +12,14 @@ from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.errors import InputError
 
 DICTIONARY: Final = "DICT_5X5_250"
-"""Of the markers on a ChArUco board; those on the floor are of another."""
+"""Dictionary of the markers on a ChArUco board; those on the floor are of another."""
 _MARKER: Final = 0.75  # of a square's side
 _MOST_SQUARES: Final = 20
 _INCH_M: Final = 0.0254
 
 
 class BoardPattern(StrEnum):
-    """What is printed."""
+    """Pattern to print."""
 
     CHARUCO = "charuco"
     CHESSBOARD = "chessboard"
@@ -29,13 +29,15 @@ def read_pattern(text: str) -> BoardPattern:
     """Return the pattern of this name.
 
     Raises:
-        InputError: there is none.
+        InputError: the pattern is unknown.
 
     """
     try:
         return BoardPattern(text)
     except ValueError:
-        raise InputError(f"--pattern {text}: is none of {', '.join(BoardPattern)}") from None
+        raise InputError(
+            f"--pattern {text}: is unknown; use one of {', '.join(BoardPattern)}"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class CalibrationBoard:
     """A board of squares.
 
     Raises:
-        InputError: too few or too many squares, or a side that is none.
+        InputError: too few or too many squares, or a side out of range.
 
     """
 

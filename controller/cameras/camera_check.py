@@ -1,4 +1,4 @@
-"""What a few seconds of frames say of a camera above the floor: rate, markers, light, latency."""
+"""Measurements from a few seconds of a camera: rate, markers, light, latency."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -24,17 +24,17 @@ from snakewalk.controller.cameras.overhead_camera import LineDetection, Overhead
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _LOOK_S: Final = 0.25
-"""Between two looks for markers, which take longer than a frame."""
+"""Time between two searches for markers, which need longer than a frame."""
 _LINE_S: Final = 0.05
 """Between two frames in which the body is looked for."""
 _LINES, _READS = 400, 1000
-"""The latest that tell the latency: 20 s."""
-_SPARSE: Final = 8  # every so many pixels count for the light
+"""The latest samples for the latency: 20 s."""
+_SPARSE: Final = 8  # step between the pixels that count for the light
 
 
 @dataclass(frozen=True, slots=True)
 class CameraReport:
-    """What was seen so far."""
+    """Observations so far."""
 
     frames: int
     size_px: tuple[int, int]
@@ -51,17 +51,17 @@ class CameraReport:
     floor: FloorFit | None
     """By the last picture; None where it shows too few markers."""
     fault: str
-    """Why there is no floor; empty where there is one."""
+    """Reason why the floor is missing; empty if it was found."""
     bump: Bump | None
     """Against the picture of the empty floor; None without one, or without markers."""
     light_spread: float
     """Range of the picture's usual brightness (5 to 95 %), as a share of it."""
     latency: LatencyFit | None
-    """None where no joints were read, or there is no picture of the empty floor."""
+    """None if no joints were read, or the picture of the empty floor is missing."""
 
 
 class CameraCheck:
-    """Takes frames as they are handed over, and joints as they are read."""
+    """Receives frames and joint angles in the order of time."""
 
     def __init__(
         self, camera: CameraConfig, robot: RobotConfig, detector: OverheadDetector | None
@@ -86,10 +86,10 @@ class CameraCheck:
         self._looked_s = self._lined_s = -np.inf
         self._window = slice(None), slice(None)
         self.markers: Markers = {}
-        """Of the last picture that was looked at for them."""
+        """Markers of the last picture in which they were searched."""
 
     def add_frame(self, image: Image, time_s: float) -> None:
-        """Take a frame (H, W, 3) that was handed over at this time.
+        """Process a frame (H, W, 3) that was handed over at this time.
 
         Raises:
             InputError: it is not as large as the picture of the empty floor.
@@ -133,7 +133,7 @@ class CameraCheck:
         self._window = slice(int(top), int(below)), slice(int(left), int(right))
 
     def add_joints(self, time_s: float, joint_rad: Floats) -> None:
-        """Take joint angles (J,) that were read at this time."""
+        """Store joint angles (J,) that were read at this time."""
         self._joint_s.append(time_s)
         self._joint_rad.append(np.array(joint_rad, dtype=float))
 

@@ -1,4 +1,4 @@
-"""What a check of the overhead camera found, as the doctor writes it."""
+"""Results of a check of the overhead camera as findings, like those of the doctor."""
 
 from collections.abc import Mapping
 from typing import Final, Literal
@@ -109,7 +109,7 @@ def _bump(report: CameraReport) -> list[Finding]:
         return []
     if bump.undone and bump.away_px < _MOVED_PX and not bump.left_out:
         return [Finding("place", "ok", f"where it was, to {bump.away_px:.1f} px")]
-    remedy = "take the picture of the empty floor again"
+    remedy = "photograph the empty floor again"
     return [Finding("place", "warn" if bump.undone else "fail", str(bump), remedy)]
 
 
@@ -118,7 +118,7 @@ def _lock(name: str, state: Lock) -> Finding:
         return Finding(name, "ok", state)
     if state == "automatic":
         return Finding(name, "warn", state, "lock it, e.g. with v4l2-ctl: a robot changes it")
-    return Finding(name, "warn", "the camera does not tell", "see the light below")
+    return Finding(name, "warn", "the camera does not report it", "see the light below")
 
 
 def _light(report: CameraReport) -> Finding:

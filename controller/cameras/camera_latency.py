@@ -17,7 +17,7 @@ from snakewalk.controller.cameras.overhead_camera import LineDetection
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 
 _EARLIEST_S, _LATEST_S, _STEP_S = -0.1, 0.6, 0.005
-_PARTS: Final = 4  # of the record, whose latencies tell the error
+_PARTS: Final = 4  # of the record, whose latencies give the error
 _LEAST: Final = 30  # frames, and reads of the joints
 _LEAST_MOVED_RAD: Final = (
     0.03  # standard deviation of a heading: less is the picture's noise (ours)
@@ -33,7 +33,7 @@ class LatencyFit:
     error_s: float
     """Standard error, from parts of the record."""
     correlation: float
-    """Of the shapes' changes."""
+    """Correlation of the shapes' changes."""
     fault: str = ""
     """Why it must not be believed; empty where it may."""
 

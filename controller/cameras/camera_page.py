@@ -47,7 +47,7 @@ class CameraPage:
         self._ahead_s: float | None = None
 
     def on_frame(self, image: Image, check: CameraCheck, time_s: float) -> None:
-        """Take a frame; a simulated camera is held to the pace of a person's clock."""
+        """Process a frame; a simulated camera is held to the pace of a person's clock."""
         now_s = self._clock.now_s()
         if self._ahead_s is None:
             self._ahead_s = now_s - time_s

@@ -1,7 +1,7 @@
 """The head's pose from an overhead camera, carried from frame to frame by dead reckoning.
 
-A frame shows where the body was when it was taken; the joints' motion since then is added
-by dead reckoning. So the pose is a frame that drifts, placed anew in the world at each image.
+A frame shows where the body was when it was taken; the joints' motion since then is added by dead
+reckoning. So the pose is a frame that drifts, and each image sets its place in the world again.
 """
 
 from collections import deque
@@ -12,8 +12,10 @@ from typing import Protocol
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.floor_markers import Bump
+from snakewalk.controller.cameras.ground_rest import GroundRest, heights_of
 from snakewalk.controller.cameras.overhead_camera import LineDetection
 from snakewalk.controller.cameras.pose_fit import PoseFit, fit_both_ends
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
@@ -40,7 +42,7 @@ class Camera(Protocol):
     """Where frames come from, as detections."""
 
     def first(self) -> LineDetection:
-        """Take a frame now and wait for its detection; the body lies still."""
+        """Capture a frame and wait for its detection; the body lies still."""
         ...
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> Sequence[LineDetection | TrackedPose]:
@@ -70,7 +72,9 @@ class CameraPose:
         camera: Camera,
         reckoning: DeadReckoning,
         on_event: Callable[[str], None] = lambda text: None,
+        ground: HeightField | None = None,
     ) -> None:
+        self._rest = GroundRest(robot, heights_of(ground))
         self._robot, self._camera, self._reckoning, self._on_event = (
             robot,
             camera,
@@ -86,10 +90,10 @@ class CameraPose:
         self.frames = 0
         """Frames taken in so far."""
         self.used = 0
-        """Of these."""
+        """Number of these that were used."""
 
     def __call__(self, state: JointState) -> BodyPose:
-        """Advance to the state's time, and take in the frames that have arrived."""
+        """Advance to the state's time, and process the frames that have arrived."""
         odometry = self._reckoning(state)
         place = np.array([*odometry.head_in_world_m[:2], odometry.heading_rad])
         self._history.append(_Moment(state.time_s, place, np.array(state.position_rad)))
@@ -104,13 +108,15 @@ class CameraPose:
             else:
                 self._update(detection)
         self._report_gap(state.time_s)
-        return self._pose(_in_world(self._offset, place), state.time_s)
+        return self._rest.pose(
+            _in_world(self._offset, place), self._history[-1].joint_rad, state.time_s
+        )
 
     def _prior_at(self, time_s: float) -> BodyPrior | None:
         if self._gap:
             return None
         then = self._at(time_s)
-        believed = self._pose(_in_world(self._offset, then.place), time_s)
+        believed = self._rest.pose(_in_world(self._offset, then.place), then.joint_rad, time_s)
         body = body_in_world(self._robot, believed, then.joint_rad)
         return BodyPrior(body.link_m[:, :2], body.forward[:, :2])
 
@@ -140,7 +146,7 @@ class CameraPose:
         then = self._at(detection.time_s)
         fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
         if fit.error_m > MISFIT * self._robot.mean_link_length_m:
-            self._reason = f"what is seen lies {fit.error_m * 1e3:.0f} mm off the measured joints"
+            self._reason = f"the image lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
         self._place(detection.time_s, fit.head_m, fit.heading_rad)
 
@@ -177,11 +183,6 @@ class CameraPose:
                 if self._gap
                 else "the camera has the body again"
             )
-
-    def _pose(self, place: Floats, time_s: float) -> BodyPose:
-        c, s = np.cos(place[2]), np.sin(place[2])
-        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return BodyPose(time_s, np.array([*place[:2], self._robot.body_radius_m]), rotation)
 
 
 def _turned(point: Floats, by_rad: float) -> Floats:

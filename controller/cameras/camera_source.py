@@ -5,10 +5,11 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from snakewalk.config.camera import CameraConfig
+from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.world import FlatGround, WorldConfig
+from snakewalk.config.world import FlatGround, Water, WorldConfig
 from snakewalk.controller.cameras.camera_pose import CameraPose
 from snakewalk.controller.cameras.device_camera import DeviceCamera
 from snakewalk.controller.console.command import plugin
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 @plugin("pose", "camera")
 class OverheadCameraPose:
-    """A camera that looks down on a level floor."""
+    """A camera that looks down on known ground, level or not."""
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
@@ -29,14 +30,20 @@ class OverheadCameraPose:
         """Return why the camera cannot measure the pose here, one line per fault."""
         require_extra("pose: the overhead camera needs", "cv2", "skimage")
         faults = []
-        if not isinstance(world.ground, FlatGround) or world.obstacle is not None:
+        if isinstance(world.ground, Water) or world.obstacle is not None:
             faults.append(
-                f"pose: the overhead camera needs a bare level floor; world {world.name} has none"
+                f"pose: the overhead camera needs dry ground without obstacles; world {world.name} "
+                "has water or an obstacle"
+            )
+        elif not isinstance(world.ground, FlatGround) and run.mapping is not None:
+            faults.append(
+                "pose: the overhead camera needs known ground; leave --map stereo out, or use "
+                "--pose tags"
             )
         if run.motion == "gait" and robot.pitch_joints:
             faults.append(
-                f"pose: the overhead camera takes the body to lie flat; a gait of {robot.name} "
-                "lifts or rolls it"
+                "pose: the overhead camera assumes that the body lies flat, and gaits of "
+                f"{robot.name} lift or roll it; choose another pose source"
             )
         if run.camera.height_m <= 4.0 * robot.body_radius_m:
             faults.append("camera: height_m: the lens must be well above the robot")
@@ -59,7 +66,11 @@ class OverheadCameraPose:
         robot = context.prepared.robot
         with closing(_camera(context)) as device:
             measure = CameraPose(
-                robot, device, context.reckoning, lambda text: context.on_event("camera", text)
+                robot,
+                device,
+                context.reckoning,
+                lambda text: context.on_event("camera", text),
+                context.prepared.ground,
             )
             yield PoseProvider(
                 measure, lambda: {"frames": measure.frames, "frames_used": measure.used}
@@ -68,13 +79,24 @@ class OverheadCameraPose:
 
 def _camera(context: PoseContext) -> "RenderedCamera | DeviceCamera":
     prepared, backend = context.prepared, context.backend
-    run, robot = prepared.run, prepared.robot
+    run, robot, ground = prepared.run, prepared.robot, prepared.ground
+    if ground is not None and float(ground.z_m.max()) > 0.8 * run.camera.height_m:
+        raise InputError(
+            f"camera: height_m: {run.camera.height_m:g} m above height 0 of the world, whose "
+            f"ground rises to {float(ground.z_m.max()):.2f} m; raise the camera"
+        )
     if backend.qpos is None:
-        return DeviceCamera(run, robot, backend.clock, context.on_picture)
+        return DeviceCamera(run, robot, backend.clock, context.on_picture, prepared.ground)
     from snakewalk.controller.cameras.rendered_camera import RenderedCamera  # noqa: PLC0415  simulator: an extra
 
     return RenderedCamera(
-        run, robot, prepared.world, backend.qpos, backend.clock, context.on_picture
+        run,
+        robot,
+        prepared.world,
+        backend.qpos,
+        backend.clock,
+        context.on_picture,
+        prepared.ground,
     )
 
 

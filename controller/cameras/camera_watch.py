@@ -1,4 +1,4 @@
-"""Frames of the overhead camera, and the joints beside them, while it is checked.
+"""Frames of the overhead camera, and the joints at the same time, during a check.
 
 On a port the joints are only read: torque stays as it is, and a person turns a joint. The simulated
 robot wiggles by itself.
@@ -33,14 +33,14 @@ _WIGGLE_RAD: Final = 0.25
 _WIGGLE_HZ: Final = 0.6, 0.97  # two that never come together: one delay fits, not a period later
 _JOINTS: Final = 3  # at the head, that wiggle
 _RAMP_S: Final = 0.5
-_READS_HZ: Final = 50.0  # of the joints, beside a real camera
+_READS_HZ: Final = 50.0  # of the joints, with a real camera
 
 OnFrame = Callable[[Image, CameraCheck, float], None]
 """(H, W, 3) red, green, blue; the check so far; time (s)."""
 
 
 def nobody(image: Image, check: CameraCheck, time_s: float) -> None:
-    """Take a frame that nobody looks at."""
+    """Ignore a frame."""
 
 
 class CameraWatch:
@@ -59,7 +59,7 @@ class CameraWatch:
         """
         self._prepared, self._port, self._camera = prepared, port, prepared.run.camera
         self.locks: dict[str, Lock] = {}
-        """Of exposure and white balance, after ``check``."""
+        """Locks of exposure and white balance, after ``check``."""
         if self._camera.device is None and port is not None:
             raise InputError("--port: a simulated camera does not see real servos: name --device")
 
@@ -91,13 +91,14 @@ class CameraWatch:
         robot = prepared.robot
         self.locks = {"exposure": "locked", "white balance": "locked"}
         pose = prepared.initial_pose()
-        backend = simulated(run, robot, prepared.world, None, pose)
+        backend = simulated(run, robot, prepared.world, prepared.ground, pose)
         chain, clock, qpos = backend.chain, backend.clock, backend.qpos
         if qpos is None:
             raise AssertionError("the simulator knows its coordinates")
-        with closing(top_view(run, robot, prepared.world)) as view:
-            ground = view.empty_floor()
-            check = CameraCheck(camera, robot, rendered_detector(run, robot, ground))
+        with closing(top_view(run, robot, prepared.world, prepared.ground)) as view:
+            floor = view.empty_floor()
+            detector = rendered_detector(run, robot, floor, prepared.ground)
+            check = CameraCheck(camera, robot, detector)
             begin = chain.enable()
             goal, begin_s, cycles = begin.position_rad, clock.now_s(), 0
             next_s, coming = begin_s, list[tuple[float, Image]]()
@@ -120,7 +121,8 @@ class CameraWatch:
 
     def _real(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
         run, robot, camera = self._prepared.run, self._prepared.robot, self._camera
-        detector = None if camera.background is None else overhead_detector(run, robot)
+        ground = self._prepared.ground
+        detector = None if camera.background is None else overhead_detector(run, robot, ground)
         check = CameraCheck(camera, robot, detector)
         with ExitStack() as stack:
             chain = None
@@ -173,7 +175,7 @@ class CameraWatch:
 
 
 def device_locks(device: cv2.VideoCapture) -> dict[str, Lock]:
-    """Whether exposure and white balance are locked, where Video4Linux tells it."""
+    """Whether exposure and white balance are locked, if Video4Linux reports it."""
     if device.getBackendName() != "V4L2":
         return {"exposure": "not told", "white balance": "not told"}
     exposure: dict[float, Lock] = {1.0: "locked", 0.0: "automatic", 3.0: "automatic"}

@@ -1,10 +1,11 @@
-"""A real overhead camera: a thread that takes frames, looks at them, and keeps what it saw.
+"""A real overhead camera: a thread captures frames, processes them, and keeps the results.
 
-Looking takes longer than a cycle of the loop may, so it is done beside it.
+Processing is longer than a cycle of the loop may be, so it runs in parallel.
 """
 
 import queue
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.cameras.camera_frames import (
@@ -24,6 +26,7 @@ from snakewalk.controller.cameras.camera_frames import (
 )
 from snakewalk.controller.cameras.camera_pose import PriorAt
 from snakewalk.controller.cameras.floor_learning import FloorLearning
+from snakewalk.controller.cameras.ground_rest import heights_of
 from snakewalk.controller.cameras.lens import Lens
 from snakewalk.controller.cameras.overhead_camera import (
     CameraModel,
@@ -37,11 +40,11 @@ from snakewalk.drivers.clock import Clock
 PATIENCE_S = 5.0
 """How long the first frame is waited for."""
 ANSWER_S = 0.1
-"""How long the loop may take to say where the body is believed to be."""
+"""Longest time until the loop states the expected place of the body."""
 
 
 class DeviceCamera:
-    """What OpenCV opens under ``camera.device``; ``close`` it.
+    """The camera that OpenCV opens under ``camera.device``; ``close`` it.
 
     A frame is dated ``latency_s`` before it has been handed over.
 
@@ -56,11 +59,12 @@ class DeviceCamera:
         robot: RobotConfig,
         clock: Clock,
         on_picture: OnPicture = lambda picture, time_s: None,
+        ground: HeightField | None = None,
     ) -> None:
-        """Open it; ``on_picture`` is called from the thread that takes the frames."""
+        """Open it; ``on_picture`` is called from the thread that captures the frames."""
         camera = run.camera
         self._clock, self._on_picture = clock, on_picture
-        self.detector = overhead_detector(run, robot)
+        self.detector = overhead_detector(run, robot, ground)
         self._name, self._latency_s = f"camera {camera.device}", camera.latency_s
         self._device = open_device(camera)
         self._robot = robot
@@ -76,7 +80,7 @@ class DeviceCamera:
         self._thread.start()
         try:
             self.start = self.first()
-            """What the camera saw first."""
+            """First detection of the camera."""
             require_whole_body(self.start, self._name)
         except InputError:
             self.close()
@@ -159,8 +163,10 @@ class DeviceCamera:
                 return
 
 
-def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
-    """Build the detector of a real camera from its table in the run.
+def overhead_detector(
+    run: RunConfig, robot: RobotConfig, ground: HeightField | None = None
+) -> OverheadDetector:
+    """Build the detector of a real camera from its table in the run, above known ground.
 
     Raises:
         InputError: no background image, of another size, no lens in its file, or corners or
@@ -168,10 +174,10 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
 
     """
     camera = run.camera
-    ground = in_colour(read_image(Path(camera.background or "")))
-    if ground.shape[:2] != (camera.height_px, camera.width_px):
+    floor = in_colour(read_image(Path(camera.background or "")))
+    if floor.shape[:2] != (camera.height_px, camera.width_px):
         raise InputError(
-            f"{camera.background}: is {ground.shape[1]} x {ground.shape[0]} pixels, the camera "
+            f"{camera.background}: is {floor.shape[1]} x {floor.shape[0]} pixels, the camera "
             f"{camera.width_px} x {camera.height_px}"
         )
     lens = None if camera.lens is None else Lens.read(Path(camera.lens))
@@ -183,15 +189,16 @@ def overhead_detector(run: RunConfig, robot: RobotConfig) -> OverheadDetector:
     if camera.corners_px is not None:
         model = CameraModel.from_corners(camera, centre_of(run), lens)
     else:
-        model = CameraModel.of_floor(camera, centre_of(run), lens, ground)
-    return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
+        model = CameraModel.of_floor(camera, centre_of(run), lens, floor)
+    model = replace(model, heights=heights_of(ground))
+    return OverheadDetector(model, floor, robot.body_radius_m, camera.shade)
 
 
 def open_device(camera: CameraConfig) -> cv2.VideoCapture:
     """Open the camera in the wanted size and rate.
 
     Raises:
-        InputError: there is none.
+        InputError: the camera does not exist.
 
     """
     name = camera.device or ""

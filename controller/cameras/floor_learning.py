@@ -1,8 +1,8 @@
-"""The floor as it becomes in time: what stays beside the robot is floor after a while.
+"""Learning of the floor: an object that stays next to the robot becomes floor after a while.
 
-A running estimate outside of the body, of frames whose pose is used and fits well. Where the body
-is, and near to it, nothing is learnt however long it stands there; nor is anything while it is lost
-or ill seen, so that a pose that is wrong cannot make the robot itself a part of the floor.
+A running estimate outside of the body, of frames whose pose is used and fits well. At the body and
+near to it nothing is learnt however long it stays there. Nothing is learnt either while it is lost
+or badly seen, so that a wrong pose cannot make the robot a part of the floor.
 """
 
 from dataclasses import replace

@@ -1,8 +1,8 @@
 """The light on a floor, and what is not explained by it.
 
 The ratio of a frame to the picture of the empty floor is smooth or has edges (gain, a gradient, a
-patch of sun), and the robot is thin: the median of the ratio over a square of twice the body's area
-never shows the body.
+patch of sun), and the robot is thin. So the median of the ratio over a square of twice the body's
+area never shows the body.
 """
 
 from typing import Final
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Image
 
-_ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is told
+_ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is measured
 _DARKEST: Final = np.uint8(8)  # grey levels: a ratio to less than this says nothing
 _GLARE: Final = 0.3  # by how much light may grow beyond that of the surroundings: soft edges (ours)
 _COARSE: Final = 4  # pixels of a frame a pixel of its wide light
@@ -35,8 +35,8 @@ def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
 def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
     """(H, W[, 3]) a frame as the light of its floor's picture would show it.
 
-    Light is here what a square of a third of the picture's width has in common, told on a smaller
-    picture: what is smaller than half of it is no light.
+    Light here means the common change of a square of a third of the picture's width, computed on a
+    smaller picture: a change over less than half of it does not count as light.
     """
     size = image.shape[1], image.shape[0]
     small = max(size[0] // _COARSE, 1), max(size[1] // _COARSE, 1)

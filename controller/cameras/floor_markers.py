@@ -1,4 +1,4 @@
-"""Printed markers on the floor: found in a picture, what they say of the floor, and of a bump.
+"""Printed markers on the floor: found in a picture; they give the floor, and show a bump.
 
 A marker is a square of ArUco's smallest dictionary: at 16 px of side one of its cells has 2.7 px.
 """
@@ -21,14 +21,16 @@ COUNT: Final = 50
 FEWEST: Final = 4
 """Markers that fix a floor."""
 _CELLS: Final = 6  # across a marker, its black border included
-_LARGER: Final = 2  # markers are looked for in a picture so many times larger: cells of 2 px (ours)
+_LARGER: Final = (
+    2  # markers are searched in a picture enlarged by this factor: cells of 2 px (ours)
+)
 _INCH_M: Final = 0.0254
 _DRAWN: Final = 6, 24  # px of a cell of the print that is laid onto a picture, least and most
 _STEPS: Final = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-4
 _SMOOTH: Final = 3  # px of the smoothing before a print is laid onto a picture
 _FURTHEST: Final = 0.5  # of a cell: by how much a corner may be bettered (ours)
 _AGREE_PX: Final = 1.5  # largest residual of a marker that moved with the picture (ours)
-_FEWEST_MOVED: Final = 3  # markers seen before and now that tell how the picture moved
+_FEWEST_MOVED: Final = 3  # markers seen before and now that give the move of the picture
 _TURNED_PX: Final = 0.5  # largest residual of a camera that was only turned (ours)
 _LEAST_SPREAD: Final = 0.05  # of markers' places: less, and they lie on a line
 Markers = Mapping[int, Floats]
@@ -62,11 +64,11 @@ class Bump:
     shift_px: tuple[float, float]
     """x, y: of the picture's middle."""
     turn_rad: float = 0.0
-    """Of the picture, clockwise as it is looked at."""
+    """Turn of the picture, clockwise for the viewer."""
     left_out: tuple[int, ...] = ()
     """Markers that did not move with the others: they were moved on the floor."""
     undone: bool = True
-    """Whether the pose takes it into account; else no pose is told any more."""
+    """Whether the pose accounts for it; else no more poses are returned."""
 
     @property
     def away_px(self) -> float:
@@ -74,11 +76,11 @@ class Bump:
         return float(np.hypot(*self.shift_px))
 
     def __str__(self) -> str:
-        """What happened, in a sentence."""
+        """Description of the event."""
         if not self.undone:
             return (
-                f"the floor's markers lie about {self.away_px:.1f} px from where they were, each "
-                "in its own way: camera or markers were moved; set the camera up anew"
+                f"floor markers: lie about {self.away_px:.1f} px from their places, each in "
+                "another direction, so camera or markers moved; set the camera up again"
             )
         said = []
         if self.away_px >= 0.05 or abs(self.turn_rad) > 1e-3:
@@ -129,7 +131,7 @@ def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
 
 
 def find_markers(picture: Image) -> dict[int, Floats]:
-    """Corners of the markers in a picture (H, W[, 3]); one that is seen twice is none."""
+    """Corners of the markers in a picture (H, W[, 3]), except those that are seen twice."""
     grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     large = cv2.resize(grey, None, fx=_LARGER, fy=_LARGER, interpolation=cv2.INTER_CUBIC)
     corners, numbers, _ = cv2.aruco.ArucoDetector(_dictionary()).detectMarkers(large)
@@ -222,8 +224,8 @@ def picture_move(
 ) -> PictureMove | None:
     """How a camera's picture has moved, by markers that are seen in both.
 
-    A bump turns the camera about its lens, or carries it by a little. Markers that are off from
-    what the others say were moved on the floor; fewer than half may be.
+    A bump turns the camera about its lens, or carries it by a little. Markers that disagree with
+    the others were moved on the floor; fewer than half may be.
 
     Args:
         then: at the set-up.
@@ -288,7 +290,7 @@ def _without(name: int, matrix: Floats, one: Markers, two: Markers, names: Seque
 
 
 def _residual_px(move: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
-    """Of the marker that is furthest off."""
+    """Residual of the marker that is furthest off."""
     return max(
         float(np.hypot(*(projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
     )

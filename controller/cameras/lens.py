@@ -60,7 +60,8 @@ class Lens:
         """Read the file of ``snakewalk camera calibrate``, or another of OpenCV's calibration.
 
         Raises:
-            InputError: there is none, it is of another kind, or its numbers describe no lens.
+            InputError: it does not exist, is of another kind, or its numbers do not describe a
+                lens.
 
         """
         if file.suffix.lower() not in _ENDINGS:
@@ -75,7 +76,9 @@ class Lens:
             held = [store.getNode(name).mat() for name in names]
             store.release()
         except (cv2.error, SystemError) as error:
-            raise InputError(f"{file}: is no file of OpenCV's FileStorage: {error}") from None
+            raise InputError(
+                f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
+            ) from None
         faults = [
             f"{file}: holds no {name}" for name, value in zip(names, held, strict=True)
             if value is None

@@ -15,12 +15,12 @@ from snakewalk.controller.cameras.lens import Lens
 FEWEST_VIEWS: Final = 5
 _OUTLIER: Final = 3.0  # times the usual view's residual: a blurred or misread picture (ours)
 _CELLS: Final = 6  # each way, in which corners are counted
-_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, where alone k3 can be told
+_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, which alone determine k3
 
 
 @dataclass(frozen=True, slots=True)
 class LensCalibration:
-    """A lens, and what its pictures say of it."""
+    """A lens, and the quality of its pictures."""
 
     lens: Lens
     rms_px: float
@@ -38,13 +38,13 @@ class LensCalibration:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What would make it better; empty where nothing stands out."""
+        """Proposals for improvement; empty if all is well."""
         focal = float(self.lens.matrix[0, 0])
         found = []
         if self.rms_px > 1.0:
             found.append(
-                f"the residual of {self.rms_px:.2f} px is large: is the board flat, are the "
-                "squares as told, are the pictures sharp?"
+                f"the residual of {self.rms_px:.2f} px is large; check that the board is flat, "
+                "the size of its squares, and the focus"
             )
         if self.coverage < 0.6:
             found.append(
@@ -53,8 +53,8 @@ class LensCalibration:
             )
         if self.tilt_deg < 15.0:
             found.append(
-                f"the board was never tilted by more than {self.tilt_deg:.0f} degrees: without "
-                "tilt, distance and focal length are hard to tell apart"
+                f"the board was never tilted by more than {self.tilt_deg:.0f} degrees, which "
+                "does not separate distance from focal length; tilt it more"
             )
         if self.focal_error_px > 0.01 * focal:
             found.append(
@@ -77,8 +77,8 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
     used = {k: view for k, view in enumerate(views) if view is not None}
     if len(used) < FEWEST_VIEWS:
         raise InputError(
-            f"the board was found in {len(used)} of {len(views)} pictures; {FEWEST_VIEWS} are "
-            "needed, better 15: is it the board that was told (pattern, squares), sharp and lit?"
+            f"the board was found in {len(used)} of {len(views)} pictures, {FEWEST_VIEWS} are "
+            "needed and 15 are better; check pattern, squares, focus and light"
         )
     while True:
         found = _calibrated(used, size_px, len(views))

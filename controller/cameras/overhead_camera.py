@@ -1,8 +1,8 @@
 """A camera above the floor: from a frame to the body's line in the world.
 
-The floor maps to the image by one homography. The image shows the body's outline, which lies
-as high as its axis; seen from a lens at height ``h`` above the foot ``f``, a point at height ``z``
-covers the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is undone.
+The floor maps to the image by one homography. The image shows the body's outline, which lies as
+high as its axis. From a lens at height ``h`` above the foot ``f``, a point at height ``z`` covers
+the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is undone.
 """
 
 from collections.abc import Callable
@@ -26,6 +26,7 @@ from snakewalk.controller.cameras.floor_markers import (
     fit_floor,
     picture_move,
 )
+from snakewalk.controller.cameras.ground_rest import Heights
 from snakewalk.controller.cameras.lens import Lens, projected
 from snakewalk.controller.cameras.pose_tracking import (
     REACH_M,
@@ -40,13 +41,15 @@ from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _SURROUNDINGS = 0.25  # of the picture's width: the square in which the body is a small part
-_CALM_PX = 200  # fewest pixels away from the body that tell the noise
+_CALM_PX = 200  # fewest pixels away from the body that give the noise
 _MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
-_HALF = 2  # the floor is matched on a picture so many times smaller
+_HALF = 2  # the floor is matched on a picture smaller by this factor
 _PARTS = 6, 4  # of a picture, across and down
-_BETTER = 0.8  # of the square of what is left in a part, where a move explains it (ours)
+_BETTER = 0.8  # share of the squared residual of a part, if a move explains it (ours)
 _LEAST_PARTS = 3
 _LIKE = 0.2  # correlation of two pictures of the floor, noise and robot included (ours)
+_SURFACE_ROUNDS = 6
+"""Rounds in which the ray of a pixel meets the ground: on 30 degrees each leaves a third (ours)."""
 MISPLACED_M = 0.03
 """A marker that lies further from its measured place fixes no floor (ours)."""
 _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
@@ -61,13 +64,15 @@ class CameraModel:
     foot_m: Floats
     """(2,) floor below the lens."""
     height_m: float
-    """Of the lens above the floor."""
+    """Height of the lens above the floor."""
     lens: Lens | None = None
     """Where it distorts, the homography is of pixels without distortion."""
     moved_px: tuple[float, float] = (0.0, 0.0)
     """x, y by which the picture has moved since the homography was measured."""
     markers: Markers = field(default_factory=dict)
     """Printed markers in the picture in which the homography was measured."""
+    heights: Heights | None = None
+    """Heights of known ground above the floor of the homography; None: the ground is that floor."""
 
     @classmethod
     def of_floor(
@@ -172,21 +177,30 @@ class CameraModel:
         return np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
 
     def on_plane(self, points_px: Floats, z_m: float) -> Floats:
-        """(..., 2) world places of pixels (..., 2) of what is ``z_m`` above the floor."""
+        """(..., 2) world places of pixels (..., 2) of points that are ``z_m`` above the ground."""
         plain = points_px - self.moved_px
         if self.lens is not None:
             plain = self.lens.undistorted(plain)
         floor = projected(self.floor_from_px, plain)
-        return np.asarray(self.foot_m + (floor - self.foot_m) * (1.0 - z_m / self.height_m))
+        out_m = floor - self.foot_m
+        places = self.foot_m + out_m * (1.0 - z_m / self.height_m)
+        if self.heights is None:
+            return np.asarray(places)
+        for _ in range(_SURFACE_ROUNDS):  # the ray of the pixel meets the ground
+            share = 1.0 - (self.heights(places) + z_m) / self.height_m
+            places = self.foot_m + out_m * share[..., None]
+        return np.asarray(places)
 
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
-        """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the floor."""
+        """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the ground."""
         return self.projection(z_m)(points_m)
 
     def projection(self, z_m: float) -> Callable[[Floats], Floats]:
         """``in_image`` of one height, for many calls."""
+        if self.heights is not None:
+            return self._projection_on(self.heights, z_m)
         grow = 1.0 / (1.0 - z_m / self.height_m)
-        onto_floor = np.diag([grow, grow, 1.0])  # what is higher covers the floor further out
+        onto_floor = np.diag([grow, grow, 1.0])  # a higher point covers the floor further out
         onto_floor[:2, 2] = self.foot_m * (1.0 - grow)
         back = np.asarray(np.linalg.inv(self.floor_from_px) @ onto_floor, dtype=float)
         lens, moved_px = self.lens, np.array(self.moved_px)
@@ -194,6 +208,19 @@ class CameraModel:
         def project(points_m: Floats) -> Floats:
             plain = projected(back, points_m)
             return np.asarray((plain if lens is None else lens.distorted(plain)) + moved_px)
+
+        return project
+
+    def _projection_on(self, heights: Heights, z_m: float) -> Callable[[Floats], Floats]:
+        """Return the same for places on uneven ground."""
+        back = np.linalg.inv(self.floor_from_px)
+        moved_px = np.array(self.moved_px)
+
+        def project(points_m: Floats) -> Floats:
+            share = 1.0 - (heights(points_m) + z_m) / self.height_m
+            plain = projected(back, self.foot_m + (points_m - self.foot_m) / share[..., None])
+            distorted = plain if self.lens is None else self.lens.distorted(plain)
+            return np.asarray(distorted + moved_px)
 
         return project
 
@@ -212,20 +239,21 @@ class LineDetection:
 
 @dataclass(frozen=True, slots=True)
 class OverheadDetector:
-    """Camera, empty floor and height of the body's axis; ``detect`` takes any frame."""
+    """Camera, empty floor and height of the body's axis; ``detect`` accepts any frame."""
 
     model: CameraModel
     background: Image
     axis_height_m: float
     shade: float = 0.0
-    """Part of the floor's light that the body's shadow may take: so much darker is still floor."""
+    """Largest share of the floor's light that the body's shadow removes: a pixel that is darker by
+    less is still floor."""
     bump: Bump | None = None
-    """Of the camera since its floor was pictured."""
+    """Bump of the camera since its floor was pictured."""
     first: Self | None = None
     """As it was before any bump that markers showed."""
     pictured: Image | None = None
-    """The floor as it was pictured, where ``background`` has been learnt since: what was put down
-    may be taken away again, and either is floor."""
+    """The floor as it was pictured, if ``background`` has been learnt since: an object may be
+    removed again, and either picture is floor."""
 
     def detect(self, image: Image, time_s: float) -> LineDetection:
         """Find the body in one frame (H, W[, 3]).
@@ -241,8 +269,8 @@ class OverheadDetector:
     def registered(self, image: Image) -> Self:
         """Return the detector for a camera that was bumped; itself where the floor has not moved.
 
-        Printed markers tell turns and tilts as well. Without three of them in view the floor's own
-        texture is matched: tiles, joints. A floor without any tells nothing.
+        Printed markers also measure turns and tilts. Without three of them in view the floor's own
+        texture is matched: tiles, joints. A floor without texture gives no result.
 
         Raises:
             InputError: the frame is not as large as the background.
@@ -295,8 +323,8 @@ class OverheadDetector:
     def _moved_by_texture(self, image: Image) -> Self:
         """The shift under which the floor's own texture lies best.
 
-        What moves in the picture covers parts of it; so the move must explain three parts more than
-        it spoils.
+        Moving objects cover parts of the picture, so the move must explain three parts more than it
+        spoils.
         """
         floor, now = (_texture(one) for one in (self.background, image))
         far = _FURTHEST_PX // _HALF

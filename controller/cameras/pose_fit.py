@@ -1,7 +1,7 @@
 """The pose of a chain of known shape from the detected line of its body.
 
-The joints are measured, so only place and heading are open: the link centres by forward kinematics
-are fitted to the detected line by Procrustes' rigid fit, evenly spaced from its middle, which
+The joints are measured, so only place and heading are open. The link centres by forward kinematics
+are fitted to the detected line by Procrustes' rigid fit, evenly spaced from its middle. The middle
 may shift a little: a tip that is hidden or sticks out moves it.
 """
 
@@ -29,7 +29,7 @@ class PoseFit:
     head_m: Floats
     """(2,) centre of the head link."""
     heading_rad: float
-    """Of the head link, in (-pi, pi]."""
+    """Heading of the head link, in (-pi, pi]."""
     links_m: Floats
     """(L, 2) centres of the links as fitted."""
     error_m: float

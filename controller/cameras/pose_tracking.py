@@ -1,8 +1,9 @@
 """The pose of a chain of known shape in a frame, near to where it must be.
 
-The joints are measured and the last pose is known, so the chain is looked for as a whole: first its
-axis on a ridge filter of what stands out from the floor, then, section by section across the body,
-the middle of what stands out there, fitted rigidly. Only what lies near the body is looked at.
+The joints are measured and the last pose is known, so the search is for the complete chain. First
+its axis is fitted on a ridge filter of the difference from the floor. Then, section by section
+across the body, the middle of the difference is fitted rigidly. Only what lies near the body is
+looked at.
 """
 
 from collections.abc import Callable
@@ -35,7 +36,7 @@ _LEAST_SEEN: Final = 0.7  # of the sections
 _LEAST_HALF: Final = 0.5  # of those of each half of the body
 _OFF: Final = 0.3  # of the radius: largest residual of a fit that is believed
 _TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
-_THIN, _THICK = 0.2, 1.5  # of the body's width: what a section may hold
+_THIN, _THICK = 0.2, 1.5  # of the body's width: limits of the content of a section
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,25 +51,25 @@ class BodyPrior:
 
 @dataclass(frozen=True, slots=True)
 class TrackedPose:
-    """What a frame says of a believed pose."""
+    """Result of a frame for an expected pose."""
 
     time_s: float
     """When the image was taken."""
     head_m: Floats
     """(2,) centre of the head link."""
     heading_rad: float
-    """Of the head link, in (-pi, pi]."""
+    """Heading of the head link, in (-pi, pi]."""
     error_m: float
     """Root of the mean square distance of the sections' middles from the chain."""
     fault: str
     """Why it must not be used; empty where it may."""
     bump: Bump | None = None
-    """Of the camera since it was set up."""
+    """Bump of the camera since it was set up."""
 
 
 @dataclass(frozen=True, slots=True)
 class StandingOut:
-    """What stands out from the floor in a window of a frame."""
+    """Difference from the floor in a window of a frame."""
 
     share: NDArray[np.float32]
     """(h, w) 0: floor, 1: as much as the body."""
@@ -236,7 +237,7 @@ def _section_spots(here: Floats, forward: Floats, wide_m: float) -> tuple[Floats
 
 
 def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]]:
-    """How far left (S,) of the chain the middle of what stands out lies, and where that is told."""
+    """Offset (S,) of the middle of the difference to the left of the chain, and its validity."""
     held = value.sum(axis=1)
     width = held * (off[1] - off[0]) / (2.0 * radius_m)
     told = (width > _THIN) & (width < _THICK)
@@ -283,11 +284,11 @@ def _fault(
     if share < _LEAST_SEEN or least < _LEAST_HALF:
         return f"{100.0 * share:.0f} % of the body is seen where it must be"
     if error_m > _OFF * robot.body_radius_m:
-        return f"what is seen lies {error_m * 1e3:.0f} mm off the measured joints"
+        return f"the image lies {error_m * 1e3:.0f} mm off the measured joints"
     if not ends.any():
         return "neither tip of the body is seen"
     if float(np.abs(along[ends]).max()) > _TIP_OFF * robot.body_radius_m:
         return "a tip of the body is not where it must be"
     if float(np.hypot(*shift)) > 1.4 * REACH_M:
-        return "what is seen lies too far from where the body must be"
+        return "the image lies too far from the possible places of the body"
     return ""

@@ -2,11 +2,13 @@
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
@@ -19,6 +21,7 @@ from snakewalk.controller.cameras.camera_frames import (
 from snakewalk.controller.cameras.camera_pose import PriorAt
 from snakewalk.controller.cameras.floor_learning import FloorLearning
 from snakewalk.controller.cameras.floor_markers import marker_picture
+from snakewalk.controller.cameras.ground_rest import heights_of
 from snakewalk.controller.cameras.overhead_camera import (
     CameraModel,
     LineDetection,
@@ -41,13 +44,17 @@ def floor_prints(camera: CameraConfig) -> list[FloorPrint]:
     return found
 
 
-def top_view(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> TopView:
+def top_view(
+    run: RunConfig, robot: RobotConfig, world: WorldConfig, ground: HeightField | None = None
+) -> TopView:
     """Return the view of the simulator's camera."""
     camera = run.camera
-    return TopView(robot, world, camera, centre_of(run), run.seed, floor_prints(camera))
+    return TopView(robot, world, camera, centre_of(run), run.seed, floor_prints(camera), ground)
 
 
-def rendered_detector(run: RunConfig, robot: RobotConfig, ground: Image) -> OverheadDetector:
+def rendered_detector(
+    run: RunConfig, robot: RobotConfig, floor: Image, ground: HeightField | None = None
+) -> OverheadDetector:
     """Build the detector of the simulator's camera from its picture (H, W, 3) of the empty floor.
 
     Raises:
@@ -55,8 +62,9 @@ def rendered_detector(run: RunConfig, robot: RobotConfig, ground: Image) -> Over
 
     """
     camera = run.camera
-    model = CameraModel.of_floor(camera, centre_of(run), None, ground)
-    return OverheadDetector(model, ground, robot.body_radius_m, camera.shade)
+    model = CameraModel.of_floor(camera, centre_of(run), None, floor)
+    model = replace(model, heights=heights_of(ground))
+    return OverheadDetector(model, floor, robot.body_radius_m, camera.shade)
 
 
 class RenderedCamera:
@@ -77,9 +85,10 @@ class RenderedCamera:
         qpos: Callable[[], Floats],
         clock: Clock,
         on_picture: OnPicture = lambda picture, time_s: None,
+        ground: HeightField | None = None,
     ) -> None:
-        self._view = top_view(run, robot, world)
-        self.detector = rendered_detector(run, robot, self._view.empty_floor())
+        self._view = top_view(run, robot, world, ground)
+        self.detector = rendered_detector(run, robot, self._view.empty_floor(), ground)
         self._qpos, self._clock, self._on_picture = qpos, clock, on_picture
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()
@@ -94,7 +103,7 @@ class RenderedCamera:
         return self._detect(self._clock.now_s())
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
-        """Take a frame if one is due; return those that have arrived."""
+        """Capture a frame if one is due; return those that have arrived."""
         if now_s >= self._next_s - 1e-9:
             self._coming.append(self._track(now_s, prior_at(now_s)))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)

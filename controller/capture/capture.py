@@ -16,14 +16,17 @@ from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, 
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
-from snakewalk.controller.capture.small_body.film_fit import fit_film
-from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.capture.small_body.film_fit import fit_film, with_least_errors
+from snakewalk.controller.capture.verification.film_check import verified
+from snakewalk.controller.capture.verification.frame_store import FrameStore
+from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _LOST_FRAMES = 5  # for so many frames a lost small body is searched where it was last
 _OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
+_FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
 _STILL = 0.02  # of the length: less change than that is no motion
 
 
@@ -52,6 +55,8 @@ class Capture:
     """How the head was told from the tail: ``given``, ``travel``, ``wave`` or ``taper``."""
     head_sure: float
     """How surely, 0 to 1."""
+    places_recorded: bool = True
+    """Whether the points of all frames share one origin; images cropped to the animal have none."""
 
     @property
     def good(self) -> Bools:
@@ -119,22 +124,28 @@ def capture(
     expected = np.where(solved, coils.expected_px, found.expected_px)
     crops = {k: crop for k, crop in found.crops.items() if not solved[k]}
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
+    fitted = with_least_errors(fitted, found.faint_error_px)
+    skeletons = verified(fitted.skeletons, found.store)
+    if sum(one.status.has_points for one in skeletons) < 2:
+        raise InputError(f"{name}: {_fault(skeletons)}")
     usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
     expected = fitted.expected_px.copy()
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
+    expected[[not one.status.has_points for one in skeletons]] = np.nan
     return Capture(
-        points_px=np.stack([one.points_px for one in fitted.skeletons]),
-        radius_px=np.stack([one.radius_px for one in fitted.skeletons]),
-        length_px=np.array([one.length_px for one in fitted.skeletons]),
-        status=tuple(one.status for one in fitted.skeletons),
+        points_px=np.stack([one.points_px for one in skeletons]),
+        radius_px=np.stack([one.radius_px for one in skeletons]),
+        length_px=np.array([one.length_px for one in skeletons]),
+        status=tuple(one.status for one in skeletons),
         expected_px=expected,
         distractors=np.array(found.distractors),
-        margin=margins(fitted.skeletons),
+        margin=margins(skeletons),
         rate_hz=rate_hz,
         time_s=np.arange(len(points)) / rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
+        places_recorded=fixed,
     )
 
 
@@ -166,7 +177,7 @@ def save_capture(path: Path, held: CaptureFile) -> None:
     Of every frame, used or not: ``verdict`` (T,) its status in words, ``points_px`` (T, 101, 2) as
     in the image, ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,),
     ``expected_px`` (T,), the error of a point, ``company`` (T,), the size of the next largest
-    object. Once: ``m_per_px`` (NaN: no scale), ``head_by``, ``head_sure``.
+    object. Once: ``m_per_px`` (NaN: no scale), ``head_by``, ``head_sure``, ``places_recorded``.
     """
     captured = held.captured
     scale = 1.0 if held.m_per_px is None else held.m_per_px
@@ -192,6 +203,7 @@ def save_capture(path: Path, held: CaptureFile) -> None:
             m_per_px=np.nan if held.m_per_px is None else held.m_per_px,
             head_by=captured.head_by,
             head_sure=captured.head_sure,
+            places_recorded=captured.places_recorded,
         )
 
 
@@ -224,7 +236,10 @@ def load_capture(path: Path) -> CaptureFile:
         and {"name", "source", "licence", "head_by"} <= held.keys()
     )
     if not whole:
-        raise InputError(f"{path}: is no track that `capture` wrote: it lacks data of the frames")
+        raise InputError(
+            f"{path}: is not a track that `capture` wrote: data of its frames are "
+            "missing; choose another file"
+        )
     scale, rate_hz = float(held["m_per_px"]), float(held["rate_hz"])
     even_s = np.arange(frames) / rate_hz  # files of before held no times
     time_s = np.asarray(held.get("time_s", even_s), dtype=float)
@@ -241,6 +256,7 @@ def load_capture(path: Path) -> CaptureFile:
             time_s=time_s if time_s.shape == (frames,) else even_s,
             head_by=str(held["head_by"]),
             head_sure=float(held["head_sure"]),
+            places_recorded=bool(np.all(held.get("places_recorded", True))),
         ),
         name=str(held["name"]),
         m_per_px=scale if np.isfinite(scale) else None,
@@ -263,6 +279,10 @@ class _Detections:
     """Of the medial axis of any body; NaN where there is none."""
     outlines: dict[int, Outline] = field(default_factory=dict)
     """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
+    faint_error_px: dict[int, float] = field(default_factory=dict)
+    """By frame: least expected error of bodies with faint parts."""
+    store: FrameStore = field(default_factory=FrameStore)
+    """The surroundings of the body in every frame."""
     crops: dict[int, Crop] = field(default_factory=dict)
     """By frame: small bodies, and where a small body was lost its last place."""
 
@@ -283,9 +303,13 @@ def _detect_all(
         if body.status is FrameStatus.GOOD:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
+            if detection.faint_parts:
+                axis_px *= _FAINT_PARTS
+                out.faint_error_px[number] = axis_px
         if body.status is FrameStatus.GOOD or body.status in COILS:
             width_px = 2.0 * float(np.max(body.radius_px))
             out.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
+        _keep(out.store, number, frame, detection, points)
         if body.length_px <= LONGEST_PX:
             last, points = number, body.points_px
             out.crops[number] = crop_body(frame, detection.background, points)
@@ -300,6 +324,17 @@ def _detect_all(
     return out
 
 
+def _keep(
+    store: FrameStore, number: int, frame: DeepImage, detection: Detection, last_px: Floats
+) -> None:
+    """Keep the surroundings of the silhouette and of the last place of a small body."""
+    body = detection.silhouette
+    corner = np.array([body.origin_px, np.add(body.origin_px, body.level.shape[::-1])])
+    places = np.vstack([corner, last_px]) if body.area_px > 0.0 else last_px
+    if len(places):
+        store.put(number, frame, places, float(np.nan_to_num(detection.skeleton.length_px)))
+
+
 def _fault(checked: list[Skeleton]) -> str:
     """Say why too few frames can be used: the commonest reason, and what would help."""
     reasons = [one.status for one in checked if one.status is not FrameStatus.GOOD]
@@ -310,8 +345,9 @@ def _fault(checked: list[Skeleton]) -> str:
         FrameStatus.NOTHING: "no contrast or no motion: nothing stands out from the background; "
         "give --background, or better light",
         FrameStatus.SEVERAL: "several animals: cut the film so that one is in view",
+        FrameStatus.EMPTY: "the found lines lie on empty ground; give --background",
         FrameStatus.CUT: "the body is cut by the edge of the image",
-        FrameStatus.BLOB: "what stands out is not a long body; give --background",
+        FrameStatus.BLOB: "the silhouette is not a long body; give --background",
     }.get(worst, f"the body is never seen whole: {worst}")
     return f"{advice} ({reasons.count(worst)} of {len(checked)} frames)"
 

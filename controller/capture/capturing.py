@@ -23,13 +23,15 @@ from snakewalk.controller.capture.corrections import apply_corrections, read_cor
 from snakewalk.controller.capture.plots.capture import contact_sheet, overlay_film, step_picture
 from snakewalk.controller.capture.review import picture_scale, review_page
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
-from snakewalk.controller.console.messages import stderr_console
+from snakewalk.controller.capture.verification.film_check import REJECTED
+from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.region import WHOLE, Region, region_of
 from snakewalk.controller.images.silhouette import as_deep_as
 from snakewalk.controller.images.video import Footage, frame_times, in_8_bits, open_footage
+from snakewalk.controller.track.track import UNSURE_HEAD
 
 _SAMPLE = 25  # frames from which the background is learnt
 _FILMS = (".mp4", ".mkv", ".avi")
@@ -84,6 +86,14 @@ class CaptureFacts:
     head_by: str
     head_sure: float
     frames_with_unsure_head: int
+    frames_missing: int
+    """Images whose number is missing in their folder; the times of the others keep the gaps."""
+    places_recorded: bool
+    """False where the images were cropped to the animal: they contain no travel."""
+    frames_rejected: int
+    """Frames whose finished skeleton their own pixels contradict; ``verdicts`` has the reasons."""
+    warning: str | None
+    """A doubt about the whole recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,14 +120,14 @@ def correct_recording(options: CaptureOptions) -> CorrectionFacts:
 
     """
     if options.corrections is None:
-        raise ValueError("there are no corrections")
+        raise ValueError("--corrections: needs a file of corrections")
     plain = CaptureOptions(
         options.recording, options.output, corrections=options.corrections, force=options.force
     )
     if options != plain:
         raise InputError(
-            "--corrections takes the TRACK.npz of an earlier capture, -o and --force; the other "
-            "options belong to a film"
+            "--corrections: works with TRACK.npz of an earlier capture, -o and --force only; "
+            "leave the other options out"
         )
     if options.output.suffix.lower() != ".npz":
         raise InputError(f"{options.output}: a track is an .npz")
@@ -153,7 +163,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     console = stderr_console()
     with console.status("learning the background ..."):
         whole = footage.spread(_SAMPLE)
-        if (options.roi or options.mask) and len({frame.shape for frame in whole}) > 1:
+        if (options.roi or options.mask) and len({frame.shape[:2] for frame in whole}) > 1:
             raise InputError(
                 f"{options.recording}: --roi and --mask need images of one size; these differ"
             )
@@ -182,7 +192,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     scale = 1.0
     if options.review is not None:
         scale = picture_scale(some[::3], footage.count, str(options.recording))
-    fixed = not options.cropped and len({frame.shape for frame in whole}) == 1
+    fixed = not options.cropped and len({frame.shape[:2] for frame in whole}) == 1
     stated_s: list[float] = []
 
     def cut_frames() -> Iterator[DeepImage]:
@@ -201,7 +211,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             on_progress=bar.advance,
         )
         time_s, rate_hz = captured.time_s, captured.rate_hz
-        if options.rate_hz is None:
+        if options.rate_hz is None or footage.missing:
             time_s, rate_hz = frame_times(stated_s, footage.rate_hz)
         captured = replace(
             captured, points_px=region.moved(captured.points_px), time_s=time_s, rate_hz=rate_hz
@@ -218,7 +228,16 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         with atomic_write(options.output) as part:
             save_capture(part, held)
         _write_pictures(options, footage, region, detector, held, bar, scale, in_colour)
-    return _facts(options, footage, detector, captured, m_per_px)
+    facts = _facts(options, footage, detector, captured, m_per_px)
+    if footage.missing:
+        LOGGER.warning(
+            "%s: %d image numbers are missing; the times of the other frames keep the gaps",
+            options.recording,
+            footage.missing,
+        )
+    if facts.warning is not None:
+        LOGGER.warning(facts.warning)
+    return facts
 
 
 def _write_pictures(
@@ -353,6 +372,19 @@ def _facts(
         head_by=captured.head_by,
         head_sure=round(captured.head_sure, 3),
         frames_with_unsure_head=_unsure_heads(captured),
+        frames_missing=footage.missing,
+        places_recorded=captured.places_recorded,
+        frames_rejected=sum(one in REJECTED for one in captured.status),
+        warning=_warning(options, captured),
+    )
+
+
+def _warning(options: CaptureOptions, captured: Capture) -> str | None:
+    if captured.head_sure >= UNSURE_HEAD:
+        return None
+    return (
+        f"{options.recording}: head and tail may be exchanged (sure by {captured.head_sure:.2f}, "
+        f"from the {captured.head_by}); look at --sheet or --review, and give --head X,Y"
     )
 
 

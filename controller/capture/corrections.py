@@ -144,8 +144,8 @@ def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats
     length = float(np.hypot(*np.diff(line, axis=0).T).sum()) if np.isfinite(line).all() else 0.0
     if not 1.0 < length < _LONGEST * usual_px:
         raise InputError(
-            f"{where}: the line is {length:.1f} px long, the body usually {usual_px:.1f} px: it is "
-            "no body"
+            f"{where}: the line is {length:.1f} px long, the body usually {usual_px:.1f} px; "
+            "redraw it"
         )
     try:
         even = equipartition(line, SEGMENTS)

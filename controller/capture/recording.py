@@ -45,6 +45,8 @@ class RecordingFacts:
     licence: str
     frames: int
     frames_left_out: int
+    frames_missing: int
+    """Frames between the first and the last for which the file has no row."""
     frames_bridged: int
     """Frames in which a missing keypoint was set on the curve through the others."""
     head_and_tail_swapped: int
@@ -66,7 +68,15 @@ class RecordingFacts:
     states_kept: int
     states_refused: dict[str, int]
     """Shapes refused, by reason, each counted for the first reason only."""
+    places_recorded: bool
+    """False where the images were cropped to the animal: they contain no travel."""
+    head_sure: float | None
+    """How surely the first point is the head, 0 to 1; None where the file does not say."""
     pace: PaceFacts
+    every_nth_frame: int = 1
+    """Frames of the camera from one row of the file to the next."""
+    notes: tuple[str, ...] = ()
+    """Lines about parts that the reader left out or changed."""
 
     def to_dict(self) -> dict[str, object]:
         """Return all facts, those of the pace among the others, for JSON."""
@@ -111,6 +121,7 @@ def examine(
         licence=track.licence,
         frames=track.frames,
         frames_left_out=track.dropped,
+        frames_missing=track.absent,
         frames_bridged=track.bridged,
         head_and_tail_swapped=track.flips,
         rate_hz=round(track.rate_hz, 3),
@@ -128,7 +139,11 @@ def examine(
         robot=robot.name,
         states_kept=len(kept),
         states_refused=refused,
+        places_recorded=track.places_recorded,
+        head_sure=None if track.head_sure is None else round(track.head_sure, 3),
         pace=_pace(track, shapes, wave.frequency_hz, robot),
+        every_nth_frame=track.every,
+        notes=track.notes,
     )
     return ExaminedRecording(track, facts)
 

@@ -35,8 +35,8 @@ class CalledCommand(TyperCommand):
             order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
             for option in dict.fromkeys(order):
                 if order.count(option) > 1 and _takes_one_value(option):
-                    told = f"given {order.count(option)} times, and takes one value: leave one"
-                    raise typer.BadParameter(told, ctx=ctx, param=option)
+                    fault = f"given {order.count(option)} times, but has one value; leave one"
+                    raise typer.BadParameter(fault, ctx=ctx, param=option)
         return rest
 
 
@@ -91,7 +91,7 @@ def called(
                 )
             return load()(**options)
 
-    own = [
+    shared = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
         for name, kind, default in (
             ("verbose", Verbose, False),
@@ -102,8 +102,8 @@ def called(
     ]
     paragraphs = (inspect.getdoc(declared) or "").split("\n\n")
     command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
-    command.__annotations__ = {one.name: one.annotation for one in (*given, *own)}
-    command.__signature__ = signature.replace(parameters=[*given, *own])  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in (*given, *shared)}
+    command.__signature__ = signature.replace(parameters=[*given, *shared])  # type: ignore[attr-defined]
     return command
 
 

@@ -37,6 +37,16 @@ _GROUPS: Final = (JOB, MOTION, RECORDINGS, BUS)
 """Order of the groups in ``--help``; other groups follow."""
 _FIRST: Final = ("list", "init", "plan", "run", "stop", "report")
 """Commands that come first in their group; the others follow by name."""
+_COMMON: Final = ("robot", "world", "run", "motion", "port", "seconds")
+"""Options that come first in the help of a command; the others follow as declared."""
+_PANELS: Final = {
+    "Display": ("view", "view_at", "ros", "observe"),
+    "Results": (
+        *("out", "output", "robot_out", "film", "look", "fine", "picture", "overlay", "sheet"),
+        *("record", "truth", "folders", "accept_dead_reckoning", "as_json", "force"),
+    ),
+}
+"""Options by their group in the help of a command; the others are in its first group."""
 _CONTEXT: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"]}
 
 
@@ -54,13 +64,15 @@ class CommandGroup(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command with its options, a family, or None."""
-        here = [e for e in _listed(self.prefix) if _next_word(e, self.prefix) == cmd_name]
-        if not here:
+        entries = [e for e in _listed(self.prefix) if _next_word(e, self.prefix) == cmd_name]
+        if not entries:
             return None
         path = f"{self.prefix} {cmd_name}".strip()
-        if here[0].name != path:
-            return _family(path, here)
-        return _stub(cmd_name, here[0]) if self._is_listing else _whole(cmd_name, here[0])
+        if entries[0].name != path:
+            return _family(path, entries)
+        return (
+            _stub(cmd_name, entries[0]) if self._is_listing else _full_command(cmd_name, entries[0])
+        )
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the list of commands from their manifests."""
@@ -141,11 +153,11 @@ def _listed(prefix: str) -> list[Plugin]:
         place = _GROUPS.index(group) if group in _GROUPS else len(_GROUPS)
         return place, first, each.name
 
-    found: dict[str, Plugin] = {}
+    commands: dict[str, Plugin] = {}
     for each in plugins("command"):
         if not prefix or each.name.startswith(f"{prefix} "):
-            found.setdefault(each.name, each)
-    return sorted(found.values(), key=order)
+            commands.setdefault(each.name, each)
+    return sorted(commands.values(), key=order)
 
 
 def _next_word(each: Plugin, prefix: str) -> str:
@@ -177,7 +189,7 @@ def _stub(name: str, listed: Plugin) -> Any:
     )
 
 
-def _whole(name: str, listed: Plugin) -> Any:
+def _full_command(name: str, listed: Plugin) -> Any:
     """Build the options of a command; its module is imported when it is called."""
     declared = declaration(listed.target) if listed.is_own else None
     function: Callable[..., Any] = declared or listed.load()
@@ -186,7 +198,24 @@ def _whole(name: str, listed: Plugin) -> Any:
     alone.command(
         name, cls=CalledCommand, epilog=_examples(info), rich_help_panel=listed.group or None
     )(called(function, listed.load))
-    return typer.main.get_command(alone)
+    made = typer.main.get_command(alone)
+    _group_options(made)
+    return made
+
+
+def _group_options(command: Any) -> None:
+    """Put the options of a command into groups, the common options first."""
+    panels = {name: panel for panel, names in _PANELS.items() for name in names}
+
+    def place(parameter: Any) -> int:
+        if parameter.param_type_name == "argument":
+            return -1
+        return _COMMON.index(parameter.name) if parameter.name in _COMMON else len(_COMMON)
+
+    command.params.sort(key=place)
+    for parameter in command.params:
+        if parameter.param_type_name == "option" and not parameter.rich_help_panel:
+            parameter.rich_help_panel = panels.get(parameter.name)
 
 
 def _examples(info: CommandInfo) -> str:
@@ -205,7 +234,8 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings=_CONTEXT,
-    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one that answers the same bytes.",
+    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one that speaks the "
+    "same protocol.",
 )
 
 
@@ -213,7 +243,7 @@ app = typer.Typer(
 def _options(
     show_version: Annotated[
         bool,
-        typer.Option("--version", help="show it", is_eager=True, callback=_show_version),
+        typer.Option("--version", help="print the version", is_eager=True, callback=_show_version),
     ] = False,
 ) -> None:
     """Read the options before a command."""

@@ -21,13 +21,13 @@ _LEFT_OUT = (
     "AVX512F AVX512CD AVX512_KNL AVX512_KNM AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR "
     "X86_V4"
 )
-"""Loops for AVX-512 that numpy, which is imported later, leaves out on x86-64: their sines and
+"""Loops for AVX-512 that numpy, which is imported later, leaves out on x86-64. Their sines and
 exponentials come from another library and differ in the last bit, and so would runs. numpy ignores
 names that its version or the processor does not have."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _INTERRUPTED = 130
-"""Of Ctrl-C, which has been told."""
+"""Exit code after Ctrl-C, which has been reported."""
 
 
 def leave_out_avx512() -> None:
@@ -60,7 +60,7 @@ def main() -> None:
         app(prog_name="snakewalk")
     except PortError as error:
         began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
-        _end(1 if began else 2, _with_notes("; ".join(error.faults), error))
+        _end(1 if began else 2, "; ".join(error.faults), *getattr(error, "__notes__", []))
     except InputError as error:
         _end(2, *error.faults)
     except DriverError as error:
@@ -72,7 +72,7 @@ def main() -> None:
         _end(2, needed)
     except OSError as error:
         place = f"{Path(str(error.filename))}: " if error.filename else ""
-        notes = getattr(error, "__notes__", [])  # of a run: what became of torque and log
+        notes = getattr(error, "__notes__", [])  # of a run: state of torque and log
         _end(1 if notes else 2, _with_notes(f"{place}{error.strerror or error}", error))
     except KeyboardInterrupt:
         _end(_INTERRUPTED, "interrupted")
@@ -89,7 +89,7 @@ def _unwind(number: int, frame: FrameType | None) -> None:
 
 
 def _check_words(words: list[str]) -> None:
-    """Refuse names that are no text: libraries below crash on them.
+    """Reject names that are not text: libraries below crash on them.
 
     Raises:
         InputError: the bytes of a word are not UTF-8.
@@ -105,7 +105,7 @@ def _check_words(words: list[str]) -> None:
 
 @cache
 def _tell_of_pipes() -> None:
-    """Have every opening of a named pipe told: it waits until another program opens it, too."""
+    """Report every opening of a named pipe: it waits until another program also opens it."""
     sys.addaudithook(_tell_of_pipe)
 
 
@@ -127,7 +127,7 @@ def _tell_of_pipe(event: str, details: tuple[object, ...]) -> None:
 
 
 def _with_notes(text: str, error: BaseException) -> str:
-    """What ended the program, and what a run says of torque and log."""
+    """Return the reason for the end, with a run's notes on torque and log."""
     return "; ".join([text, *getattr(error, "__notes__", [])])
 
 

@@ -1,7 +1,7 @@
-"""Values that the shell completes: shipped names, one's own files beside them, a choice's words.
+"""Values that the shell completes: shipped names, a user's files, and the words of a choice.
 
-Each function takes what has been typed and returns what it may become. A shell completes any other
-file by itself where these return nothing.
+Each function receives the typed text and returns its completions. A shell completes any other file
+by itself where these return nothing.
 """
 
 from collections.abc import Callable

@@ -26,8 +26,8 @@ def declaration(target: str) -> Callable[..., Any] | None:
 
     """
     module, _, name = target.partition(":")
-    found = _names(module, {name}, is_declared=True)
-    return None if found is None else found[name]
+    names = _names(module, {name}, is_declared=True)
+    return None if names is None else names[name]
 
 
 def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[str, Any] | None:
@@ -66,13 +66,13 @@ def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
     """Return the names that an import statement provides, as far as they are needed."""
     namespace: dict[str, Any] = {}
     if isinstance(node, ast.ImportFrom):
-        wanted = [each for each in node.names if (each.asname or each.name) in names]
-        found = None
+        needed = [each for each in node.names if (each.asname or each.name) in names]
+        values = None
         if _COMMANDS in (node.module or ""):
-            found = _names(node.module or "", {each.name for each in wanted})
-        if found is not None:
-            return {each.asname or each.name: found[each.name] for each in wanted}
-        node = ast.ImportFrom(node.module, wanted, node.level)
+            values = _names(node.module or "", {each.name for each in needed})
+        if values is not None:
+            return {each.asname or each.name: values[each.name] for each in needed}
+        node = ast.ImportFrom(node.module, needed, node.level)
     if isinstance(node, ast.Import | ast.ImportFrom):
         code = ast.fix_missing_locations(ast.Module([node], []))
         exec(compile(code, "<imports of a command>", "exec"), namespace)

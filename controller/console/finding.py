@@ -9,13 +9,13 @@ Grade = Literal["ok", "warn", "fail"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one check found."""
+    """Result of one check."""
 
     check: str
     grade: Grade
     found: str
     remedy: str = ""
-    """What to do; empty where all is well."""
+    """Remedy; empty if all is well."""
 
     def to_dict(self) -> dict[str, str]:
         """For JSON."""

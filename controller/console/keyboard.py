@@ -48,10 +48,13 @@ class Keyboard:
 
     def __init__(self, descriptor: int | None = None) -> None:
         if termios is None:
-            raise InputError("--live: keys are for Linux and macOS; here take --view")
+            raise InputError("--live: reads keys on Linux and macOS only; use --view here")
         self._file = sys.stdin.fileno() if descriptor is None else descriptor
         if not os.isatty(self._file):
-            raise InputError("--live reads keys from a terminal, and standard input is none")
+            raise InputError(
+                "--live: reads keys from a terminal, but standard input is not a "
+                "terminal; use --view"
+            )
         self._before = termios.tcgetattr(self._file)
         self.gone: str | None = None
         """Why keys do not arrive any more, or None."""

@@ -1,8 +1,8 @@
-"""What a command says beside its result: on standard error by its level, and in a log file.
+"""Messages of a command in addition to its result: on standard error by level, and in a log file.
 
 Everything goes through the logger ``snakewalk`` of Python's logging: ``debug`` is what a step did,
-``info`` what a run decided by itself, ``warning`` what a user should know, ``error`` a fault. What
-libraries warn of is ``debug``. Without :func:`messages` nothing is shown, as for any library.
+``info`` what a run decided by itself, ``warning`` what a user should know, ``error`` a fault.
+Warnings of libraries are ``debug``. Without :func:`messages` nothing is shown, as for any library.
 """
 
 import logging
@@ -28,11 +28,11 @@ LOGGER.addHandler(logging.NullHandler())
 _KEPT_LINES: Final = 10_000
 """Messages that are kept to restore a deleted file (ours)."""
 FAULT: Final = "fault"
-"""Attribute of a record whose text is printed by whoever ends the command."""
+"""Attribute of a record whose text is printed by the caller that ends the command."""
 
 
 class _Screen(logging.Handler):
-    """Standard error as it is at that moment: a bar takes it over while it is shown."""
+    """Standard error at that moment: a progress bar redirects it while it is shown."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a line; a warning says who warns."""
@@ -169,7 +169,7 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
 
 
 def _tell_end(error: BaseException) -> None:
-    """Write how a command ended; whoever catches the error prints it."""
+    """Write how a command ended; the function that catches the error prints it."""
     elsewhere = {FAULT: True}
     if isinstance(error, InputError):
         for line in error.faults:
@@ -190,6 +190,6 @@ def _library_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Take a library's warning: it is for whoever writes programs, and shown to those who ask."""
+    """Receive a library's warning: it is for programmers, and shown on request."""
     del file, line
     LOGGER.debug("%s:%d: %s: %s", Path(filename).name, lineno, category.__name__, message)

@@ -1,4 +1,4 @@
-"""What the commands share: options, and how a result is shown."""
+"""Parts that the commands share: options, and the display of a result."""
 
 import json
 import sys
@@ -34,46 +34,46 @@ RunName = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 Assume = Annotated[
     list[str] | None,
-    typer.Option(help="KEY=VALUE for what the file does not state; may be repeated"),
+    typer.Option(help="KEY=VALUE: a value that the file does not state; may be repeated"),
 ]
-Seed = Annotated[int | None, typer.Option(help="of every random choice")]
-FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="the others follow it")]
+Seed = Annotated[int | None, typer.Option(help="seed of every random choice")]
+FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="first seed; the others follow it")]
 Motion = Annotated[
     str | None,
     typer.Option(
-        help="walk, walk-printed, walk-blind or serpenoid", autocompletion=completion.MOTIONS
+        help="kind of motion: walk, walk-printed, walk-blind or serpenoid",
+        autocompletion=completion.MOTIONS,
     ),
 ]
 Port = Annotated[
     str | None,
     typer.Option(
         callback=check_port_name,
-        help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter "
-        "there is",
+        help="serial port, or a URL such as socket://pi:5000; default: the only USB adapter",
     ),
 ]
 ChainPort = Annotated[
     str | None,
     typer.Option(
         callback=check_port_name,
-        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
-        "of the chain have ports of their own; default: the only USB adapter there is",
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B for segments with "
+        "separate ports; default: the only USB adapter",
     ),
 ]
 RunPort = Annotated[
     str | None,
     typer.Option(
         callback=check_port_name,
-        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=B where segments "
-        "of the chain have ports of their own (sim: simulated servos beside real ones), or robot, "
-        "whose file says which; without it, the simulator",
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=sim for segments, "
+        "where sim simulates them; robot: the ports of the robot's file; default: the "
+        "simulator",
     ),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
 Look = Annotated[
     str,
     typer.Option(
-        help="body in the film: servos, animal, or a BODY as of `snakewalk body`",
+        help="body in the film: servos, animal, or a BODY that `snakewalk body` accepts",
         autocompletion=completion.LOOKS,
     ),
 ]
@@ -87,24 +87,26 @@ Compliant = Annotated[
     bool | None,
     typer.Option(
         "--compliance/--no-compliance",
-        help="joints yield to measured current, or not; default: as the run says",
+        help="let joints yield to measured current, or not; default: the run's setting",
         show_default=False,
     ),
 ]
 Shadow = Annotated[
     bool,
-    typer.Option("--shadow", help="run the simulator beside it, and say what differs and why"),
+    typer.Option(
+        "--shadow", help="compare the run with a simulation, and name the cause of differences"
+    ),
 ]
-View = Annotated[bool, typer.Option("--view", help="show the run in a browser while it lasts")]
+View = Annotated[bool, typer.Option("--view", help="show the running robot in a browser")]
 ViewAt = Annotated[
     str,
-    typer.Option("--view-at", metavar="HOST:PORT", help="of the page"),
+    typer.Option("--view-at", metavar="HOST:PORT", help="address of the page"),
 ]
 Ros = Annotated[
-    bool, typer.Option("--ros", help="tell a ROS 2 graph of the run, with a service that stops it")
+    bool, typer.Option("--ros", help="publish the run in ROS 2, with a service that stops it")
 ]
 VIEW_AT = "127.0.0.1:8080"
-Force = Annotated[bool, typer.Option("--force", help="overwrite files")]
+Force = Annotated[bool, typer.Option("--force", help="overwrite existing files")]
 Robot = Annotated[
     str | None, typer.Option(help="shipped robot, or a TOML file", autocompletion=completion.ROBOTS)
 ]
@@ -127,26 +129,29 @@ TrackFile = Annotated[
 ]
 
 Rate = Annotated[
-    float | None, typer.Option(help="frames a second of the files, instead of what they say")
+    float | None,
+    typer.Option(help="frame rate in frames per second; default: the rate that the files state"),
 ]
 MinScore = Annotated[
     float | None,
-    typer.Option(help="keypoints scoring less are missing; default 0, of DeepLabCut 0.6"),
+    typer.Option(help="ignore keypoints with a lower score; default: 0, for DeepLabCut 0.6"),
 ]
 Individual = Annotated[
-    str | None, typer.Option(help="of a file of several animals: the one that is taken")
+    str | None, typer.Option(help="name of the animal to use from a file of several animals")
 ]
 Keypoints = Annotated[
     str | None,
     typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
 ]
-Plane = Annotated[str | None, typer.Option(help="of markers in space: xy (default), xz or yz")]
+Plane = Annotated[
+    str | None, typer.Option(help="plane of markers in space: xy (default), xz or yz")
+]
 Set = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="replace a value of the run's, robot's or world's file, e.g. "
-        "run.cycle_hz=25; may be given again",
+        help="replace a value of the run's, robot's or world's file, e.g. run.cycle_hz=25; "
+        "may be repeated",
         metavar="KEY=VALUE",
         autocompletion=completion.keys,
     ),
@@ -154,16 +159,16 @@ Set = Annotated[
 _MESSAGES: Final = "Messages"
 """Group of options in ``--help``."""
 Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="every step", rich_help_panel=_MESSAGES)
+    bool, typer.Option("--verbose", "-v", help="print every step", rich_help_panel=_MESSAGES)
 ]
 Quiet = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="warnings and faults only", rich_help_panel=_MESSAGES),
+    typer.Option("--quiet", "-q", help="print warnings and faults only", rich_help_panel=_MESSAGES),
 ]
 LogLevel = Annotated[
     Literal["debug", "info", "warning", "error"] | None,
     typer.Option(
-        help="from which on it says something; default: info",
+        help="lowest level of the messages to print; default: info",
         rich_help_panel=_MESSAGES,
         show_default=False,
     ),
@@ -171,7 +176,7 @@ LogLevel = Annotated[
 LogFile = Annotated[
     Path | None,
     typer.Option(
-        dir_okay=False, help="write all of it to the end of this file", rich_help_panel=_MESSAGES
+        dir_okay=False, help="append all messages to this file", rich_help_panel=_MESSAGES
     ),
 ]
 
@@ -225,7 +230,7 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
     """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
 
     Raises:
-        InputError: there is no key, or no value, or a key stands twice.
+        InputError: key or value is missing, or a key occurs twice.
 
     """
     values: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""Registry of plug-ins: what each package offers, found without importing the packages.
+"""Registry of plug-ins: the offers of each package, found without importing the packages.
 
 A package lists its plug-ins in a manifest: a module without imports whose ``PLUGINS`` is a tuple of
 ``(kind, name, help, "module:attribute", group)``. The manifests of snakewalk's own packages are
@@ -20,7 +20,10 @@ from snakewalk.config.errors import InputError
 
 ENTRY_POINTS: Final = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
-KINDS: Final = ("command", "run", "motion", "pose", "map", "observer", "look", "planner", "results")
+KINDS: Final = (
+    *("command", "run", "motion", "joints", "pose", "map", "observer", "look", "planner"),
+    "results",
+)
 """Kinds of plug-ins."""
 OWN: Final = "snakewalk"
 
@@ -101,7 +104,7 @@ def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Pl
         others: further valid values, which are no plug-ins.
 
     Raises:
-        InputError: there is none; lists the valid values.
+        InputError: the plug-in does not exist; lists the valid values.
 
     """
     found = find(kind, name)

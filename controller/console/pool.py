@@ -42,7 +42,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 def _begin(folder: str) -> None:
     """Let a worker's temporary files lie in the pool's folder, and the worker end with its parent.
 
-    A worker that is at work does not notice that nobody will take its result.
+    A busy worker does not notice that no process will receive its result.
     """
     tempfile.tempdir = folder
     threading.Thread(target=_end_with_parent, daemon=True).start()

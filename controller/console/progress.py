@@ -14,6 +14,8 @@ from snakewalk.drivers.clock import WallClock
 T = TypeVar("T")
 EVERY = 10
 """Cycles of a run between two updates."""
+REFRESH_HZ = 4.0
+"""Rate at which a terminal shows the bar (ours): drawing it uses as much CPU time as a cycle."""
 
 
 class ProgressBar:
@@ -22,14 +24,17 @@ class ProgressBar:
     def __init__(
         self, description: str, total: float | None = None, *, transient: bool = False
     ) -> None:
+        console = stderr_console()
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),  # a file may be named [red]
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("{task.fields[note]}", markup=False),
             TimeElapsedColumn(),
-            console=stderr_console(),
+            console=console,
             transient=transient,
+            auto_refresh=console.is_terminal,  # elsewhere only the last state is printed
+            refresh_per_second=REFRESH_HZ,
         )
         self._task = self._progress.add_task(description, total=total, note="")
 
@@ -65,7 +70,7 @@ class ProgressBar:
         self._progress.advance(self._task)
 
     def hide(self) -> None:
-        """Take the bar away, and its line: what it stood for failed."""
+        """Remove the bar and its line, because its task failed."""
         self._progress.live.transient = True
         self._progress.console.quiet = not self._progress.console.is_interactive
         self._progress.update(self._task, visible=False)
@@ -116,10 +121,10 @@ class PathBar(RunBar):
 
 
 class TimeBar(RunBar):
-    """How much of its time a gait, or anything else that takes a known time, has gone.
+    """Share of the time of a gait, or of any task of known duration, that has passed.
 
-    ``name_at`` takes the time gone by, in seconds, and returns what then moves: a run may change
-    its gait.
+    ``name_at`` receives the elapsed time in seconds and returns the present motion: a run may
+    change its gait.
     """
 
     def __init__(

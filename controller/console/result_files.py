@@ -15,14 +15,14 @@ FILM: Final = "film.mp4"
 REPORT: Final = "report.html"
 SUMMARY: Final = "summary.json"
 MAP: Final = "map.npz"
-"""Of a run that maps its ground; a world of kind ``map`` takes it."""
+"""Map of a run that maps its ground; a world of kind ``map`` accepts it."""
 RUN_FILES: Final = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY, MAP)
-"""What a run leaves in its folder, which holds the files of one run only."""
+"""Files of a run in its folder, which holds the files of one run only."""
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
 
 def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
-    """Check the files of all results before any work is done; None is no file.
+    """Check the files of all results before any work is done; None is ignored.
 
     Raises:
         InputError: one line for each that exists (without ``force``), whose folder does not or
@@ -30,9 +30,10 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
 
     """
     files = [path for path in paths if path is not None]
-    faults = [f"{path}: exists; --force overwrites it" for path in files if path.exists()]
-    if force:
-        faults = [f"{path}: is a folder" for path in files if path.is_dir()]
+    faults = [f"{path}: is a folder; name a file" for path in files if path.is_dir()]
+    if not force:
+        exist = [path for path in files if path.exists() and not path.is_dir()]
+        faults += [f"{path}: exists; --force overwrites it" for path in exist]
     for folder in dict.fromkeys(path.parent for path in files):
         fault = _folder_fault(folder)
         faults += [] if fault is None else [fault]
@@ -43,9 +44,9 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
 
 
 def _folder_fault(folder: Path) -> str | None:
-    """What keeps a folder from taking a new file; None if nothing does.
+    """Return why a folder accepts no new file; None if it does.
 
-    A file without a name is made in it: permissions alone do not tell a read-only disk.
+    A file without a name is made in it: permissions alone do not reveal a read-only disk.
     """
     if not folder.is_dir():
         return f"{folder}: no such folder"
@@ -64,7 +65,7 @@ def run_folder(name: str, out: Path | None) -> Iterator[Path]:
     nothing was written into it.
 
     Raises:
-        InputError: the folder cannot be made, or takes no file.
+        InputError: the folder cannot be made, or accepts no file.
 
     """
     folder = Path("runs") / name if out is None else out
@@ -109,7 +110,7 @@ def refuse_another_run(folder: Path, force: bool) -> None:
 
 
 def refuse_mixture(log: Path, folder: Path, force: bool) -> None:
-    """Check that page and film of a log do not come to stand beside another run's files.
+    """Check that page and film of a log are not written into the folder of another run.
 
     In the log's own folder, as a run leaves it, they are made again. Elsewhere an old page and film
     are deleted with ``force``, a log never.
@@ -134,10 +135,10 @@ def clear_run(folder: Path) -> None:
 
 
 def check_picture(path: Path | None) -> None:
-    """Refuse a file that cannot be drawn; None is no picture.
+    """Reject a file that cannot be drawn; None is ignored.
 
     Raises:
-        InputError: the ending is no picture's, or matplotlib is not installed.
+        InputError: the ending is not a picture's, or matplotlib is not installed.
 
     """
     if path is None:
@@ -151,7 +152,7 @@ def check_picture(path: Path | None) -> None:
 def atomic_write(path: Path) -> Iterator[Path]:
     """Give a temporary path to write to; it becomes ``path`` when the block ends without an error.
 
-    The temporary file has the same name, in a folder beside ``path``; further files that the block
+    The temporary file has the same name, in a folder next to ``path``. Further files that the block
     writes next to it (a mesh's material) are moved along. After an error (a full disk, an
     interrupt) nothing is left, and an older file is as it was. Missing parent folders are made.
     """

@@ -17,7 +17,7 @@ from snakewalk.controller.console.options import (
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RunOptions:
-    """Where a run goes, who watches it, and how its results are shown.
+    """Target of a run, its observers, and the display of its results.
 
     A command declares all of these options by one parameter of this type.
     """

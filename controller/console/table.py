@@ -26,7 +26,9 @@ def read_csv_table(path: Path, columns: Sequence[str], command: str) -> list[dic
     whole = text[: text.rfind("\n") + 1]
     rows = csv.DictReader(io.StringIO(whole))
     if not whole or tuple(rows.fieldnames or ()) != tuple(columns):
-        raise InputError(f"{path}: is no table of `snakewalk {command}` of this version")
+        raise InputError(
+            f"{path}: is not a table of `snakewalk {command}` of this version; choose another file"
+        )
     return list(rows)
 
 

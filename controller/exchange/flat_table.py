@@ -15,12 +15,15 @@ from snakewalk.config.joint_names import numbered_joint_names
 from snakewalk.config.robot import JointConfig
 from snakewalk.controller.runlog.column import ANY, JOINT, LINK, Column, Table, unit_of
 from snakewalk.controller.runlog.encode import encode
+from snakewalk.controller.runlog.evidence import PoseEvidence
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.topics import ConfigTable
+from snakewalk.controller.runlog.topics import ConfigTable, FrictionTable, PoseTable, WalkTable
 
 Cells = NDArray[Any] | Sequence[str]
 _XYZ: Final = ("x", "y", "z")
 _BOUNDS: Final = ("low", "high")
+_OF_THE_POSE: Final = (PoseTable, WalkTable, FrictionTable)
+"""Tables whose numbers depend on the pose; each of their rows states its evidence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +50,13 @@ def flat_tables(record: RunRecord, *, joint_numbers: bool = False) -> list[FlatT
     robot = record.header.robot
     joints = numbered_joint_names(robot.joint_count) if joint_numbers else robot.joint_names
     marks = tuple(map(str, range(robot.joint_count))) if joint_numbers else joints
+    evidence = record.header.pose_evidence
     tables = [
-        FlatTable(table.topic.table_name, _columns(table, joints, marks))
+        FlatTable(
+            table.topic.table_name,
+            _columns(table, joints, marks)
+            | (_evidence(evidence, len(table.time_s)) if isinstance(table, _OF_THE_POSE) else {}),
+        )
         for table in record.tables()
         if len(table.time_s)
     ]
@@ -107,6 +115,22 @@ def _columns(table: Table, joints: Sequence[str], marks: Sequence[str]) -> dict[
         else:
             cells[name] = values
     return cells
+
+
+def _evidence(evidence: PoseEvidence, rows: int) -> dict[str, Cells]:
+    """Columns that state how the poses are known; they are the same in every row."""
+    uncertainties = {
+        "pose_position_sd_m": evidence.position_m,
+        "pose_heading_sd_rad": evidence.heading_rad,
+    }
+    return {
+        "pose_evidence": [str(evidence.kind)] * rows,
+        "pose_source": [evidence.source] * rows,
+        **{
+            name: np.full(rows, np.nan if value is None else value)
+            for name, value in uncertainties.items()
+        },
+    }
 
 
 def cell_names(name: str, column: Column, width: int, joints: Sequence[str]) -> list[str]:

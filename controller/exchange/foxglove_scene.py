@@ -113,6 +113,7 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
             data = encode(message).encode()
             writer.add_message(channel(topic), stamp_ns, data, publish_time=stamp_ns)
             counts[topic] += 1
+        writer.add_metadata("pose", record.header.pose_evidence.texts)
         writer.finish()
     return dict(counts)
 

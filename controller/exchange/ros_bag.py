@@ -43,5 +43,6 @@ def write_ros_bag(record: RunRecord, path: Path) -> dict[str, int]:
             data = bytes(store.serialize_cdr(message, kind))
             writer.add_message(channel(topic, kind), stamp_ns, data, publish_time=stamp_ns)
             counts[topic] += 1
+        writer.add_metadata("pose", record.header.pose_evidence.texts)
         writer.finish()
     return dict(counts)

@@ -9,12 +9,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.ros import RosConfig
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames
 from snakewalk.controller.exchange.imu_readings import imu_readings
 from snakewalk.controller.exchange.remaining_fields import Shown, remaining_fields
 from snakewalk.controller.runlog.column import Column
 from snakewalk.controller.runlog.encode import encode
-from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.topics import (
     ConfigTable,
     CycleTable,
@@ -29,6 +30,7 @@ JOINT_STATES: Final = "/joint_states"
 JOINT_GOALS: Final = "/joint_goals"
 FRAMES: Final = "/tf"
 HEAD_POSE: Final = "/head_pose"
+ODOMETRY: Final = "/odom"
 IMU: Final = ImuTable.topic.name
 PATH: Final = PathTable.topic.name
 DIAGNOSTICS: Final = "/diagnostics"
@@ -46,6 +48,7 @@ TYPES: Final = {
     JOINT_GOALS: "sensor_msgs/msg/JointState",
     FRAMES: "tf2_msgs/msg/TFMessage",
     HEAD_POSE: "geometry_msgs/msg/PoseStamped",
+    ODOMETRY: "nav_msgs/msg/Odometry",
     IMU: "sensor_msgs/msg/Imu",
     PATH: _PATH,
     DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
@@ -62,6 +65,12 @@ SHOWN: Final[Shown] = {
 """Fields that the messages of other packages contain; the others have messages of ``std_msgs``."""
 
 
+UNKNOWN_VARIANCE: Final = 1e6
+"""Variance of an unknown value, as `robot_localization` expects it."""
+_LEAST_VARIANCE: Final = 1e-6
+"""The variance of an exact pose: zeros would mean that the covariance is unknown."""
+
+
 class Row(NamedTuple):
     """A message of a topic."""
 
@@ -69,6 +78,19 @@ class Row(NamedTuple):
     topic: str
     type: str
     message: Any
+
+
+def pose_frame(header: Header) -> str:
+    """Return the frame of a run's poses: the world's if they are measured, else that of odometry.
+
+    A frame of odometry drifts, by REP 105; so a dead-reckoned pose never looks measured.
+    """
+    ros = header.robot.ros or RosConfig()
+    return ros.world_frame if header.pose_evidence.is_measured else ros.odom_frame
+
+
+def _variance(deviation: float | None) -> float:
+    return UNKNOWN_VARIANCE if deviation is None else max(deviation**2, _LEAST_VARIANCE)
 
 
 class RosMessages:
@@ -95,7 +117,7 @@ class RosMessages:
     def rows(self, record: RunRecord) -> Iterator[Row]:
         """All messages, topic by topic."""
         yield from self.joints(record)
-        yield from self._frames(record)
+        yield from self.transforms(record)
         yield from self.head_poses(record)
         yield from self.imu(record)
         yield from self._diagnostics(record)
@@ -145,8 +167,9 @@ class RosMessages:
             effort=self._floats(effort),
         )
 
-    def _frames(self, record: RunRecord) -> Iterator[Row]:
-        frames = body_frames(record)
+    def transforms(self, record: RunRecord, *, links: bool = True) -> Iterator[Row]:
+        """Return the transforms of the head alone, or of every link."""
+        frames, world = body_frames(record), pose_frame(record.header)
         for k, time_s in enumerate(frames.time_s.tolist()):
             rows = zip(
                 frames.parents,
@@ -158,7 +181,7 @@ class RosMessages:
             transforms = [
                 self._new(
                     "geometry_msgs/msg/TransformStamped",
-                    header=self._header(time_s, parent),
+                    header=self._header(time_s, world if parent == WORLD else parent),
                     child_frame_id=name,
                     transform=self._new(
                         "geometry_msgs/msg/Transform",
@@ -167,6 +190,7 @@ class RosMessages:
                     ),
                 )
                 for parent, name, at, turn in rows
+                if links or parent == WORLD
             ]
             yield self._row(time_s, FRAMES, TYPES[FRAMES], transforms=transforms)
 
@@ -174,11 +198,49 @@ class RosMessages:
         """Where the head was."""
         if not len(record.pose.time_s):
             return
-        frames = body_frames(record)
+        frames, world = body_frames(record), pose_frame(record.header)
         for k, time_s in enumerate(frames.time_s.tolist()):
             at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
-            pose = self._pose(time_s, at.tolist(), turn.tolist())
+            pose = self._pose(time_s, world, at.tolist(), turn.tolist())
             yield Row(time_s, HEAD_POSE, TYPES[HEAD_POSE], pose)
+
+    def odometry(
+        self, record: RunRecord, position_sd_m: float | None, heading_sd_rad: float | None
+    ) -> Iterator[Row]:
+        """Return the head's poses with their covariance; no speed is measured.
+
+        Args:
+            record: with poses.
+            position_sd_m: standard deviation of x, y and z; None: unknown.
+            heading_sd_rad: standard deviation of the rotations; None: unknown.
+
+        """
+        if not len(record.pose.time_s):
+            return
+        frames, world = body_frames(record), pose_frame(record.header)
+        unknown = self._floats(np.diag([UNKNOWN_VARIANCE] * 6).ravel())
+        variance = [_variance(position_sd_m)] * 3 + [_variance(heading_sd_rad)] * 3
+        nothing = self._xyz("Vector3", [0.0, 0.0, 0.0])
+        for k, time_s in enumerate(frames.time_s.tolist()):
+            at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
+            stamped = self._pose(time_s, world, at.tolist(), turn.tolist())
+            pose = self._new(
+                "geometry_msgs/msg/PoseWithCovariance",
+                pose=stamped.pose,
+                covariance=self._floats(np.diag(variance).ravel()),
+            )
+            twist = self._new(
+                "geometry_msgs/msg/TwistWithCovariance",
+                twist=self._new("geometry_msgs/msg/Twist", linear=nothing, angular=nothing),
+                covariance=unknown,
+            )
+            yield self._row(
+                *(time_s, ODOMETRY, TYPES[ODOMETRY]),
+                header=stamped.header,
+                child_frame_id=frames.names[0],
+                pose=pose,
+                twist=twist,
+            )
 
     def imu(self, record: RunRecord) -> Iterator[Row]:
         """Attitude and rate of a robot's IMU."""
@@ -205,28 +267,28 @@ class RosMessages:
     def paths(self, record: RunRecord) -> Iterator[Row]:
         """The plan's path, and those that replaced it."""
         for time_s, points_m in record.paths:
-            yield self._points(time_s, PATH, points_m)
+            yield self._points(time_s, PATH, pose_frame(record.header), points_m)
 
-    def _points(self, time_s: float, topic: str, points_m: Floats) -> Row:
+    def _points(self, time_s: float, topic: str, frame: str, points_m: Floats) -> Row:
         level = np.hstack([points_m, np.zeros((len(points_m), 3 - points_m.shape[1]))])
-        poses = [self._pose(time_s, point, [0.0, 0.0, 0.0, 1.0]) for point in level.tolist()]
-        header = self._header(time_s, WORLD)
+        poses = [self._pose(time_s, frame, point, [0.0, 0.0, 0.0, 1.0]) for point in level.tolist()]
+        header = self._header(time_s, frame)
         return self._row(time_s, topic, _PATH, header=header, poses=poses)
 
     def _others(self, record: RunRecord) -> Iterator[Row]:
         """Fields that no message above contains: each has a topic of its own."""
-        name = ConfigTable.topic.name
+        name, frame = ConfigTable.topic.name, pose_frame(record.header)
         yield self._row(0.0, name, _TEXT, data=encode(record.header.row()))
         for table, columns in remaining_fields(record, SHOWN):
             for name, column in columns.items():
                 topic = table.topic.name
                 times_s, values = table.time_s.tolist(), getattr(table, name)
                 for time_s, value in zip(times_s, values, strict=True):
-                    yield self._value(time_s, f"{topic}/{name}", column, value)
+                    yield self._value(time_s, f"{topic}/{name}", frame, column, value)
 
-    def _value(self, time_s: float, topic: str, column: Column, value: Any) -> Row:
+    def _value(self, time_s: float, topic: str, frame: str, column: Column, value: Any) -> Row:
         if column.kind == "points":
-            return self._points(time_s, topic.rpartition("/")[0], value)
+            return self._points(time_s, topic.rpartition("/")[0], frame, value)
         if column.kind == "text":
             return self._row(time_s, topic, _TEXT, data=value)
         if not column.shape:
@@ -242,8 +304,14 @@ class RosMessages:
 
     def _diagnostics(self, record: RunRecord) -> Iterator[Row]:
         for k, time_s in enumerate(record.slow.time_s.tolist()):
-            status = self.servos(record, k)
+            status = [self.pose_status(record.header), *self.servos(record, k)]
             yield self.diagnostics(time_s, status)
+
+    def pose_status(self, header: Header) -> Any:
+        """Return the status of the pose: how it is known, from which source, how accurately."""
+        evidence = header.pose_evidence
+        level = OK if evidence.is_measured else WARNING
+        return self.status("pose", level, evidence.text, header.robot.name, evidence.texts)
 
     def servos(self, record: RunRecord, k: int) -> list[Any]:
         """Return the status of every servo in a row of ``/slow``."""
@@ -287,10 +355,10 @@ class RosMessages:
         header = self._header(time_s, "")
         return self._row(time_s, DIAGNOSTICS, TYPES[DIAGNOSTICS], header=header, status=status)
 
-    def _pose(self, time_s: float, at: list[float], turn: list[float]) -> Any:
+    def _pose(self, time_s: float, frame: str, at: list[float], turn: list[float]) -> Any:
         return self._new(
             TYPES[HEAD_POSE],
-            header=self._header(time_s, WORLD),
+            header=self._header(time_s, frame),
             pose=self._new(
                 "geometry_msgs/msg/Pose",
                 position=self._xyz("Point", at),

@@ -21,7 +21,7 @@ def body_map(
     kept: NDArray[np.int64] | None = None,
     limit: float | None = None,
 ) -> None:
-    """Draw values (S, N), one row a frame, with zero white; what is not known stays grey.
+    """Draw values (S, N), one row a frame, with zero white; unknown values stay grey.
 
     Args:
         figure: for the colour bar.

@@ -42,7 +42,15 @@ def path_figure(record: RunRecord) -> Figure | None:
         draw_ground(axes, record.header.ground)
     _plan(axes, record)
     _bodies(axes, record)
-    axes.plot(*pose.centre_m[:, :2].T, color=BLUE, linewidth=2.0, label="centre of mass")
+    is_measured = record.header.pose_evidence.is_measured
+    known = "" if is_measured else ", dead-reckoned"
+    axes.plot(
+        *pose.centre_m[:, :2].T,
+        color=BLUE,
+        linewidth=2.0,
+        label=f"centre of mass{known}",
+        linestyle="-" if is_measured else (0, (3, 2)),
+    )
     axes.plot(*pose.head_m[:, :2].T, color=BLUE, linewidth=0.7, alpha=0.55, label="head")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
@@ -92,22 +100,25 @@ def _plan(axes: Axes, record: RunRecord) -> None:
             zorder=2,
         )
     reached = len(waypoint_times_s(record.pose, plan))
+    measured = record.header.pose_evidence.is_measured
     for number, point in enumerate(plan.waypoints_m):
         colour = GREEN if number < reached else RED
         axes.add_patch(
             Circle(
                 (float(point[0]), float(point[1])),
                 plan.waypoint_radius_m,
-                facecolor=colour,
+                facecolor=colour if measured else "none",
                 edgecolor=colour,
-                alpha=0.16,
+                alpha=0.16 if measured else 0.9,
+                linestyle="-" if measured else (0, (4, 3)),
                 zorder=1,
             )
         )
         axes.annotate(
-            str(number + 1), point, ha="center", va="center", color="white", fontsize=9,
-            fontweight="bold", zorder=6,
-            bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour, "edgecolor": "white"},
+            str(number + 1), point, ha="center", va="center", fontsize=9, fontweight="bold",
+            color="white" if measured else colour, zorder=6,
+            bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour if measured else "white",
+                  "edgecolor": "white" if measured else colour},
         )  # fmt: skip
 
 

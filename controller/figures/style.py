@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind people tell apart, thin grey frames."""
+"""One look for all figures: colours that colour-blind people can distinguish, thin grey frames."""
 
 import base64
 from collections.abc import Iterator, Sequence
@@ -130,11 +130,21 @@ def name_joints(axes: Axes, names: Sequence[str]) -> None:
     axes.set_yticks(places, [names[k] for k in places])
 
 
-def mark_waypoints(panels: list[Axes], times_s: Floats) -> None:
-    """Vertical lines where waypoints were reached, numbered on the first panel."""
+def mark_waypoints(panels: list[Axes], times_s: Floats, *, measured: bool) -> None:
+    """Draw vertical lines where waypoints were reached, numbered on the first panel.
+
+    The lines are dashed if the arrivals are not measured.
+    """
     for number, time in enumerate(times_s, start=1):
         for axes in panels:
-            axes.axvline(time, color=GREEN, linewidth=0.9, alpha=0.7, zorder=0.5)
+            axes.axvline(
+                time,
+                color=GREEN,
+                linewidth=0.9,
+                alpha=0.7,
+                zorder=0.5,
+                linestyle="-" if measured else (0, (3, 3)),
+            )
         panels[0].annotate(
             str(number), (time, 1.0), (3, -3), xycoords=("data", "axes fraction"),
             textcoords="offset points", va="top", color=GREEN, fontsize=9, fontweight="bold",

@@ -3,8 +3,8 @@
 Two steps. The first is that of Yamada and Hirose (Study of active cord mechanism: approximations to
 continuous curves of a multi-joint body, J. RSJ 26, 2008): in a frame that goes along the curve
 without turning about it (R. L. Bishop, There is more than one way to frame a curve, 1975) the curve
-bends to the left by ``k_left(s)`` and upwards by ``k_up(s)``, and a joint takes the bend of its own
-direction over the stretch that it stands for. The second moves the chain onto the curve, which the
+bends to the left by ``k_left(s)`` and upwards by ``k_up(s)``. A joint gets the bend of its own
+direction over the stretch that it replaces. The second moves the chain onto the curve, which the
 first leaves by an error that grows along the body: Gauss-Newton on the distances of all joints from
 the curve, in the spirit of R. L. Hatton, H. Choset, Generating gaits for snake robots: annealed
 chain fitting and keyframe wave extraction, Autonomous Robots 28, 2010.
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
 
 SAMPLES_A_LINK = 24
-"""Of the curve, over the length of a mean link."""
+"""Number of samples of the curve, over the length of a mean link."""
 ROUNDS = 40
 STEP_RAD = 0.3
 """The most that an angle moves in a round."""

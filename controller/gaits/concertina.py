@@ -21,7 +21,7 @@ class ConcertinaParameters(GaitParameters):
     """The fold."""
 
     winding_rad: float = Field(1.0, ge=0.0, le=1.5, description="folds against the body's axis")
-    folds: float = Field(2.0, ge=1.0, le=6.0, description="that a body has room for")
+    folds: float = Field(2.0, ge=1.0, le=6.0, description="that fit on the body")
     share: float = Field(0.8, ge=0.2, le=1.0, description="of the body that is folded at a time")
 
 

@@ -1,10 +1,10 @@
 """Walk and trot on legs that hang down: a time chart of contacts, and joint angles of the feet.
 
-The goat of [KP] 4.2.2 is moved by a time chart that says which feet are on the ground, by the
-angles of the joints of the legs, and by a body that follows from the legs. Here the chart is a
-share of the cycle and an offset for each foot, and the feet are given their way: on the ground
-level and back at an even rate, all at the same, so that the body goes forward at that rate; in the
-air forward again. Hip and knee are the angles of two segments whose foot is there.
+The goat of [KP] 4.2.2 is moved by a time chart of the feet on the ground, by the angles of the
+joints of the legs, and by a body that follows from the legs. Here the chart is a share of the cycle
+and an offset for each foot, and the paths of the feet are given. On the ground they move level and
+back at an even rate, all at the same, so that the body goes forward at that rate. In the air they
+move forward again. Hip and knee are the angles of two segments whose foot is there.
 """
 
 from typing import TYPE_CHECKING, ClassVar
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
 
 AXES = "ryy"
-"""Of a leg that hangs down: it rolls out at the trunk, hip and knee swing it."""
+"""Axes of a leg that hangs down: it rolls out at the trunk, hip and knee swing it."""
 
 
 class ErectParameters(GaitParameters):

@@ -1,8 +1,8 @@
 """Footfall: how a foot goes back on the ground and forward in the air, over a cycle.
 
-Correction of the cyclic legs of [GC] 2.2.2, Eq. 9-10: there both feet take their height from one
-``T_y``; here each foot has a phase of its own in height and way, and the share of the cycle that it
-is on the ground is free.
+Correction of the cyclic legs of [GC] 2.2.2, Eq. 9-10: there both feet get their height from one
+``T_y``. Here each foot has separate phases in height and way, and the share of the cycle that it is
+on the ground is free.
 """
 
 import numpy as np

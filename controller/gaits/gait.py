@@ -29,7 +29,7 @@ class Needs:
     yaw: bool = False
     pitch: bool = False
     legs: bool = False
-    """Whether two pairs of legs take part."""
+    """Whether two pairs of legs are used."""
     leg_axes: str = ""
     """Axes of each of these legs from the hip; empty: whatever they are."""
     wheels: bool = False
@@ -90,9 +90,9 @@ class Gait(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    """One line: what the body does."""
+    """Motion of the body in one line."""
     source: ClassVar[str]
-    """Who described it."""
+    """Author of the description."""
     needs: ClassVar[Needs]
     world: ClassVar[str] = "isotropic"
     """Shipped world of its runs, where none is given."""
@@ -100,6 +100,8 @@ class Gait(ABC):
     """Register 84 of every servo where the robot's own would squeeze too hard."""
     steered_by: ClassVar[str | None] = None
     """Its parameter, positive to the left, that steers it along waypoints; None: none does."""
+    follows_velocity: ClassVar[bool] = False
+    """Whether its rate and its ``turn_rad`` set how fast the body goes along itself and turns."""
     aim: ClassVar[Aim] = "advance"
     """The purpose that its speed is measured by."""
     model: ClassVar[type[GaitParameters]] = GaitParameters
@@ -173,7 +175,7 @@ class Range:
 
     @property
     def step(self) -> float:
-        """What one press of a key changes: a fortieth of the range, 1 for whole numbers."""
+        """Change by one press of a key: a fortieth of the range, 1 for whole numbers."""
         return (self.high - self.low) / 40.0 if self.kind is float else 1.0
 
 

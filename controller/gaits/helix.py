@@ -32,7 +32,7 @@ def helix_joints_rad(
 ) -> Floats:
     """(T, J) of a helix about whose line the body has turned by phases (T,).
 
-    A joint takes the bend of the body half a spacing of its axis before and behind it, exactly
+    A joint gets the bend of the body half a spacing of its axis before and behind it, exactly
     integrated: ``k_axis(s) = k cos(torsion s + phase)`` over that stretch.
 
     Args:
@@ -100,7 +100,7 @@ class _Helix(Gait):
 
     @abstractmethod
     def _radius_m(self) -> float:
-        """Of the centre line."""
+        """Radius of the centre line."""
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params

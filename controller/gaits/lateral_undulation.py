@@ -36,6 +36,7 @@ class LateralUndulation(Gait):
     source = "S. Hirose, Biologically Inspired Robots, Oxford University Press, 1993: serpenoid"
     needs = Needs(yaw=True, wheels=True)
     world = "flat"
+    follows_velocity = True
     model = LateralUndulationParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:

@@ -25,7 +25,7 @@ class RectilinearParameters(GaitParameters):
 
 
 class Rectilinear(Gait):
-    """The crests that touch the ground carry the body; no room at the sides is needed."""
+    """The crests that touch the ground carry the body; it needs no space at the sides."""
 
     name = "rectilinear"
     title = "a wave in height runs along a straight body, which goes forward through its own width"

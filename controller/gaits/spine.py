@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
 
 SAMPLES = 257
-"""Of the spine, before it is divided into equal links."""
+"""Number of samples of the spine, before it is divided into equal links."""
 SOURCE = (
     "G. Gonzalez Castro, M. Athanasopoulos, H. Ugail et al., Cyclic animation using partial "
     "differential equations, The Visual Computer 26, 2010, Table 1; travelling form: "
@@ -61,8 +61,8 @@ def spine_bends_rad(
     """(T, joints) bends of a chain of ``joints + 1`` links along the spine at phases (T,).
 
     The spine ``y(u)``, u from 0 at the head to 2 pi, is divided into parts of equal arc length (or
-    at the shares ``edges`` of it) before its headings are read: they are those of rigid links, not
-    of slices in u.
+    at the shares ``edges`` of it) before its headings are read. They are headings of rigid links,
+    not of slices in u.
     """
     write_headings = heading_loop()
     shares = np.linspace(0.0, 1.0, joints + 2) if edges is None else edges
@@ -116,7 +116,7 @@ class AnguilliformParameters(SpineParameters):
 
 
 class Anguilliform(SpineGait):
-    """The whole body takes part."""
+    """The complete body moves."""
 
     name = "anguilliform"
     title = "swims as an eel does: one and a half waves, growing to the tail"

@@ -2,7 +2,7 @@
 
 The lizard of [KP] 4.2.2 has a body that may bend where the pairs of legs are, and legs whose angles
 to the body over one cycle say everything. Here the angles are computed: on the ground a foot goes
-back at an even rate, in the air it goes forward again; the girdles turn with the legs, the front
+back at an even rate, in the air it goes forward again. The girdles turn with the legs, the front
 one against the hind one (a standing wave between them), which makes the strides longer, while head
 and tail keep their heading.
 """
@@ -45,7 +45,7 @@ class LegParameters(GaitParameters):
 
 
 class LegGait(Gait, ABC):
-    """Legs of two pairs by phase; a subclass says in what order they step."""
+    """Legs of two pairs by phase; a subclass defines the order of their steps."""
 
     duty: ClassVar[float]
     """Share of a cycle that a foot is on the ground."""

@@ -4,6 +4,7 @@ Amplitudes of gaits are *winding angles*: how far the body turns away from its a
 alpha). They do not depend on the number of joints; these functions make joint angles of them.
 """
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +18,16 @@ TURN = 2.0 * np.pi
 
 
 def places(robot: "RobotConfig", joints: tuple[int, ...]) -> Floats:
-    """(n,) where joints are on the body: 0 at the head's tip, 1 at the tail's end."""
-    ends = np.array(robot.link_ends)
-    return np.asarray(ends[np.array(joints, dtype=int) + 1] / robot.link_count)
+    """(n,) where joints are on the body: 0 at the head's tip, 1 at the tail's end; read-only."""
+    return _places(robot.link_ends, joints)
+
+
+@lru_cache(maxsize=64)
+def _places(link_ends: tuple[float, ...], joints: tuple[int, ...]) -> Floats:
+    ends = np.array(link_ends)
+    shares = np.asarray(ends[np.array(joints, dtype=int) + 1] / (len(ends) - 1))
+    shares.setflags(write=False)
+    return shares
 
 
 def joint_amplitude_rad(

@@ -72,8 +72,8 @@ def smooth_background(image: DeepImage) -> DeepImage:
 def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> DeepImage:
     """(H, W[, 3]) the image without what is narrower than ``side_px``: a morphological closing.
 
-    Of dark things on lighter ground; an opening of light things on darker ground. Wide shades of
-    the ground, as those of a lens, of stains and of lamps, are kept.
+    A closing for dark objects on lighter ground; an opening for light objects on darker ground.
+    Wide shades of the ground, as those of a lens, of stains and of lamps, are kept.
     """
     kind = cv2.MORPH_OPEN if polarity is Polarity.LIGHT else cv2.MORPH_CLOSE
     calm = cv2.medianBlur(image, 3)

@@ -15,11 +15,13 @@ from snakewalk.controller.images.background import (
     smooth_background,
     surrounding_ground,
 )
+from snakewalk.controller.images.faint_parts import may_have_faint_parts, with_faint_parts
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton, skeleton_of_level
 from snakewalk.controller.images.residual import check_residual
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
+_LONGER = 1.15  # times the length without the faint parts: they are parts of the body
 _LENGTH_TOLERANCE = 0.15  # of the length: frames that agree on the body's length
 _BETTER = 0.04  # of the frames: by how much more must agree to leave the median
 _FEWEST = 5  # frames from which a ground is learnt
@@ -40,11 +42,13 @@ class Detection:
     """Its ends in no particular order; its status is that of the frame."""
     background: DeepImage
     """(H, W[, 3]) the image that the frame was compared with."""
+    faint_parts: bool = False
+    """Whether parts of the body are much fainter than the rest; its line is then less accurate."""
 
 
 @dataclass(frozen=True, slots=True)
 class BodyDetector:
-    """Background and contrast of a scene; ``detect`` takes any frame, in any order."""
+    """Background and contrast of a scene; ``detect`` accepts any frame, in any order."""
 
     background: DeepImage | None
     """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
@@ -52,12 +56,14 @@ class BodyDetector:
     background_source: str
     """Where the background is from, in words."""
     surroundings_px: int = 0
-    """Where there is no background: side of the square whose ground a place is compared with; 0: a
-    smooth surface is fitted to the frame."""
+    """Without a background: side of the square whose ground a place is compared with; 0: a smooth
+    surface is fitted to the frame."""
     inside: Bools | None = None
     """(H, W) where the animal may be; a body that reaches beyond is cut. None: everywhere."""
     threshold: float | None = None
     """Contrast at the body's boundary, grey levels; None: half of the body's own."""
+    search_faint_parts: bool = True
+    """Whether parts that are much fainter than the rest of the body belong to it."""
 
     def detect(self, image: DeepImage) -> Detection:
         """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
@@ -71,7 +77,20 @@ class BodyDetector:
             raise InputError(
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
             )
-        body = silhouette_of(image, background, self.polarity, self.threshold)
+        body = silhouette_of(image, background, self.polarity, self.threshold, wide_margin=True)
+        found = self._judged(image, background, body)
+        search = self.search_faint_parts and self.threshold is None
+        if search and may_have_faint_parts(body):
+            fuller = with_faint_parts(image, background, self.polarity, body)
+            if fuller is not None:
+                other = self._judged(image, background, fuller)
+                length = np.nan_to_num(found.skeleton.length_px)
+                if other.skeleton.length_px > _LONGER * length:
+                    return replace(other, faint_parts=True)
+        return found
+
+    def _judged(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Detection:
+        """The skeleton of a silhouette, and whether it explains the frame."""
         if self.inside is not None and body.status is FrameStatus.GOOD:
             left, top = (int(v) for v in body.origin_px)
             rows, columns = body.mask.shape
@@ -106,11 +125,11 @@ def make_detector(
 ) -> BodyDetector:
     """Learn a scene from a few frames spread over the recording.
 
-    Without a background the median of the frames is taken. Where the animal hardly moves, or the
-    camera goes with it, the median shows the animal itself; then another ground is taken if more
-    frames agree on the body's length and are explained by it: the median of frames in which the
-    animal is painted out, a brighter or darker quantile of each pixel's values, or what is found in
-    each frame alone, a smooth surface or the surroundings of each place.
+    Without a background the median of the frames is taken. If the animal hardly moves, or the
+    camera follows it, the median shows the animal itself. Then another ground is used if more
+    frames agree on the body's length and are explained by it. It is the median of frames in which
+    the animal is painted out, a brighter or darker quantile of each pixel's values, or the ground
+    found in each frame alone: a smooth surface or the surroundings of each place.
 
     Args:
         frames: (H, W) or (H, W, 3), 8 bit.
@@ -131,6 +150,15 @@ def make_detector(
         given = replace(plain, background=background, background_source="given")
         given.detect(frames[0])
         return replace(given, polarity=_usual_polarity(frames, background))
+    best = _learnt(replace(plain, search_faint_parts=False), frames, cropped=cropped)
+    if best.share < _SURE:
+        other = _learnt(plain, frames, cropped=cropped)
+        best = other if other.share > best.share + _BETTER else best
+    return replace(best.detector, search_faint_parts=True)
+
+
+def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) -> "_Candidate":
+    """The best ground for some frames, and how the detector does with it."""
     surface = replace(
         plain,
         polarity=_usual_polarity(frames, None),
@@ -141,7 +169,7 @@ def make_detector(
     if around is not None:
         alone.append(_Candidate.of(around, frames))
     if cropped or len({frame.shape for frame in frames}) > 1 or len(frames) < _FEWEST:
-        return _best(alone)
+        return _best_of(alone)
     median, *quantiles = [
         replace(
             plain,
@@ -155,7 +183,7 @@ def make_detector(
     painted = _painted_out(_best(alone), frames)
     if painted is not None:
         fixed.insert(1, painted)
-    return _best([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
+    return _best_of([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
 
 
 def whole_share(detector: BodyDetector, frames: Sequence[DeepImage]) -> float:
@@ -169,9 +197,10 @@ class _Candidate:
 
     detector: BodyDetector
     share: float
-    """Of the frames: they show a whole body of the usual length, which explains the picture."""
+    """Share of the frames that show a complete body of the usual length, which explains the
+    picture."""
     length_px: float
-    """Usual length; 0 where there is none."""
+    """Usual length; 0 if it is unknown."""
     width_px: float
     contrast: float
     """At the boundaries of these bodies, grey levels."""
@@ -191,9 +220,15 @@ class _Candidate:
 
 
 def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
+    """The detector of ``_best_of``."""
+    return _best_of(candidates).detector
+
+
+def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
     """The first with about the highest share; half of a body in all frames counts as half.
 
-    A part of the body stands out as much as all of it; what is longer and much fainter is a stain.
+    A part of the body has the same contrast as all of it; a longer and much fainter object is a
+    stain.
     """
     sure = [one for one in candidates if one.share >= _SURE]
     strongest = max((one.contrast for one in sure), default=0.0)
@@ -204,9 +239,7 @@ def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
     ]
     best = max(scores)
     return next(
-        one.detector
-        for one, score in zip(candidates, scores, strict=True)
-        if score >= best - _BETTER
+        one for one, score in zip(candidates, scores, strict=True) if score >= best - _BETTER
     )
 
 

@@ -1,8 +1,8 @@
 """Equal chords along a curve: ``N`` consecutive points on it, first at A, last at B ([PT] 2.3).
 
-Steepest descent on the chord as in [PT], Algorithm 1, with the corrections of the errata: it is
-bracketed and bisected where it does not settle, then chords that end at a later crossing of their
-circle are tried, and a curve without a solution is an error, never an unequal partition.
+Steepest descent on the chord as in [PT], Algorithm 1, with the corrections of the errata. It is
+bracketed and bisected if it does not settle. Then chords that end at a later crossing of their
+circle are tried. A curve without a solution is an error, never an unequal partition.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 TOLERANCE = 1e-9
-"""Of the last point's place, in curve lengths."""
+"""Tolerance of the last point's place, in curve lengths."""
 _RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
 _DESCENTS = 12
 _BISECTIONS = 80
@@ -95,9 +95,9 @@ class _Curve:
 def equipartition(curve: Floats, segments: int = 100) -> Equipartition:
     """Divide ``curve`` (M, 2), M 2 or more, into ``segments`` equal chords.
 
-    Where a chord leaves its arc by more than 5 % (few chords on a strong bend) all solutions by
-    first crossings are searched, for 8 segments or fewer also those by later crossings, and the
-    closest to the curve is taken.
+    If a chord leaves its arc by more than 5 % (few chords on a strong bend), all solutions by first
+    crossings are searched, for 8 segments or fewer also those by later crossings. The result is the
+    closest to the curve.
 
     Raises:
         ValueError: wrong shape, not finite, no length, or no segments.
@@ -134,7 +134,7 @@ def _halves(given: _Curve) -> Equipartition:
     curve, arc = given.curve, given.arc
     side = ((curve - curve[0]) ** 2 - (curve - curve[-1]) ** 2).sum(axis=1)
     if given.least <= TOLERANCE * given.length:
-        side = arc - 0.5 * given.length  # A is B: any point will do, take the middle
+        side = arc - 0.5 * given.length  # A is B: any point is valid, use the middle
     found = []
     for k in np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0)):
         part = side[k] / (side[k] - side[k + 1])
@@ -182,7 +182,7 @@ def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None
 
 
 def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
-    """Search every solution and take the one closest to the curve."""
+    """Search every solution and return the one closest to the curve."""
     found = [] if known is None else [known]
     for method, crossing in _crossings(given.segments, search=known is None):
         for chord in _roots(given, crossing):
@@ -235,7 +235,7 @@ def _thirds(given: _Curve) -> list[Equipartition]:
 
 
 def _newton(given: _Curve, at: Floats) -> Floats:
-    """Those of the starts (K, 2) from which Newton's method finds three equal chords."""
+    """Return those of the starts (K, 2) from which Newton's method finds three equal chords."""
     length, ends = given.length, given.curve[[0, -1]]
     slope = np.diff(given.curve, axis=0) / np.diff(given.arc)[:, None]
     for _ in range(_NEWTON_STEPS):

@@ -16,6 +16,7 @@ from skimage.morphology import skeletonize
 
 from snakewalk.config.arrays import Bools, Floats, Image, Ints
 from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.images.pointed_tips import to_pointed_tips
 from snakewalk.controller.images.thin_body_fit import THIN_PX, fitted
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.compiling import compiled
@@ -25,9 +26,11 @@ SEGMENTS = 100
 _MARGIN = 3
 _LARGEST_PX = 8000  # side of the enlarged cut-out
 _HOLE = 0.35  # a larger hole, in squares of the width, is a loop of the body
-_THIN_TIP = 0.2  # of the contrast, where a body two pixels wide ends: blur takes its tips away
+_THIN_TIP = 0.2  # share of the contrast at which a body two pixels wide ends: blur hides its tips
 _UNSURE_PX = 4.5  # a thinner body's line is used only where its blurred picture fits
-_LONG = 2.5  # widths: what is shorter is no long body
+_POINTED_PX = 3.5  # a thinner body's tips are those of its fit
+_UNIFORM = 0.85  # of the mean width: a body with a deeper place has a wide part
+_LONG = 2.5  # widths: a shorter object is not a long body
 _BRANCH = 0.14  # of the length: a longer side branch is a part of the body
 WORKING_WIDTH = 14.0
 """Width of the body while it is thinned, px."""
@@ -41,12 +44,12 @@ class Skeleton:
     """A body in one image; lengths in pixels of that image, x to the right and y downwards."""
 
     points_px: Floats
-    """(101, 2) x, y at 100 equal chords from tip to tip; NaN where there is none. Which end is the
+    """(101, 2) x, y at 100 equal chords from tip to tip; NaN without a skeleton. Which end is the
     head, ``identity`` decides. A pixel's centre has whole coordinates."""
     radius_px: Floats
     """(101,) distance to the boundary."""
     length_px: float
-    """Sum of the chords; NaN where there is no skeleton."""
+    """Sum of the chords; NaN without a skeleton."""
     status: FrameStatus
 
     def reversed(self) -> "Skeleton":
@@ -125,12 +128,15 @@ def skeleton_of_level(
     line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, noise_level)))
     if line is None:
         return no_skeleton(FrameStatus.BLOB)
-    if width < THIN_PX and grey:
+    uniform = float(depth.max()) < _UNIFORM * WORKING_WIDTH
+    if width < THIN_PX and grey and (uniform or width < _UNSURE_PX):
         found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
         if found is None and width < _UNSURE_PX:
             return no_skeleton(FrameStatus.BLOB)
         if found is not None:
             line = (found[0] + 0.5) * step - 0.5 + _MARGIN
+    if grey and width >= _POINTED_PX:
+        line = to_pointed_tips(line, fine, WORKING_WIDTH, step)
     try:
         even = equipartition(line, SEGMENTS)
     except (NoEquipartitionError, ValueError):

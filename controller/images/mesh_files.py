@@ -1,4 +1,4 @@
-"""A mesh as files: Wavefront OBJ with its material and texture beside it, or one binary glTF."""
+"""A mesh as files: Wavefront OBJ with its material and texture, or one binary glTF."""
 
 import io
 import struct
@@ -16,9 +16,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.images.mesh import Mesh
 
 SKIN_RGB = (0.66, 0.48, 0.20)
-"""Of a body without a picture."""
+"""Colour of a body without a picture."""
 MOST_PIXELS: Final = 8192**2
-"""Of a mesh's pictures (ours)."""
+"""Limit of a mesh's pictures (ours)."""
 _ITEM_BYTES: Final = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _WIDTH: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 """glTF's kinds of numbers (bytes) and of items (numbers)."""
@@ -30,7 +30,7 @@ _AXES: Final = {f"{sign}{axis}": (k, factor)
 
 @dataclass(frozen=True, slots=True)
 class GivenMesh:
-    """A mesh of somebody else's, turned so that x is forward and z up."""
+    """A mesh of another program, turned so that x is forward and z up."""
 
     mesh: Mesh
     solid: Any
@@ -52,7 +52,8 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
         up: default: +y, which glTF prescribes; of an OBJ, +z, but where z is forward, +y.
 
     Raises:
-        InputError: no such file, no triangles in it, or axes that are none or not at right angles.
+        InputError: no such file, no triangles in it, or axes that are unknown or not at right
+            angles.
 
     """
     if not file.is_file():

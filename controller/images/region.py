@@ -12,12 +12,14 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.images.video import read_image
 
 _LEAST_PX = 16  # of a region's sides
-_SOFT_PX = 5  # over which what fills the outside is averaged, so that its noise is no pattern
+_SOFT_PX = (
+    5  # distance over which the fill of the outside is averaged, so that its noise is not a pattern
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A cut-out of every frame; what the mask leaves out is filled from the nearest ground."""
+    """A cut-out of every frame; the area outside the mask is filled from the nearest ground."""
 
     origin_px: tuple[int, int]
     """x, y of its first pixel in the whole picture."""
@@ -26,7 +28,7 @@ class Region:
     inside: Bools | None = None
     """(height, width) of the region: where the animal may be; None: everywhere."""
     fill: tuple[Indices, Indices] | None = None
-    """Rows and columns of the ground that each pixel of the outside takes."""
+    """Rows and columns of the ground that fills each pixel of the outside."""
 
     def cut(self, frame: DeepImage) -> DeepImage:
         """(height, width[, C]) the region of a frame (H, W[, C])."""

@@ -1,4 +1,4 @@
-"""What a body found in a frame leaves unexplained: a part beyond its tips, or a ghost."""
+"""Parts of a frame that a body does not explain: a part beyond its tips, or a ghost."""
 
 import cv2
 import numpy as np
@@ -10,11 +10,11 @@ from snakewalk.controller.images.silhouette import Polarity, Silhouette, as_deep
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _AROUND = 0.5  # of the length, looked at on each side
-_WEAK = 0.2  # of the body's contrast: what is left over and weaker is ground
-_NEAR = 1.5  # widths from a tip: what begins there may be the body's
+_WEAK = 0.2  # share of the body's contrast: a weaker residual is ground
+_NEAR = 1.5  # widths from a tip: a nearer residual may belong to the body
 _AWAY = 1.2  # widths from the body: a shadow stays nearer
 _PART = 0.02  # of the body's summed contrast: so much beyond a tip is a part of it
-_GHOST = 0.05  # the same for what the background shows and the frame does not
+_GHOST = 0.05  # the same for objects of the background that the frame lacks
 _GHOST_WEAK = 0.3  # of the body's contrast
 
 
@@ -62,7 +62,7 @@ def check_residual(
 
 
 def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:
-    """Sum of contrast of what begins at a tip and goes away from the body."""
+    """Sum of contrast of residuals that begin at a tip and lead away from the body."""
     apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
     rest = (same > least) & (apart > 1.5)
     count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
@@ -80,7 +80,7 @@ def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least:
 def _ghost(
     seen: DeepImage, ground: DeepImage, polarity: Polarity, body: Bools, wide: float, least: float
 ) -> float:
-    """Sum of what stands out the wrong way beside the body where the ground holds something alike.
+    """Sum of the contrast of the wrong sign near the body, if the ground holds a similar shape.
 
     A ghost away from the body does not spoil it.
     """

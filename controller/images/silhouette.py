@@ -12,6 +12,7 @@ from snakewalk.config.arrays import Bools, DeepImage
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _MARGIN = 4
+_WIDE_MARGIN = 20
 _CLEAR = 6.0  # standard deviations of the noise by which an animal's pixel must stand out
 _LEAST_PX = 12
 _RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
@@ -72,7 +73,12 @@ def contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> Dee
     return np.asarray(np.maximum(apart, 0) if apart.dtype == np.float32 else apart)
 
 
-def _noise_of(apart: DeepImage) -> tuple[float, float]:
+def soft_contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
+    """(H, W) ``contrast`` with the noise of single pixels averaged."""
+    return as_deep_as(image, cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0))
+
+
+def noise_of(apart: DeepImage) -> tuple[float, float]:
     """Median and spread of the contrast of the background, from every n-th pixel."""
     every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
     some = apart[::every, ::every].ravel()
@@ -86,6 +92,8 @@ def silhouette_of(
     background: DeepImage,
     polarity: Polarity = Polarity.BOTH,
     threshold: float | None = None,
+    *,
+    wide_margin: bool = False,
 ) -> Silhouette:
     """Find the animal of one frame.
 
@@ -94,18 +102,20 @@ def silhouette_of(
         background: the same without the animal.
         polarity: whether the animal is darker or lighter than its ground.
         threshold: contrast at the boundary, grey levels; None: half of the body's own.
+        wide_margin: whether the cut-out is larger where the body fades out at its edge.
 
     """
-    apart = as_deep_as(image, cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0))
-    middle, spread = _noise_of(apart)
+    margin = _WIDE_MARGIN if wide_margin else _MARGIN
+    apart = soft_contrast(image, background, polarity)
+    middle, spread = noise_of(apart)
     clear = middle + _CLEAR * spread
     if threshold is not None:
-        return _cut_out(apart, threshold, min(clear, threshold), middle)
-    found = _parts((apart > clear).astype(np.uint8))
+        return cut_out(apart, threshold, min(clear, threshold), middle, margin)
+    found = connected_parts((apart > clear).astype(np.uint8))
     if found is None:
         return _no_silhouette()
     threshold = _threshold_of_body(apart, *found, middle, middle + 3.0 * spread)
-    return _cut_out(apart, threshold, clear, middle)
+    return cut_out(apart, threshold, clear, middle, margin)
 
 
 def _threshold_of_body(
@@ -117,10 +127,9 @@ def _threshold_of_body(
 ) -> float:
     """Half of the contrast of the part with the most contrast in sum.
 
-    Stains of a JPEG and a soft shade of the ground may be larger than the animal, and joined to
-    it. So where a part is mostly fainter than half of its strong pixels, its contrast is a
-    percentile in which each pixel counts by the square of its own, and a part's sum is taken above
-    half of that.
+    Stains of a JPEG and a soft shade of the ground may be larger than the animal, and joined to it.
+    So if a part is mostly fainter than half of its strong pixels, its contrast is a percentile in
+    which each pixel counts by its squared contrast, and a part's sum is taken above half of that.
     """
     strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
     inside = label > 0
@@ -150,7 +159,7 @@ def _no_silhouette() -> Silhouette:
     return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
 
 
-def _parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+def connected_parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     """Labels and statistics of the connected parts, searched only where the mask is not empty."""
     left, top, wide, high = cv2.boundingRect(mask)
     if wide * high < _LEAST_PX:
@@ -166,9 +175,14 @@ def _parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | Non
     return label, np.asarray(stats, dtype=np.int32)
 
 
-def _cut_out(apart: DeepImage, threshold: float, noise_level: float, middle: float) -> Silhouette:
-    """The body of most contrast above the threshold, with a margin; whether alone and whole."""
-    found = _parts((apart > threshold).astype(np.uint8))
+def cut_out(
+    apart: DeepImage, threshold: float, noise_level: float, middle: float, most_px: int
+) -> Silhouette:
+    """The body of most contrast above the threshold, with a margin; whether alone and whole.
+
+    The margin is ``most_px`` where more than noise reaches its edge, else a few pixels.
+    """
+    found = connected_parts((apart > threshold).astype(np.uint8))
     if found is None:
         return _no_silhouette()
     label, stats = found
@@ -183,11 +197,15 @@ def _cut_out(apart: DeepImage, threshold: float, noise_level: float, middle: flo
         status = FrameStatus.SEVERAL
     elif left == 0 or top == 0 or left + wide == columns or top + high == rows:
         status = FrameStatus.CUT
-    window = (
-        slice(max(0, top - _MARGIN), min(rows, top + high + _MARGIN)),
-        slice(max(0, left - _MARGIN), min(columns, left + wide + _MARGIN)),
-    )
-    level = apart[window].astype(np.float32)
+    for margin in sorted({_MARGIN, most_px}):
+        window = (
+            slice(max(0, top - margin), min(rows, top + high + margin)),
+            slice(max(0, left - margin), min(columns, left + wide + margin)),
+        )
+        level = apart[window].astype(np.float32)
+        rim = (level[0], level[-1], level[:, 0], level[:, -1])
+        if not any(bool((side > noise_level).any()) for side in rim):
+            break
     other = (label[window] != best) & (label[window] != 0)
     if other.any():
         level[cv2.dilate(other.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0

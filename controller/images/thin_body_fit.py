@@ -1,8 +1,8 @@
 """Small bodies, as thin as their own blur: the curve whose blurred picture is the image's.
 
-The ridge of a blurred bend lies inside the bend, and blur takes tips away. So a line of Gaussian
-spots along a cubic spline is fitted to the contrast by damped least squares: control points,
-thickness at a few stations, and the width of the spots, which blur and body share.
+The ridge of a blurred bend lies inside the bend, and blur hides tips. So a line of Gaussian spots
+along a cubic spline is fitted to the contrast by damped least squares. The parameters are control
+points, thickness at a few stations, and the width of the spots, which blur and body share.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ _STIFF = 0.02  # of second differences of the controls, against the picture's ow
 _EVEN = 0.3  # the same of the differences in thickness
 _LEAST_WIDTH = 0.5  # px, of a spot
 _FAR = 5.5  # standard deviations: further off a spot is not seen
-_TAPER = 0.02  # of the length: what tapers off at each end and is too little to be fitted
+_TAPER = 0.02  # share of the length at each end that tapers off and is too faint for the fit
 _MISFIT = 0.25  # of the picture's own strength: more left over, and the curve is not the body's
 
 

@@ -1,11 +1,10 @@
-"""Frames of a recording: a video that OpenCV or PyAV reads, or a folder of images by name.
+"""Frames of a recording: a video that OpenCV or PyAV reads, a TIFF stack, or a folder of images.
 
 Images of 16 bit keep their depth: they become float32, and one scale for the whole recording puts
 what its camera uses of the range where 8 bit would have it. Frames of a video have its times.
 """
 
 import os
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -19,6 +18,12 @@ from numpy.typing import NDArray
 from snakewalk.config.archive import why_no_file
 from snakewalk.config.arrays import DeepImage, Floats, Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.images.image_sequence import (
+    STACKS,
+    frame_numbers_of,
+    in_order,
+    pages_of,
+)
 
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # faults get our own messages
 if "OPENCV_LOG_LEVEL" not in os.environ:  # which OpenCV has read when it was loaded
@@ -30,7 +35,7 @@ _DEEP_RANGE = (16.0, 240.0)
 """Grey levels between which the values of deep images are put."""
 _DEEP_SAMPLE = 9
 _EVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
-_ALIKE = 0.005  # of the rate: what the times say beside what the file states
+_ALIKE = 0.005  # share of the rate: difference between the times and the rate that the file states
 _MISSING = 0.02  # of the frames that a file declares may be absent: some codecs count wrongly
 
 
@@ -59,7 +64,16 @@ class Footage:
     decoded_by_av: bool = False
     """Whether PyAV reads the video, as this OpenCV lacks its codec."""
     deep: GreyScale | None = None
-    """Of images of 16 bit; None for all others."""
+    """Scale of images of 16 bit; None for all others."""
+    pages: tuple[int, ...] = ()
+    """The page of each of ``files``, from 0: a stack is among them once for each page."""
+    numbers: tuple[int, ...] = ()
+    """Frame number of each of ``files`` where some numbers are missing; else empty."""
+
+    @property
+    def missing(self) -> int:
+        """Images whose number is missing."""
+        return self.numbers[-1] + 1 - len(self.numbers) if self.numbers else 0
 
     def read(self) -> Iterator[DeepImage]:
         """(H, W) or (H, W, 3) frames in order, 8 bit, or deeper ones on the same scale.
@@ -75,19 +89,25 @@ class Footage:
         return map(in_8_bits, self.read())
 
     def timed(self) -> Iterator[tuple[DeepImage, float]]:
-        """Frames as of ``read``, and when a video says they are shown, s; NaN for images."""
+        """Frames as of ``read``, and when a video says they are shown, s.
+
+        Images have the times of their numbers where some are missing, else NaN.
+        """
         if self.files:
-            return ((self.image(file), float("nan")) for file in self.files)
+            at_s = [n / self.rate_hz for n in self.numbers] or [float("nan")] * len(self.files)
+            shots = zip(self.files, self.pages, at_s, strict=True)
+            return ((self.image(file, page), at) for file, page, at in shots)
         return self._video(1)
 
     def spread(self, most: int) -> list[DeepImage]:
         """At most ``most`` frames, spread over the recording."""
         every = max(1, -(-self.count // most))
         if self.files:
-            return [self.image(file) for file in self.files[::every]]
+            shots = list(zip(self.files, self.pages, strict=True))
+            return [self.image(file, page) for file, page in shots[::every]]
         return [frame for frame, _ in self._video(every)]
 
-    def image(self, file: Path) -> DeepImage:
+    def image(self, file: Path, page: int = 0) -> DeepImage:
         """One image of the recording, or one that belongs to it: a background.
 
         Raises:
@@ -95,8 +115,8 @@ class Footage:
 
         """
         if self.deep is None:
-            return read_image(file)
-        whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+            return in_8_bits(_one_channel(_decoded(file, cv2.IMREAD_ANYCOLOR, page)))
+        whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page)
         if whole.dtype != np.uint16:
             return _one_channel(whole)
         return _one_channel((whole.astype(np.float32) - self.deep.black) * self.deep.gain)
@@ -143,7 +163,7 @@ def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
                 whole = None if number % every else frame.to_ndarray(format="bgr24")
                 yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
-        return  # what is missing is counted by the caller
+        return  # missing frames are counted by the caller
 
 
 def _av() -> ModuleType:
@@ -166,7 +186,7 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
     """Open a recording without reading all of it.
 
     Args:
-        path: a video file, or a folder of images.
+        path: a video file, a TIFF stack, or a folder of images.
         rate_hz: frames a second, instead of what the file states; a folder states none.
 
     Raises:
@@ -175,20 +195,8 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
     """
     if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
         raise InputError(f"{path}: the frame rate must be above 0 Hz, not {rate_hz}")
-    if path.is_dir():
-        files = tuple(
-            sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=_in_order)
-        )
-        if not files:
-            raise InputError(f"{path}: holds no images ({', '.join(IMAGES)})")
-        return Footage(
-            path,
-            files,
-            len(files),
-            rate_hz or ASSUMED_HZ,
-            rate_hz is None,
-            deep=_scale_of_deep(files[:: max(1, len(files) // _DEEP_SAMPLE)]),
-        )
+    if path.is_dir() or (path.is_file() and path.suffix.lower() in STACKS):
+        return _images(path, rate_hz)
     if not path.is_file():
         raise InputError(why_no_file(path, "no such video or folder of images"))
     if path.stat().st_size == 0:
@@ -204,14 +212,36 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
         count, stated = by_av
     elif not first:
         raise InputError(
-            f"{path}: no frame can be read: it is no video, is cut, or has a codec that this "
-            "OpenCV lacks (PyAV, of the extra view, reads more); convert it, or give images"
+            f"{path}: OpenCV cannot read a frame: the file is incomplete, or not a video, or "
+            "has another codec; convert it, install PyAV (extra view), or give images"
         )
     if not 0.0 < stated < 1e5:
         stated = 0.0
     rate = rate_hz or stated or ASSUMED_HZ
     assumed = rate_hz is None and stated == 0.0
     return Footage(path, (), max(1, int(count)), rate, assumed, by_av is not None)
+
+
+def _images(path: Path, rate_hz: float | None) -> Footage:
+    """A folder of images, or one file of many pages."""
+    if path.is_dir():
+        found = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=in_order)
+    else:
+        found = [path]
+    if not found:
+        raise InputError(f"{path}: holds no images ({', '.join(IMAGES)})")
+    files, pages = pages_of(found)
+    numbers = frame_numbers_of(files) if len(files) == len(found) else None
+    return Footage(
+        path,
+        files,
+        len(files),
+        rate_hz or ASSUMED_HZ,
+        rate_hz is None,
+        deep=_scale_of_deep(found[:: max(1, len(found) // _DEEP_SAMPLE)]),
+        pages=pages,
+        numbers=() if numbers is None else tuple(numbers.tolist()),
+    )
 
 
 def frame_times(stated_s: Sequence[float], rate_hz: float) -> tuple[Floats, float]:
@@ -274,14 +304,19 @@ def read_image(file: Path) -> Image:
     return in_8_bits(_one_channel(_decoded(file, cv2.IMREAD_ANYCOLOR)))
 
 
-def _decoded(file: Path, how: int) -> NDArray[np.uint8 | np.uint16 | np.float32]:
+def _decoded(file: Path, how: int, page: int = 0) -> NDArray[np.uint8 | np.uint16 | np.float32]:
+    if page:
+        done, mats = cv2.imreadmulti(str(file), page, 1, flags=how)
+        if not done:
+            raise InputError(f"{file}: page {page + 1} is not a readable image")
+        return np.asarray(mats[0])
     try:
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
     image = cv2.imdecode(data, how) if data.size else None
     if image is None:
-        raise InputError(f"{file}: is no image that can be read")
+        raise InputError(f"{file}: is not a readable image; choose another file")
     whole: NDArray[np.uint8 | np.uint16 | np.float32] = np.asarray(image)
     return whole
 
@@ -295,10 +330,3 @@ def _one_channel(image: NDArray[np.uint8 | np.uint16 | np.float32]) -> DeepImage
     ):
         return np.ascontiguousarray(out[..., 0])
     return out
-
-
-def _in_order(file: Path) -> list[tuple[int, str]]:
-    """2.png before 10.png."""
-    return [
-        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)
-    ]

@@ -30,15 +30,13 @@ class BodyView(NamedTuple):
     def headings_rad(self) -> Floats:
         """(L,) unwrapped headings of the links in the horizontal plane."""
         angles = np.arctan2(self.rotation[:, 1, 0], self.rotation[:, 0, 0])
-        turns = np.rint(
-            (angles[1:] - angles[:-1]) / (2.0 * np.pi)
-        )  # np.unwrap takes 4 times longer
+        turns = np.rint((angles[1:] - angles[:-1]) / (2.0 * np.pi))  # np.unwrap is 4 times slower
         angles[1:] -= 2.0 * np.pi * turns.cumsum()
         return np.asarray(angles)
 
     @property
     def heading_rad(self) -> float:
-        """Of the body's mean line: the mean of the links' headings."""
+        """Heading of the body's mean line: the mean of the links' headings."""
         return float(self.headings_rad.mean())
 
     def advance_since_m(self, before: "BodyView") -> float:
@@ -48,8 +46,9 @@ class BodyView(NamedTuple):
     def unbiased_advance_since_m(self, before: "BodyView") -> float:
         """Return the same along the mean of the axes before and now.
 
-        Noise of the head's rotation moves the links and turns their axes at once: along the axes of
-        one of both times, 3 degrees in every pose make a body of 1.2 m 0.13 m/s slower at 50 Hz.
+        Noise of the head's rotation moves the links and turns their axes at once. Along the axes of
+        only one of both times, 3 degrees of noise in every pose make a body of 1.2 m 0.13 m/s
+        slower at 50 Hz.
         """
         return 0.5 * (self.advance_since_m(before) - before.advance_since_m(self))
 
@@ -66,7 +65,7 @@ class SpineLinks(NamedTuple):
 
     @staticmethod
     def of(robot: RobotConfig) -> "SpineLinks":
-        """Of a robot's file."""
+        """Links of a robot's file."""
         return _spine(robot.joint_axes, robot.link_lengths_m, robot.link_masses_kg)
 
     def in_world(self, pose: BodyPose, joint_rad: Floats) -> BodyView:

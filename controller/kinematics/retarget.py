@@ -19,8 +19,8 @@ class Retarget:
         yaw = np.array(robot.yaw_joints, dtype=int)
         if len(yaw) == 0:
             raise InputError(
-                f"robot {robot.name}: has no yaw joint: it cannot take the shapes of a walk or a "
-                "recording; gaits that need pitch joints only run on it (snakewalk gait list)"
+                f"robot {robot.name}: has no yaw joint, which a walk or a recording needs; "
+                "choose another robot, or a gait for pitch joints only (snakewalk gait list)"
             )
         links = robot.link_count
         ends = np.array(robot.link_ends)

@@ -1,9 +1,9 @@
 """Roll compensation: joint goals that bend a rolled body in the plane that was meant.
 
 A body that has rolled by an angle bends its yaw joints out of the ground's plane, and on its back
-to the wrong side. Its bends, turned back by that angle, lie in the plane again: what yaw joints
-lack, the pitch joints beside them make. A remainder of the roll is left in, so that the weight of
-the tilted shape turns the body home.
+to the wrong side. Its bends, turned back by that angle, lie in the plane again: the pitch joints
+next to the yaw joints make the missing part. A remainder of the roll is left in, so that the weight
+of the tilted shape turns the body home.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.drivers.compiling import compiled
 
 _LEFT_IN_RAD = 1.0
-"""Roll that is not compensated: the weight takes care of it (ours)."""
+"""Roll that is not compensated: the weight corrects it (ours)."""
 _RATE_RAD_S = 2.0
 """Fastest change of the compensation: joints of 0.7 rad then move at 1.4 rad/s (ours)."""
 

@@ -18,7 +18,7 @@ def cubic(x: Share, height: float = 1.0) -> Share:
 
 
 def cubic_slope(x: Share, height: float = 1.0) -> Share:
-    """Of ``cubic``; largest in the middle, 1.5 heights."""
+    """Slope of ``cubic``; largest in the middle, 1.5 heights."""
     return height * 6.0 * x * (1.0 - x)
 
 
@@ -44,7 +44,7 @@ def quintic_sum(x: Share) -> Share:
 
 
 def quintic_slope(x: Share) -> Share:
-    """Of ``quintic``."""
+    """Slope of ``quintic``."""
     return 30.0 * x * x * (1.0 - x) ** 2
 
 

@@ -50,10 +50,10 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Action (J,): goal angles as shares of the joints' limits, -1 to 1: the goals in rad are
     ``action * limit_rad``. The safety link clamps their rate.
 
-    Observation (4 J + 7,): measured angles (rad), velocities (rad/s) and currents (A), as the
-    packets brought them; the goals that safety let through last (rad); from the simulation the
-    world's up in the axes of the head; cosine and sine of the body's mean heading, x being 0; the
-    velocity of the centre of mass along x and y since the last step (m/s).
+    Observation (4 J + 7,): measured angles (rad), velocities (rad/s) and currents (A), as in the
+    packets; the last goals that safety passed (rad). The simulation adds the world's up in the axes
+    of the head, cosine and sine of the body's mean heading (x being 0), and the velocity of the
+    centre of mass along x and y since the last step (m/s).
 
     Reward, in m: how far the centre of mass came along x, less ``energy_weight_m_j`` metres for
     each joule that the motors took in. If safety trips, the episode terminates, and
@@ -127,7 +127,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         ).astype("f4")
         self.observation_space = spaces.Box(-self._end, self._end, dtype=np.float32)
         self.observation_names = _names(body)
-        """Of each number of an observation, with its unit."""
+        """Name of each number of an observation, with its unit."""
         self._limits = SafetyLimits.from_config(body, run.safety)
         self._backend: Backend | None = None
         self._link: SafeLink | None = None
@@ -144,7 +144,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def period_s(self) -> float:
-        """Of the robot's time, a step."""
+        """Duration of a step in the robot's time."""
         return 1.0 / self._prepared.run.cycle_hz
 
     @property
@@ -152,7 +152,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """The body as it was measured last.
 
         Raises:
-            gymnasium.error.ResetNeeded: there is no episode.
+            gymnasium.error.ResetNeeded: no episode has begun.
 
         """
         if self._view is None:
@@ -162,10 +162,10 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Lay another robot of the same kind on the ground, torque on; takes as long as 600 steps.
+        """Lay another robot of the same kind on the ground, torque on; needs as long as 600 steps.
 
         Raises:
-            InputError: ``options`` are given; there are none.
+            InputError: ``options`` are given, although none exist.
 
         """
         super().reset(seed=seed)
@@ -204,7 +204,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         try:
             link.write(JointCommand(backend.clock.now_s(), goal_rad))
         except SafetyTrippedError:
-            pass  # it has latched: the episode ends, with what can still be read
+            pass  # it has latched: the episode ends, with the last readings
         else:
             if link.last_verdict is not None:
                 self._sent_rad = link.last_verdict.goal_rad

@@ -1,4 +1,4 @@
-"""The environment of a policy's training: what runs in it is the policy's own motion.
+"""The environment of a policy's training; it runs the policy's own motion.
 
 It is ``SnakeEnvironment`` with the eyes and hands of a ``PolicyMotion``: an observation is what the
 motion observes on a robot without a camera, an action changes the motion's wave.
@@ -60,7 +60,7 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
         self._policy = policy.model_copy(update={"network": (), "observation": ()})
         self._motion: PolicyMotion | None = None
         self.observation_names = observation_names(self._snake.robot)
-        """Of each number of an observation, with its unit."""
+        """Name of each number of an observation, with its unit."""
         ends = np.full(len(self.observation_names), np.pi, dtype="f4")
         self.observation_space = spaces.Box(-ends, ends, dtype=np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, WAVE_SPAN.shape, dtype=np.float32)

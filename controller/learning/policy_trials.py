@@ -1,4 +1,4 @@
-"""Policies beside gaits: how fast and at what cost each moves, over seeds that move the start.
+"""Comparison of policies with gaits: speed and cost of each, over seeds that move the start.
 
 Each seed draws the start's heading, the ground's friction and the supply, the same for all motions.
 """
@@ -45,7 +45,7 @@ class PolicyTrialResult:
     """A run's numbers at full rate; NaN where it tripped."""
 
     speed_m_s: float
-    """Of the centre of mass, along the straight line from where it was to where it came."""
+    """Speed of the centre of mass, along the straight line from its start to its end."""
     body_lengths_cycle: float
     energy_j_m: float
     """Electrical energy of the motors, integrated in every physics step, for a metre of it."""
@@ -54,6 +54,9 @@ class PolicyTrialResult:
     tripped: str | None
     slowed_to: float
     """Lowest rate of derating."""
+    pose_evidence: str
+    """How the poses are known that the numbers follow from."""
+    pose_source: str
 
 
 def policy_trials(
@@ -103,8 +106,9 @@ def _is_set(motion: str) -> bool:
 def _result(finished: Finished, seconds: float) -> PolicyTrialResult:
     record, source, outcome = finished.record, finished.source, finished.outcome
     assert isinstance(source, GaitMotion | PolicyMotion)
+    pose_of = (finished.summary.pose_evidence, finished.summary.pose_source)
     if outcome.tripped is not None:
-        return PolicyTrialResult(*(math.nan,) * 4, outcome.tripped, outcome.least_rate)
+        return PolicyTrialResult(*(math.nan,) * 4, outcome.tripped, outcome.least_rate, *pose_of)
     pose = record.pose
     ends_s = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), seconds)
     first, last = np.searchsorted(pose.time_s, ends_s)
@@ -121,4 +125,5 @@ def _result(finished: Finished, seconds: float) -> PolicyTrialResult:
         float(np.arctan2(way_m[1], way_m[0])),
         None,
         outcome.least_rate,
+        *pose_of,
     )

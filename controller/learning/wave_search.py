@@ -69,7 +69,7 @@ def search_wave(
         on_progress: gets the progress after each generation.
 
     Raises:
-        InputError: there is no such robot or world.
+        InputError: the robot or the world does not exist.
 
     """
     start = PolicyWave().vector()

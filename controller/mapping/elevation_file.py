@@ -165,9 +165,9 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
         points = cloud.points
         if cloud.image is not None and options.up is None:
             raise InputError(
-                f"{file}: is a picture of {cloud.image[0]} by {cloud.image[1]} points, as depth "
-                "cameras give it, whose z points away from the camera and whose y points down; it "
-                "states no direction up: add --up -y (or --up z, if it was turned upright)"
+                f"{file}: is a depth picture of {cloud.image[0]} by {cloud.image[1]} points "
+                "without a direction up; add --up -y if y points down in the picture, or --up "
+                "z if it is upright"
             )
         notes += cloud.notes
     elif ending == ".xyz":
@@ -279,10 +279,9 @@ def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> No
     share = float(count[stacked].sum() / count[several].sum())
     if share > _STACKED_SHARE:
         raise InputError(
-            f"{file}: is no ground seen from above: {100.0 * share:.0f} % of its points are in "
-            "cells where they lie one above the other by more than "
-            f"{100.0 * _STACKED_RELIEF:.0f} % of the relief; add --up AXIS if another axis points "
-            "up, or --point lowest, median or highest for what counts in a cell"
+            f"{file}: is not ground seen from above: {100.0 * share:.0f} % of its points share a "
+            f"cell whose heights differ by over {100.0 * _STACKED_RELIEF:.0f} % of the relief; "
+            "add --up AXIS, or --point lowest, median or highest"
         )
 
 

@@ -172,7 +172,7 @@ class _Strips:
             enough_m = spacing_m * math.sqrt(samples[0] * samples[1] / MOST_SAMPLES)
             raise InputError(
                 f"{self._opened.name}: {samples[1]} by {samples[0]} samples are over "
-                f"{MOST_SAMPLES}: take a --spacing of {enough_m:.3g} m of the file or more, or "
+                f"{MOST_SAMPLES}; use a --spacing of {enough_m:.3g} m of the file or more, or "
                 "--crop a part"
             )
         out, absent = np.full(samples, np.nan), 0

@@ -3,7 +3,7 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "terrain from", "Make a world for `plan` and `run` from a file of real ground; its holes stay known.", "snakewalk.controller.mapping.commands.elevation:elevation", ""),
-    ("command", "terrain from-stereo", "Make a world of the ground in front of a stereo camera; what it did not see stays unknown.", "snakewalk.controller.mapping.commands.stereo:stereo", ""),
+    ("command", "terrain from", "Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown.", "snakewalk.controller.mapping.commands.elevation:elevation", ""),
+    ("command", "terrain from-stereo", "Make a world of the ground in front of a stereo camera; unseen ground stays unknown.", "snakewalk.controller.mapping.commands.stereo:stereo", ""),
     ("map", "stereo", "A map from the pictures of the robot's stereo head.", "snakewalk.controller.mapping.stereo_map:StereoMap", ""),
 )

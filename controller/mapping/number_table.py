@@ -55,8 +55,8 @@ def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
             value = _number(cell, comma)
             if value is None:
                 raise InputError(
-                    f"{file}: line {number}, column {column + 1}: {cell!r} is no number; leave "
-                    "cells without a value empty"
+                    f"{file}: line {number}, column {column + 1}: {cell!r} is not a number; "
+                    "leave cells without a value empty"
                 )
             values[k, column] = value
     if comma and notes is not None:

@@ -55,7 +55,9 @@ def read_pcd(file: Path) -> PcdCloud:
         width, height = int(header["WIDTH"][0]), int(header.get("HEIGHT", ["1"])[0])
         pose = [float(word) for word in header.get("VIEWPOINT", [])]
     except (ValueError, KeyError, IndexError, struct.error, OverflowError) as error:
-        raise InputError(f"{file}: is no whole PCD file: {error}") from None
+        raise InputError(
+            f"{file}: is not a complete PCD file: {error}; choose another file"
+        ) from None
     finite = np.isfinite(points).all(axis=1)
     notes = []
     if not finite.all():
@@ -92,7 +94,7 @@ def _pcd(file: Path, data: bytes) -> Floats:
         points = np.frombuffer(body, row, total)
         return np.stack([points[axis][:, 0].astype(float) for axis in "xyz"], axis=-1)
     if encoding != "binary_compressed":
-        raise ValueError(f"DATA {encoding} is none of ascii, binary, binary_compressed")
+        raise ValueError(f"DATA {encoding} is not one of ascii, binary, binary_compressed")
     packed, unpacked = struct.unpack("<II", body[:8])
     if unpacked != total * row.itemsize or packed > len(body) - 8:
         raise ValueError("the sizes of its compressed data do not fit its points")

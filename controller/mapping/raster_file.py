@@ -78,7 +78,9 @@ def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Rast
     if units.cell is None:
         raise InputError(f"{file}: says no size of its cells: --cell, between two samples")
     if units.unit == DEGREE:
-        raise InputError(f"{file}: says no latitude, so that degrees are no lengths: --unit m")
+        raise InputError(
+            f"{file}: states no latitude, so degrees cannot be converted to lengths; add --unit m"
+        )
     cell_m = units.cell * unit_m(units.unit or "m")
     rows, columns = raster_window(file, values.shape, cell_m, cell_m, crop)
     per_value_m = (units.height_step or 1.0) * unit_m(units.height_unit or units.unit or "m")

@@ -125,7 +125,9 @@ def _storage(file: Path) -> dict[str, Any]:
         held = {name: node.mat() for name, node in nodes.items() if node.isMap()}
         store.release()
     except (cv2.error, SystemError) as error:
-        raise InputError(f"{file}: is no file of OpenCV's FileStorage: {error}") from None
+        raise InputError(
+            f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
+        ) from None
     return held
 
 
@@ -141,7 +143,9 @@ def _middlebury(file: Path) -> dict[str, Any]:
         baseline_m = 0.001 * float(lines["baseline"])
         k_left, k_right = k_left.reshape(3, 3), k_right.reshape(3, 3)
     except (KeyError, ValueError) as error:
-        raise InputError(f"{file}: is no calib.txt with cam0, cam1, baseline: {error}") from None
+        raise InputError(
+            f"{file}: is not a calib.txt with cam0, cam1, baseline: {error}; choose another file"
+        ) from None
     return {
         "k_left": k_left,
         "k_right": k_right,

@@ -24,13 +24,13 @@ class StereoMap:
         faults = []
         if robot.stereo_head is None:
             faults.append(
-                f"mapping: robot {robot.name} has no stereo head: describe it in its file, table "
-                "[stereo_head], or take alternating16-stereo"
+                f"mapping: robot {robot.name} has no stereo head; add the table [stereo_head] "
+                "to its file, or use alternating16-stereo"
             )
         if on_port:
             faults.append("mapping: pictures are the simulator's; on servos give the world's map")
         if run.motion not in ("walk", "serpenoid"):
-            faults.append(f"mapping: motion {run.motion} plans once; take walk or serpenoid")
+            faults.append(f"mapping: motion {run.motion} plans only once; use walk or serpenoid")
         if prepared.ground is None:
             faults.append(f"mapping: world {prepared.world.name} is level; there is nothing to map")
         if not run.pose_is_true:

@@ -1,8 +1,8 @@
 """Friction filter: the friction under a body, found from where it slid.
 
 An extended Kalman filter on the logarithms of the friction along and across. It begins at the
-world's file and returns to it while nothing is measured. Each span of motion is foretold under
-three hypotheses by whatever model there is; where the body really went moves the estimate.
+world's file and returns to it while nothing is measured. A model predicts each span of motion under
+three hypotheses; the body's real motion moves the estimate.
 """
 
 import math
@@ -18,10 +18,10 @@ _PRIOR = 0.4
 _MEMORY_S = 40.0
 """In which the estimate returns to the file by a factor of e (ours)."""
 _STRAY = 0.1
-"""By which the friction of one span may differ from that of the ground (ours): no span alone tells
-it better, however much the body slid."""
+"""Difference of the friction of one span from that of the ground (ours): no single span is more
+accurate, however far the body slid."""
 _STEP = 0.1
-"""Of the logarithms, between the hypotheses (ours)."""
+"""Step of the logarithms, between the hypotheses (ours)."""
 _MOST = 0.3
 """By which a span moves an estimate at most (ours)."""
 _BOUND = math.log(4.0)
@@ -41,7 +41,7 @@ class _Square(NamedTuple):
 
     @property
     def inverse(self) -> "_Square":
-        """Of a positive definite one."""
+        """Inverse of a positive definite matrix."""
         whole = self.uu * self.vv - self.uv * self.uv
         return _Square(self.vv / whole, -self.uv / whole, self.uu / whole)
 
@@ -61,7 +61,7 @@ class _Square(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FoundFriction:
-    """What was found so far."""
+    """Results so far."""
 
     friction: FrictionConfig
     """Best estimate."""
@@ -75,8 +75,8 @@ class FoundFriction:
 class FrictionFilter:
     """Estimates the friction along and across a body.
 
-    Its axes are u, both logarithms greater, which moves nothing on a level floor and has to tell
-    nothing there, and v, along against across.
+    Its axes are u, both logarithms greater, which has no effect on a level floor and gives no
+    information there, and v, along against across.
     """
 
     def __init__(self, file: FrictionConfig, sigma: Sequence[float]) -> None:
@@ -95,12 +95,12 @@ class FrictionFilter:
         self._differs = False
 
     def hypotheses(self) -> tuple[FrictionConfig, ...]:
-        """The three under which the next span is to be foretold: the estimate first."""
+        """The three hypotheses for the prediction of the next span: the estimate first."""
         u, v = self._u, self._v
         return self._friction(u, v), self._friction(u + _STEP, v), self._friction(u, v + _STEP)
 
     def update(self, measured: Floats, foretold: Floats, span_s: float) -> FoundFriction:
-        """Take a span of motion.
+        """Process a span of motion.
 
         Args:
             measured: (3,) way ahead and to the left, m, and turn, rad.
@@ -123,7 +123,7 @@ class FrictionFilter:
     def _correct(
         self, measured: list[float], here: list[float], by_u: list[float], by_v: list[float]
     ) -> None:
-        """Move the estimate by what the body did beside what was foretold under it."""
+        """Move the estimate by the difference between motion and prediction."""
         gap = [m - h for m, h in zip(measured, here, strict=True)]
         gap[2] = math.remainder(gap[2], 2.0 * math.pi)
         slopes = [
@@ -136,7 +136,7 @@ class FrictionFilter:
             pull_u, pull_v = pull_u + weight * u * g, pull_v + weight * v * g
         span, about = self._of_span(information, 1.0)
         excess = max(1.0, (whole - about.about(pull_u, pull_v)) / len(gap))
-        span, about = self._of_span(information, excess)  # what is far off counts the less
+        span, about = self._of_span(information, excess)  # a large deviation counts less
         u, v = about.times(pull_u / excess, pull_v / excess)
         cov, to_span = self._covariance, span.inverse
         u, v = cov.times(*to_span.times(u, v))

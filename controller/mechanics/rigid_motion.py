@@ -20,14 +20,14 @@ _CLOSE = 1e-8
 _NONE = np.zeros((3, 3))
 
 LANES = 8
-"""Links that stand side by side in a table, so that the processor takes them at once."""
+"""Number of links side by side in a table, which the processor handles at once."""
 POINT_X, POINT_Y, FORWARD_X, FORWARD_Y, SHAPE_X, SHAPE_Y = range(0, 6 * LANES, LANES)
 """Where rows of a table begin: a link's centre, the unit vector along it, its velocity relative to
 the body frame."""
 NORMAL, MOVING_X, MOVING_Y = range(6 * LANES, 9 * LANES, LANES)
 """A link's load, and how it moved in the step before."""
 OTHERS = 34 * LANES
-"""Where the rows begin of whoever else makes the table."""
+"""First row that is free for other users of the table."""
 _SLIDES = 9 * LANES
 """Where the rows of ``_power`` begin: 14 that it reads, 11 that it writes."""
 
@@ -215,9 +215,9 @@ def _wrench(points_m: Floats, force: Floats) -> Floats:
 def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
-    They say how each link's velocity along and across itself grows with (vx, vy, omega), three
-    numbers each; what the change of the shape makes of the two; and the lower triangle of the
-    product of what comes first with its transpose.
+    They state how each link's velocity along and across itself grows with (vx, vy, omega), three
+    numbers each; the contribution of the change of the shape to the two; and the lower triangle of
+    the product of the first rows with their transpose.
     """
     for group in range(len(table) // rows):
         link = table[group * rows : (group + 1) * rows]
@@ -259,8 +259,8 @@ def _power(
 ) -> tuple[float, float]:
     """Power that all links dissipate, less gravity's; and what they would if the shape stood still.
 
-    What each link adds is worked out for ``LANES`` links at once, and added up in their order, so
-    that the bits do not depend on the processor.
+    The contribution of each link is computed for ``LANES`` links at once, and added up in their
+    order, so that the bits do not depend on the processor.
 
     Args:
         table: of ``_set_up``.

@@ -1,7 +1,7 @@
 """Rollout: where pieces of angle track would carry the body, on paper, before one is chosen.
 
-The links' headings follow the track; in each step the rigid velocity balances Coulomb friction and
-the slope's pull under every link (``rigid_motion``), as in the forecast of a whole plan, but
+The links' headings follow the track. In each step the rigid velocity balances Coulomb friction and
+the slope's pull under every link (``rigid_motion``), as in the forecast of a complete plan, but
 compiled and for many pieces at once. The balance knows no rate: lengths stand in place of times,
 except where nothing holds the body and it slides with inertia.
 """
@@ -39,7 +39,8 @@ from snakewalk.controller.mechanics.rollout_kernel import (
 )
 
 STEP_SEGMENTS = 4.0
-"""Of a step (ours): ends lie 1 cm along the way and 3 to 5 mm aside of those by steps of 0.5."""
+"""Segments per step (ours): ends lie 1 cm along the path and 3 to 5 mm aside of those by steps of
+0.5."""
 _BEYOND_M = 4.0
 
 
@@ -55,7 +56,7 @@ class PlanarPose:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """What a body does beside the balance, per segment of pulse, in the frame of its mean line."""
+    """Drift of a body from the balance, per segment of pulse, in the frame of its mean line."""
 
     ahead_m: float = 0.0
     left_m: float = 0.0
@@ -90,7 +91,7 @@ class TabulatedPath:
 
 @dataclass(frozen=True, slots=True)
 class Rolled:
-    """What became of C pieces; lengths in metres."""
+    """Results of C pieces; lengths in metres."""
 
     columns: Floats
     """(C, 10) place (2) of the centre and turn, and what the properties from there on say."""
@@ -151,7 +152,7 @@ class Followed:
         self._state[3], self._state[10] = path_at, np.inf
 
     def note(self, centre_m: Floats, dt_s: float) -> None:
-        """Take the centre of mass (2,), ``dt_s`` after the last."""
+        """Record the centre of mass (2,), ``dt_s`` after the last."""
         path, (x, y) = self._path, centre_m
         note_place(self._state, path.points_m, path.waypoint_m, float(x), float(y), dt_s)
         self._steps += 1
@@ -190,7 +191,7 @@ class Rollout:
         self.use_friction(friction)
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Roll out with this friction; what has begun goes on with that of before."""
+        """Roll out with this friction; pieces that have begun keep the earlier one."""
         self._body = np.array([friction.along, friction.across, self._speed_limit_rad_s])
 
     def change_ground(self, ground: HeightField) -> None:
@@ -240,7 +241,7 @@ class Rollout:
 
 
 class RolloutTree:
-    """Rollouts from one pose on one track: what pieces have in common is rolled out once."""
+    """Rollouts from one pose on one track: the common part of pieces is rolled out once."""
 
     def __init__(
         self,
@@ -250,7 +251,7 @@ class RolloutTree:
         given: tuple[Any, ...],
         room_of: "RolloutTree | None" = None,
     ) -> None:
-        """Of ``Rollout.begin``; ``groups`` of links; ``given`` are arguments of ``roll_pieces``."""
+        """Store arguments of ``Rollout.begin``, and those of ``roll_pieces`` in ``given``."""
         self._samples, self._head, self._given = samples_rad, head, given
         self._count = 0
         if room_of is None:
@@ -283,7 +284,7 @@ class RolloutTree:
         return Rolled(out)
 
     def _make_room(self, count: int, length: int, steps: int) -> int:
-        """Make room for so many more pieces; the place of the first."""
+        """Allocate ``count`` more pieces; returns the place of the first."""
         fits = (length, steps + 1) == (self._pieces.shape[1], self._states.shape[1])
         if not fits:
             self._count = 0

@@ -37,7 +37,7 @@ _NEXT, _NEXT_X, _NEXT_Y, _COS, _SIN = range(OTHERS + 5 * LANES, OTHERS + 10 * LA
 """The same after the step; a cosine and a sine."""
 ROWS = OTHERS + 10 * LANES
 OFF_PATH, END_OFF, HEAD_OFF, HEADING, PASSED, ALONG, TIME = range(3, 10)
-"""Columns of what became of a piece."""
+"""Columns of the result of a piece."""
 COLUMNS = 10
 PATH_STEP_M = 0.01
 
@@ -168,7 +168,7 @@ def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
 def note_place(
     state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt: float
 ) -> None:
-    """Take into a state (11,) that its body has come to (x, y) within ``dt``."""
+    """Record in a state (11,) that its body has come to (x, y) within ``dt``."""
     state[0], state[1] = x, y
     state[3], state[4] = _nearest(path, int(state[3]), x, y)
     state[5] += state[4] * state[4]
@@ -308,9 +308,9 @@ def write_result(
 
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)", makes_arrays=False)
 def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
-    """Which earlier piece begins like a piece for longest, and for how many samples; -1 is none.
+    """Return the earlier piece with the longest equal beginning, and its samples; -1 is none.
 
-    Of several that do for as long it is the first: what that shares with others is known of it.
+    Among equally long ones it is the first: its own common part is known.
     """
     best, longest = -1, -1
     for other in range(piece):

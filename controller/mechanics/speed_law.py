@@ -2,8 +2,8 @@
 
 ``dv/dt = max(0, c3 K - c4 |dO/dt|) - c1 v - c2`` with K the standard deviation of the skeleton
 angles and O the heading (Eq. 8-9). Corrections: Eq. 9 equates norms, by which no body ever slows
-down: here the acceleration is signed; ``v >= 0``, as friction never pushes backwards at rest; the
-printed constants have a length unit that the text does not name: here it is declared.
+down; here the acceleration is signed. ``v >= 0``, as friction never pushes backwards at rest. The
+printed constants have a length unit that the text does not name; here it is declared.
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class SpeedLaw:
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """A law fitted to what a robot did."""
+    """A law fitted to the motion of a robot."""
 
     law: SpeedLaw
     rms_m_s2: float

@@ -1,4 +1,4 @@
-"""Support: what of the weight the ground bears under each link, told by the torque of the joints.
+"""Support: weight that the ground bears under each link, from the torque of the joints.
 
 Quasi-static, with vertical support forces: the part of the body behind a pitch joint is in balance
 under its weight, the support under it and the joint's torque. So the torques are linear in the
@@ -53,6 +53,6 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
 
 
 def lifted(robot: RobotConfig, bears_n: Floats) -> Bools:
-    """Whether each link is lifted, by what the ground bears of it; any shape."""
+    """Whether each link is lifted, by the force that the ground bears; any shape."""
     weight_n = robot.mean_link_mass_kg * link_weights(robot) * GRAVITY_M_S2
     return np.asarray(bears_n < LIFTED_SHARE * weight_n)

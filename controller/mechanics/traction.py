@@ -14,7 +14,7 @@ def quasi_static_gain(
 ) -> Floats:
     """Gain (S,) of each shape (S, N) at the moment at which the body shows it.
 
-    The angles move tailwards along the body at pulse speed u; the rigid velocity that balances the
+    The angles move tailwards along the body at pulse speed u. The rigid velocity that balances the
     friction of ``links`` links carries the body forward at ``eta_q u``. 1 is a body that never
     slips, below 0 it goes backwards.
     """

@@ -28,7 +28,7 @@ class Difference:
     first_column: int | None
     """Joint, or axis, that differs there."""
     first_name: str = ""
-    """What people call it: ``joint yaw_05 (ID 5)``, ``y``; empty where nothing differs."""
+    """Name for people: ``joint yaw_05 (ID 5)``, ``y``; empty without a difference."""
     decides: bool = True
     """Whether it has a tolerance; else it is reported only."""
 

@@ -2,8 +2,8 @@
 
 Energy is integrated where something adds it up in every step: in the simulation. A real servo has
 no such counter. Its Present Current is a sample at the moment of the reading, just before the next
-goal arrives, when the error of position that the last goal made has mostly decayed: power from such
-samples is too low (``docs/gaits.md`` has the factor, measured on the same runs).
+goal arrives. The error of position that the last goal made has mostly decayed by then, so power
+from such samples is too low (``docs/gaits.md`` has the factor, measured on the same runs).
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class EnergyTrack:
     time_s: Floats
     """(T,)"""
     electrical_j: Floats
-    """(T,) taken in; what a motor gives back is lost. Without the servos' electronics."""
+    """(T,) consumed; energy that a motor returns is lost. Without the servos' electronics."""
     mechanical_j: Floats
     """(T,) net work at the shafts."""
     source: EnergySource
@@ -89,7 +89,7 @@ class Effort:
     """Means over the time at full rate; NaN where the log does not hold what is needed."""
 
     power_w: float
-    """Electrical, all motors, mean; what they give back is lost."""
+    """Electrical, all motors, mean; returned energy is lost."""
     cost_of_transport: float
     """Power over weight times net speed; without the servos' own electronics."""
     mechanical_cost: float
@@ -99,8 +99,11 @@ class Effort:
     """Distance that touching links slide sideways, over that of the centre; flat floors only."""
 
 
-def effort(record: RunRecord) -> Effort:
-    """Return the effort of a gait run while it runs at full rate; NaN for other runs."""
+def effort(record: RunRecord, moved: Travel | None = None) -> Effort:
+    """Return the effort of a gait run while it runs at full rate; NaN for other runs.
+
+    ``moved`` is its travel, where it was computed before.
+    """
     pose, gait = record.pose, record.header.run.gait
     unknown = Effort(*(float("nan"),) * 5)
     if gait is None or len(pose.time_s) == 0:
@@ -116,7 +119,7 @@ def effort(record: RunRecord) -> Effort:
     moved_m = pose.centre_m[steady][-1] - pose.centre_m[steady][0]
     return Effort(
         electrical_j / span_s,
-        *costs_of_transport(record, energy, travel(record)),
+        *costs_of_transport(record, energy, travel(record) if moved is None else moved),
         float(moved_m[2]) / span_s,
         _slip(record, steady),
     )

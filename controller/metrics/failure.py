@@ -1,4 +1,4 @@
-"""Failure of a run along waypoints: what ended it, told from its log."""
+"""Failure of a run along waypoints: its cause, from its log."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -61,7 +61,7 @@ def failure(record: RunRecord) -> Failure | None:
     if way_m > speed_m_s * limit_s > 0.0:  # no body that does what was planned comes to the end
         return Failure(
             "time",
-            f"its path takes {way_m / speed_m_s:.0f} s at the {speed_m_s:.2f} m/s of the plan; "
+            f"its path needs {way_m / speed_m_s:.0f} s at the {speed_m_s:.2f} m/s of the plan; "
             f"time_limit_s is {limit_s:g}",
         )
     clamped = np.array([verdict == "clamp" for verdict in cycle.verdict], dtype=bool)

@@ -46,10 +46,10 @@ def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundConta
 
 
 def lifted_by_current(record: RunRecord) -> float:
-    """Return the mean share of links that the pitch joints' currents tell to be lifted.
+    """Return the mean share of lifted links, from the pitch joints' currents.
 
-    It takes the pose only for the directions of the joints, and knows no ground. NaN without pitch
-    joints, torque constant or poses. ``docs/compliance.md`` has how well it tells.
+    It uses the pose only for the directions of the joints, and does not use the ground. NaN without
+    pitch joints, torque constant or poses. ``docs/compliance.md`` states its accuracy.
     """
     header, pose, cycle = record.header, record.pose, record.cycle
     robot, k_t = header.robot, header.torque_constant_n_m_a

@@ -3,7 +3,7 @@
 from typing import Final
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy  # its modules load when they are first used: signal needs 23 MB
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
@@ -92,7 +92,7 @@ def smooth_track_m(pose: PoseTable) -> Floats:
     """Return the track of the centre of mass (P, 3) without the noise of single poses.
 
     Parabolas are fitted to it over 1 s (Savitzky and Golay 1964). Noise of 1 cm and 3 degrees in
-    every pose makes the raw track 40 % too long, and this one 1 %; without noise it is as long as
+    every pose makes the raw track 40 % too long, and this one 1 %. Without noise it is as long as
     the raw track to 0.1 % (measured on runs of ``flat-slalom``).
     """
     time_s, centre_m = pose.time_s, pose.centre_m
@@ -107,7 +107,9 @@ def smooth_track_m(pose: PoseTable) -> Floats:
     smooth = centre_m.copy()
     for axis in range(3):
         even_m = np.interp(even_s, time_s[known], centre_m[known, axis])
-        smooth[known, axis] = np.interp(time_s[known], even_s, savgol_filter(even_m, window, 2))
+        smooth[known, axis] = np.interp(
+            time_s[known], even_s, scipy.signal.savgol_filter(even_m, window, 2)
+        )
     return smooth
 
 

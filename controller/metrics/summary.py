@@ -11,6 +11,7 @@ from snakewalk.controller.metrics.effort import (
     energy_track,
 )
 from snakewalk.controller.metrics.ground_contact import lifted_by_current
+from snakewalk.controller.metrics.ground_slope import carrier_share
 from snakewalk.controller.metrics.path_error import (
     length_m,
     path_error_m,
@@ -19,7 +20,7 @@ from snakewalk.controller.metrics.path_error import (
 )
 from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
 from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
-from snakewalk.controller.metrics.travel import travel
+from snakewalk.controller.metrics.travel import Travel, travel
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Header, RunRecord
 
@@ -54,7 +55,7 @@ class SummarizedFriction:
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """A run in numbers, SI units, six digits; None where the log cannot tell."""
+    """A run in numbers, SI units, six digits; None for values that the log lacks."""
 
     run: str
     motion: str
@@ -70,7 +71,7 @@ class RunSummary:
     log_complete: bool
     """Whether the log was closed properly."""
     log_note: str
-    """What the log lacks; empty if nothing."""
+    """Parts that the log lacks; empty if it is complete."""
     outcome: str
     """How the run ended, in words."""
     waypoints: int
@@ -80,11 +81,14 @@ class RunSummary:
     waypoints_counted: int
     """Waypoints that the run itself counted."""
     waypoint_times_s: tuple[float, ...] | None
+    """Since torque on."""
     duration_s: float | None
+    """Time from torque on to torque off."""
     path_length_m: float | None
     paths_replanned: int
     """How often the path was replanned."""
     travelled_m: float | None
+    """Length of the track of the centre of mass, on a way to waypoints while the shape moves."""
     path_error_mean_m: float | None
     path_error_max_m: float | None
     speed_m_s: float | None
@@ -102,7 +106,8 @@ class RunSummary:
     peak_torque_n_m: float | None
     """Peak current times the torque constant."""
     electrical_energy_j: float | None
-    """Taken in by the motors in the whole run; what they give back is lost, electronics not in."""
+    """Consumed by the motors in the whole run; returned energy is lost, electronics not
+    included."""
     mechanical_energy_j: float | None
     """Net work at the shafts."""
     energy_source: str
@@ -122,7 +127,7 @@ class RunSummary:
     yield_max_rad: float | None
     """Largest angle by which compliance moved a goal; None if nothing yields."""
     lifted_by_current: float | None
-    """Mean share of links that the currents of the pitch joints tell to be lifted."""
+    """Mean share of lifted links, from the currents of the pitch joints."""
     clamps: int
     vetoes: int
     trip: str | None
@@ -135,19 +140,25 @@ class RunSummary:
     """Share of the cycle that bytes were on the wire."""
     wire_use_max: float | None
     decisions: int
-    """Of the walk over the state library."""
+    """Decisions of the walk over the state library."""
     states_visited: int
     decisions_without_candidates: int
+    carrier_share: float | None
+    """Share of the decisions that ride on a wide wave, for steep ground; None if unknown."""
     state_library: dict[str, int]
     """Counts of recorded, random and refused states."""
     friction_found: SummarizedFriction | None
-    """What the run found at last; None where it did not look for it."""
+    """Last result of the run; None if it did not estimate it."""
     battery: SummarizedBattery | None
     """Supply and load over the run; None in older logs."""
     pose_evidence: str
     """How the poses are known: ``measured``, ``estimated`` or ``dead-reckoned``."""
     pose_source: str
     """``simulator``, ``camera``, ``joints``, ``imu``, or the name of a plug-in."""
+    pose_position_sd_m: float | None
+    """Standard deviation of the head's position; None where the source does not state it."""
+    pose_heading_sd_rad: float | None
+    """The same of its heading."""
     pose_is_simulated: bool
     """Whether the simulator measured the poses, or moved the body that was measured."""
     port_is_pseudo_terminal: bool | None
@@ -163,6 +174,12 @@ class RunSummary:
     dead_reckoned_eta: float | None = None
     dead_reckoned_electrical_cost_of_transport: float | None = None
     dead_reckoned_mechanical_cost_of_transport: float | None = None
+
+    @property
+    def evidence(self) -> dict[str, object]:
+        """Kind, source and uncertainty of the pose, as results state them."""
+        keys = ("pose_evidence", "pose_source", "pose_position_sd_m", "pose_heading_sd_rad")
+        return {key: getattr(self, key) for key in keys}
 
     @property
     def is_measured(self) -> bool:
@@ -188,13 +205,15 @@ _OF_THE_POSE = (
 """Numbers that need a measured pose."""
 
 
-def summary(record: RunRecord) -> RunSummary:
+def summary(record: RunRecord, moved: Travel | None = None) -> RunSummary:
     """Return the numbers of a run, from its log alone.
 
+    ``moved`` is its travel, where it was computed before.
+
     Where the pose is dead-reckoned, the numbers that need a measured pose are None and have a
-    counterpart ``dead_reckoned_*``.
+    counterpart ``dead_reckoned_*``. Times count from the moment torque was switched on.
     """
-    numbers = _summary(record)
+    numbers = _summary(record, travel(record) if moved is None else moved)
     if numbers.is_measured:
         return numbers
     changes: dict[str, Any] = {
@@ -204,7 +223,7 @@ def summary(record: RunRecord) -> RunSummary:
     return replace(numbers, **changes)
 
 
-def _summary(record: RunRecord) -> RunSummary:
+def _summary(record: RunRecord, moved: Travel) -> RunSummary:
     header, cycle, pose, walk = record.header, record.cycle, record.pose, record.walk
     waypoints, times = len(header.plan.waypoints_m), waypoint_times_s(pose, header.plan)
     tripped = next((e.text for e in record.events if e.kind == "trip"), None)
@@ -217,7 +236,7 @@ def _summary(record: RunRecord) -> RunSummary:
     use = wire_use(record)
     energy = energy_track(record)
     whole = energy.between(-np.inf, np.inf)
-    moved, along_links = travel(record), _mean(pose.speed_m_s[chosen])
+    along_links = _mean(pose.speed_m_s[chosen])
     costs = costs_of_transport(record, energy, moved)
     return RunSummary(
         run=header.run.name,
@@ -234,11 +253,11 @@ def _summary(record: RunRecord) -> RunSummary:
         waypoints=waypoints,
         waypoints_reached=len(times),
         waypoints_counted=int(pose.target.max(initial=0)),
-        waypoint_times_s=tuple(known for t in times if (known := _digits(t)) is not None),
-        duration_s=_digits(record.end_s),
+        waypoint_times_s=tuple(float(f"{t - record.torque_on_s:.6g}") for t in times),
+        duration_s=_digits(record.duration_s),
         path_length_m=_digits(length_m(header.plan.path_m)),
         paths_replanned=len(record.paths) - 1,
-        travelled_m=_digits(travelled_m(pose)),
+        travelled_m=_digits(_distance_m(record, moved)),
         path_error_mean_m=_digits(_mean(off_path)),
         path_error_max_m=_digits(_peak(off_path)),
         speed_m_s=_digits(moved.speed_m_s),
@@ -275,15 +294,31 @@ def _summary(record: RunRecord) -> RunSummary:
         decisions=len(walk.time_s),
         states_visited=int(walk.visited.max(initial=0)),
         decisions_without_candidates=int(np.count_nonzero(walk.candidates == 0)),
+        carrier_share=_digits(carrier_share(record)),
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
         battery=_battery(record),
-        pose_evidence=str(header.pose_evidence.kind),
-        pose_source=header.pose_evidence.source,
-        pose_is_simulated=header.initial_pose is not None,
-        port_is_pseudo_terminal=header.port_is_pseudo_terminal,
-        assumptions=_assumptions(header),
+        **_evidence(header),
     )
+
+
+def _evidence(header: Header) -> dict[str, Any]:
+    """Return the fields of a summary about pose, port and assumptions."""
+    return {
+        "pose_evidence": str(header.pose_evidence.kind),
+        "pose_source": header.pose_evidence.source,
+        "pose_position_sd_m": header.pose_evidence.position_m,
+        "pose_heading_sd_rad": header.pose_evidence.heading_rad,
+        "pose_is_simulated": header.initial_pose is not None,
+        "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
+        "assumptions": _assumptions(header),
+    }
+
+
+def _distance_m(record: RunRecord, moved: Travel) -> float:
+    """Return the distance travelled; the start into the first shape is not part of a walk."""
+    walks = len(record.header.plan.waypoints_m) > 0 and np.isfinite(moved.distance_m)
+    return moved.distance_m if walks else travelled_m(record.pose)
 
 
 def _assumptions(header: Header) -> dict[str, dict[str, object]]:

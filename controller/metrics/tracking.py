@@ -18,7 +18,7 @@ def tracking_error_rad(cycle: CycleTable) -> Floats:
 def lag_s(cycle: CycleTable, period_s: float) -> float:
     """Delay that best explains measured by sent: least squares over whole cycles, then a parabola.
 
-    NaN when nothing moves, or when the run is too short to tell.
+    NaN when nothing moves, or when the run is too short.
     """
     whole = np.isfinite(cycle.sent_rad).all(axis=1) & np.isfinite(cycle.measured_rad).all(axis=1)
     if np.count_nonzero(whole) < 2:

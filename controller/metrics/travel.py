@@ -5,19 +5,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.controller.gaits.registry import make_gait
-from snakewalk.controller.metrics.displacement import full_rate_span_s, gait_displacement
+from snakewalk.controller.metrics.displacement import (
+    GaitDisplacement,
+    full_rate_span_s,
+    gait_displacement,
+)
 from snakewalk.controller.metrics.path_error import travelled_m
 from snakewalk.controller.runlog.record import RunRecord
 
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """Displacement of the centre of mass between two times; NaN where the log does not tell."""
+    """Displacement of the centre of mass between two times; NaN if the log lacks it."""
 
     distance_m: float
     """Along the path, or along the axis of the gait; negative for a climber that falls."""
     start_s: float
     end_s: float
+    gait: GaitDisplacement | None = None
+    """Displacement in a cycle, if it was computed."""
 
     @property
     def speed_m_s(self) -> float:
@@ -49,7 +55,7 @@ def travel(record: RunRecord) -> Travel:
     if gait is not None and not gait.then and not _is_steered(record):
         moved = gait_displacement(record)
         if moved.cycles:
-            return Travel(moved.distance_m, moved.start_s, moved.end_s)
+            return Travel(moved.distance_m, moved.start_s, moved.end_s, moved)
     if gait is not None and len(pose.time_s):
         ends = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), gait.duration_s)
         rows = np.flatnonzero((pose.time_s >= ends[0]) & (pose.time_s <= ends[1]))

@@ -1,9 +1,9 @@
 """Joining one motion to another without a step.
 
-What the joints do at the moment of the join differs from what the new source does by an error in
-angle and in speed. The new source runs from then on, and the error dies out along a polynomial that
-begins with exactly that angle and speed: the sum is C1 whatever the two sources are. Where the sum
-would be too fast the new source starts at a slower rate, down to rest, and speeds up meanwhile:
+At the moment of the join the joints differ from the new source by an error in angle and in speed.
+The new source runs from then on, and the error dies out along a polynomial that begins with exactly
+that angle and speed: the sum is C1 whatever the two sources are. Where the sum would be too fast
+the new source starts at a slower rate, down to rest, and speeds up meanwhile:
 
     q(t) = target(s(t)) + e(t),   s' = r0 + (1 - r0) S((x - d) / (1 - d)),   x = t / T
     e(t) = e0 + v0 B(t) - (e0 + v0 T_b / 2) P(x),   P(x) = 10 x^3 - 15 x^4 + 6 x^5
@@ -115,7 +115,7 @@ def _shortest(
 
 
 RATES = (1.0, 0.7, 0.4, 0.0)
-"""Rates at which the target may start; slower ones are tried where faster ones take too long."""
+"""Rates at which the target may start; slower ones are tried if faster ones last too long."""
 LONGEST_JOIN_S = (0.5, 1.0, 1.6, np.inf)
 """Longest join that is accepted at each rate, s."""
 

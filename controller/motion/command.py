@@ -1,4 +1,4 @@
-"""What another program may command the joints of a robot to do."""
+"""Commands of another program to the joints of a robot."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -9,7 +9,7 @@ from snakewalk.controller.gaits.gait import Gait
 TIMEOUT_S: Final = 1.0
 """How long joints go on towards goals that nobody renews (ours)."""
 POINTS_MAX: Final = 500
-"""Of a trajectory, which is splined and checked within a cycle."""
+"""Largest number of points of a trajectory, which is splined and checked within a cycle."""
 JOINTS_MAX: Final = 256
 """Joints that a command may name (ours): a robot has at most 200."""
 LINE_BYTES: Final = 1 << 20
@@ -43,6 +43,21 @@ class StartGait(NamedTuple):
     gait: Gait
 
 
+class Velocity(NamedTuple):
+    """Go along the body and turn; a command that nobody renews ends in rest."""
+
+    forward_m_s: float
+    turn_rad_s: float
+    """Positive to the left."""
+
+
+class GoTo(NamedTuple):
+    """Go to a point of the ground; waypoints that are left are left out."""
+
+    x_m: float
+    y_m: float
+
+
 class HoldStill(NamedTuple):
     """Come to rest where the joints are."""
 
@@ -53,4 +68,4 @@ class Refused(NamedTuple):
     why: str
 
 
-Command = JointGoals | JointTrajectory | StartGait | HoldStill | Refused
+Command = JointGoals | JointTrajectory | StartGait | Velocity | GoTo | HoldStill | Refused

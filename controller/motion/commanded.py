@@ -1,4 +1,4 @@
-"""Joints that another program commands while they move: goals, trajectories, gaits, hold.
+"""Joints that another program commands while they move: goals, trajectories, gaits, velocities.
 
 Whatever comes is checked whole before a joint follows it, and refused whole. From one command to
 the next the joints go on from the angles and the speeds that they have.
@@ -14,25 +14,29 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, Needs
+from snakewalk.controller.gaits.lateral_undulation import LateralUndulation
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.blend import Blend
 from snakewalk.controller.motion.command import (
     TIMEOUT_S,
     Command,
+    GoTo,
     HoldStill,
     JointGoals,
     JointTrajectory,
     StartGait,
+    Velocity,
 )
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.rate_limiter import RateLimiter
 from snakewalk.controller.motion.refusals import Refusals
-from snakewalk.controller.motion.source import HEADROOM, Pace
+from snakewalk.controller.motion.source import HEADROOM, MotionSource, Pace
 from snakewalk.controller.motion.trajectory import (
     JointLimits,
     JointsNow,
     spline_through,
 )
+from snakewalk.controller.motion.velocity_gait import VelocityGait
 
 _GAIN_PER_S: Final = 20.0
 _REACHED_RAD: Final = 1e-3
@@ -41,7 +45,7 @@ _TRIED_S: Final = 0.02
 
 
 class _Mode(Protocol):
-    """What moves the joints now."""
+    """Present motion of the joints."""
 
     def now(self) -> JointsNow:
         """Angles and speeds."""
@@ -109,8 +113,8 @@ class _Through:
         self._now_s = min(self._now_s + dt_s, self._end_s)
 
 
-class _ByGait:
-    """Joints move by a gait, joined to what they did before."""
+class _BySource:
+    """Joints move by a gait, joined to their earlier motion."""
 
     def __init__(self, blend: Blend) -> None:
         self._blend = blend
@@ -146,8 +150,8 @@ class Commanded:
             commands: what has come since the last call, the oldest first; returns at once.
             on_event: takes ("command", text) of what is begun or done, ("refused", text) and
                 ("stale", text).
-            timeout_s: after so long the joints stop on their way to goals that nobody renews;
-                infinite: they never do.
+            timeout_s: after so long the joints stop on their way to goals that nobody renews, and
+                the body comes to rest if nobody renews its velocity; infinite: they never do.
             gait: to begin with; None: hold.
 
         """
@@ -155,8 +159,13 @@ class Commanded:
         self._limits = JointLimits.of(robot, joints)
         self._timeout_s = timeout_s
         self._first = gait
-        self._waiting: Gait | None = None
-        """Begun as soon as a join to it keeps the joints' limits."""
+        self._waiting: Callable[[], MotionSource] | None = None
+        """Makes the source that is begun as soon as a join to it keeps the joints' limits."""
+        self._driven: VelocityGait | None = None
+        """Gait that follows velocities, from the first such command to another kind of command."""
+        self._driven_by: Gait = LateralUndulation()
+        self._driven_s = 0.0
+        """Until the velocity is out of date."""
         rest = np.zeros(robot.joint_count)
         self._mode: _Mode = _Follow(JointsNow(rest, rest), self._limits)
         self._time_s = 0.0
@@ -177,11 +186,11 @@ class Commanded:
         return self._mode.now().speed_rad_s
 
     def pace(self) -> Pace:
-        """The robot's limits: what will be commanded is not known."""
+        """The robot's limits: later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Take what has been commanded, then go on by ``dt_s``."""
+        """Execute the commands that have arrived, then go on by ``dt_s``."""
         self._time_s += dt_s
         if self._first is not None:
             self._take(StartGait(self._first))
@@ -203,7 +212,17 @@ class Commanded:
                 mode.stop()
                 text = f"no joint goals for {self._timeout_s:g} s: the joints hold where they are"
                 self._on_event("stale", text)
+        if self._driven is not None:
+            self._check_velocity_age(dt_s)
         return self.goal_rad()
+
+    def _check_velocity_age(self, dt_s: float) -> None:
+        assert self._driven is not None
+        before_s, self._driven_s = self._driven_s, self._driven_s - dt_s
+        if before_s > 0.0 >= self._driven_s and not self._driven.rests:
+            self._driven.stop()
+            text = f"no velocity for {self._timeout_s:g} s: the body comes to rest"
+            self._on_event("stale", text)
 
     def _take(self, command: Command) -> None:
         try:
@@ -212,14 +231,19 @@ class Commanded:
             elif isinstance(command, JointTrajectory):
                 spline, end_s = spline_through(command, self._mode.now(), self._limits)
                 self._mode, self._waiting = _Through(spline, end_s), None
+                self._driven = None
                 points = len(command.time_s)
                 self._on_event("command", f"a trajectory of {points} points, {end_s:.2f} s")
             elif isinstance(command, StartGait):
                 self._move_by(command.gait)
+            elif isinstance(command, Velocity):
+                self._drive(command)
             elif isinstance(command, HoldStill):
-                self._waiting = None
+                self._waiting = self._driven = None
                 self._follow().stop()
                 self._on_event("command", "hold")
+            elif isinstance(command, GoTo):
+                raise InputError("goal pose: this run has no waypoints; use run NAME --live --ros")
             else:
                 raise InputError(command.why)
         except InputError as error:
@@ -240,7 +264,7 @@ class Commanded:
                 "for each name"
             )
         self._limits.check_angles(angle_rad[None], joints, "joint goals")
-        self._waiting = None
+        self._waiting = self._driven = None
         follow = self._follow()
         follow.goal_rad = np.array(follow.goal_rad)
         follow.goal_rad[joints] = angle_rad
@@ -249,28 +273,50 @@ class Commanded:
     def _move_by(self, gait: Gait) -> None:
         if gait.p_gain is not None:
             raise InputError(
-                f"gait {gait.name}: takes soft servos (P gain {gait.p_gain}), which are set up "
-                "before a run: snakewalk gait run"
+                f"gait {gait.name}: needs soft servos (P gain {gait.p_gain}), which are set up "
+                "before a run; use snakewalk gait run"
             )
         gait.check(self._robot)
-        self._waiting = gait
+        self._waiting, self._driven = (lambda: GaitMotion(gait, self._robot)), None
+        if gait.follows_velocity:
+            self._driven_by = gait
         self._on_event("command", f"gait {gait.name}")
 
-    def _join(self, gait: Gait, view: BodyView) -> None:
-        """Join a gait where no joint leaves its range by that; else go towards its first pose."""
-        tried, most_rad = self._blend(gait), self._limits.angle_rad
+    def _drive(self, command: Velocity) -> None:
+        if self._driven is None and not any(command):
+            self._waiting = None
+            self._follow().stop()
+            return
+        driven = self._driven or VelocityGait(self._driven_by, self._robot)
+        driven.follow(*command)
+        self._driven_s = self._timeout_s
+        if self._driven is not None:
+            return
+        self._driven, self._waiting = driven, self._copy_of_driven
+        self._on_event("command", f"velocities, by gait {self._driven_by.name}")
+
+    def _copy_of_driven(self) -> VelocityGait:
+        assert self._driven is not None
+        return self._driven.anew()
+
+    def _join(self, make: Callable[[], MotionSource], view: BodyView) -> None:
+        """Join a source where no joint leaves its range by that; else go towards its first pose."""
+        tried, most_rad = self._blend(make()), self._limits.angle_rad
         first_rad = tried.target.goal_rad()
         within = (np.abs(tried.goal_rad()) <= most_rad + _REACHED_RAD).all()
         while within and not tried.over:
             within = (np.abs(tried.step(_TRIED_S, view)) <= most_rad + _REACHED_RAD).all()
         if within:
-            self._mode, self._waiting = _ByGait(self._blend(gait)), None
+            blend = self._blend(make())
+            self._mode, self._waiting = _BySource(blend), None
+            if isinstance(blend.target, VelocityGait):
+                self._driven = blend.target
             return
         follow = self._follow()
         follow.goal_rad = np.clip(first_rad, -most_rad, most_rad)
         follow.left_s = None
 
-    def _blend(self, gait: Gait) -> Blend:
-        """Join a gait to what the joints do now."""
-        now, motion = self._mode.now(), GaitMotion(gait, self._robot)
-        return Blend(now.angle_rad, now.speed_rad_s, motion, Pace.limit(self._robot))
+    def _blend(self, source: MotionSource) -> Blend:
+        """Join a source to the current motion of the joints."""
+        now = self._mode.now()
+        return Blend(now.angle_rad, now.speed_rad_s, source, Pace.limit(self._robot))

@@ -1,4 +1,4 @@
-"""Shape compliance: joint goals that yield to the load on the joints, told by measured current.
+"""Shape compliance: joint goals that yield to the load on the joints, from measured current.
 
 An admittance between a motion source and the safety layer, as in M. Travers, J. Whitman,
 H. Choset, Shape-based coordination in locomotion control, IJRR 2018: shape parameters beta give way
@@ -32,7 +32,7 @@ class Compliance:
 
     @property
     def yield_rad(self) -> Floats:
-        """(J,) how far the goals are from what the motion asked."""
+        """(J,) distance of the goals from those of the motion."""
         return self._yield_rad
 
     def step(self, goal_rad: Floats, state: JointState, dt_s: float) -> Floats:
@@ -70,7 +70,7 @@ class Compliance:
         """(J,) yield of windows that scale: the joint admittance, projected on the bends in each.
 
         With ``x = P beta`` the joints' law ``b x' + k x = load`` becomes ``P^T P (b beta' + k beta)
-        = P^T load``; windows have no joint in common, so ``P^T P`` is a sum of squares each.
+        = P^T load``. Windows have no joint in common, so ``P^T P`` is a sum of squares each.
         """
         bends_rad = np.where(self._yields & valid, goal_rad, 0.0)
         windows = len(self._scale)
@@ -90,7 +90,7 @@ def chatters(config: ComplianceConfig, current_gain_a_rad: float, period_s: floa
         current_gain_a_rad: current of a servo per radian between its goal and its shaft.
         period_s: of the control cycle.
 
-    A blocked shaft draws ``c (goal - shaft)``; a goal that yields to it by the law above goes back
+    A blocked shaft draws ``c (goal - shaft)``. A goal that yields to it by the law above goes back
     by ``(c + k) dt / b`` of its distance from rest in a cycle, which must not be over 1.
 
     """

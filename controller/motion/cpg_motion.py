@@ -117,7 +117,7 @@ class GaitTransition:
 
 
 class CpgMotion:
-    """Oscillators at rest at a pose, that take up gaits one after the other and can stop."""
+    """Oscillators at rest at a pose, which adopt gaits one after the other and can stop."""
 
     def __init__(self, robot: RobotConfig, joint_rad: Floats) -> None:
         """Start at rest at ``joint_rad`` (J,)."""
@@ -141,7 +141,7 @@ class CpgMotion:
         return bool(far < DONE_RAD and np.abs(self.velocity_rad_s()).max() < DONE_RAD_S)
 
     def become(self, gait: Gait) -> float:
-        """Take a gait as the target, as fast as the limits allow; returns how long it takes, s.
+        """Adopt a gait as the target, as fast as the limits allow; returns the duration, s.
 
         Raises:
             InputError: joints are missing, or do not bend so far; nothing changes then.
@@ -150,11 +150,11 @@ class CpgMotion:
         return self._begin(self._plan(gait))
 
     def stop(self) -> float:
-        """Come to rest at the middle of each joint's swing; returns how long it takes, s."""
+        """Come to rest at the middle of each joint's swing; returns the duration, s."""
         return self._begin(self._plan(None))
 
     def schedule(self, changes: Sequence[tuple[float, Gait | None]]) -> float:
-        """Take up gaits, or rest for None, at rising times from now; returns when the last is over.
+        """Adopt gaits, or rest for None, at rising times from now; returns the end of the last one.
 
         All is computed here: the course of the oscillators on the motion's own time is known ahead,
         so that nothing remains to be chosen while the motion runs. A later ``become`` or ``stop``
@@ -187,7 +187,7 @@ class CpgMotion:
         return GaitTransition(self._now_s, parts, needs, settled, under_way, stops=gait is None)
 
     def _begin(self, change: GaitTransition) -> float:
-        """Begin a change; returns how long it takes, s."""
+        """Begin a change; returns its duration, s."""
         self._scheduled = ()
         change.parts[0].begin(self.cpg)
         self._next = change.parts[1:]

@@ -39,7 +39,7 @@ class GaitCycle:
 
     @property
     def needs(self) -> Needs:
-        """Those of the gait."""
+        """Needs of the gait."""
         return self.gait.needs
 
     @property

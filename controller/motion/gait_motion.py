@@ -41,7 +41,7 @@ class GaitMotion(MotionWrapper):
 
     @property
     def gait(self) -> Gait:
-        """What runs now."""
+        """Present gait."""
         return self._cycle.gait
 
     @property
@@ -75,7 +75,7 @@ class GaitMotion(MotionWrapper):
         return self.become(type(self.gait).of(kept | values))
 
     def become(self, gait: Gait) -> float:
-        """Turn into another gait at the phase now; returns the time that it takes, s.
+        """Change to another gait at the present phase; returns the duration, s.
 
         Raises:
             InputError: joints are missing, or do not bend so far; nothing changes then.
@@ -109,7 +109,7 @@ class GaitSequence(MotionWrapper):
     """Runs a ``GaitMotion`` through gaits."""
 
     def __init__(self, motion: GaitMotion, changes: Sequence[tuple[float, Gait]]) -> None:
-        """Take gaits at rising times on the motion's own time; all suit its robot."""
+        """Adopt gaits at rising times on the motion's own time; all suit its robot."""
         super().__init__(motion)
         self.motion = motion
         self._changes = list(changes)

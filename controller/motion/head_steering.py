@@ -40,7 +40,7 @@ class HeadSteering(MotionWrapper):
     def __init__(
         self, source: MotionSource, robot: RobotConfig, target: HeadTarget, neck_joints: int = 2
     ) -> None:
-        """Take over the first ``neck_joints`` yaw joints of ``source``.
+        """Control the first ``neck_joints`` yaw joints of ``source``.
 
         Raises:
             InputError: the robot has no yaw joint, or lacks what the source needs.
@@ -63,7 +63,7 @@ class HeadSteering(MotionWrapper):
 
     @property
     def needs(self) -> Needs:
-        """Those of the source, and yaw joints."""
+        """Needs of the source, and yaw joints."""
         needs = self.wrapped.needs
         return Needs(yaw=True, pitch=needs.pitch, wheels=needs.wheels)
 

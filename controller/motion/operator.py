@@ -1,8 +1,8 @@
 """A live operator as a motion source: keys change a gait's parameters, the gait itself, its rate.
 
-Keys come as names from a keyboard, a gamepad, the page or a test, values as ``PARAMETER=VALUE``;
-what they do goes through the same joins as any other change of motion, so nothing that an operator
-does can make a step.
+Keys come as names from a keyboard, a gamepad, the page or a test, values as ``PARAMETER=VALUE``.
+Their effects go through the same joins as any other change of motion, so an operator can never
+cause a step.
 """
 
 import math
@@ -82,7 +82,7 @@ class Operator(MotionWrapper):
         return self._rate * self.motion.velocity_rad_s()
 
     def pace(self) -> Pace:
-        """The robot's limits: what the operator will do is not known."""
+        """The robot's limits: the operator's later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:

@@ -1,4 +1,4 @@
-"""What a motion that follows a path tells beside its joint targets: how far it has come."""
+"""Progress of a motion along a path, in addition to its joint targets."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -22,11 +22,13 @@ class Decision:
     """Shapes within the heading tolerance; 0 means that the nearest few were taken instead."""
     visited: int
     """Distinct states visited so far."""
+    carrier_rad: float = 0.0
+    """Amplitude of the wide wave on which the shape rides; 0 without one."""
 
 
 @runtime_checkable
 class PathProgress(Protocol):
-    """A ``MotionSource`` may offer this, too; whoever runs it asks with ``path_progress``."""
+    """Optional interface of a ``MotionSource``; callers get it from ``path_progress``."""
 
     @property
     def reached(self) -> int:
@@ -45,7 +47,7 @@ class PathProgress(Protocol):
 
     @property
     def along_m(self) -> float:
-        """Arc length of the body on the path; NaN where there is no path."""
+        """Arc length of the body on the path; NaN without a path."""
         ...
 
     @property
@@ -69,7 +71,7 @@ class PathProgress(Protocol):
 
 @runtime_checkable
 class OpenWaypoints(Protocol):
-    """A motion along a path may offer this: somebody sets its waypoints while it is on its way."""
+    """Optional interface of a motion along a path whose waypoints are set during the run."""
 
     @property
     def waypoints_m(self) -> Floats:

@@ -1,10 +1,10 @@
 """A learnt policy as a file: a wave, and a small network that changes it while it runs.
 
-The wave is an oscillator whose phase all joints share. A policy without a network runs its wave as
-it stands, with the two feedbacks that belong to it: bends against the heading's error, and reflexes
-to what joints do not follow. After G. Bellegarda, A. Ijspeert, CPG-RL: Learning Central Pattern
-Generators for Quadruped Locomotion, IEEE Robotics and Automation Letters 7 (4), 12547-12554, 2022:
-actions of a network are the oscillators' parameters.
+The wave is an oscillator whose phase all joints share. A policy without a network runs its wave
+unchanged, with its two feedbacks: bends against the heading's error, and reflexes to the following
+errors of the joints. After G. Bellegarda, A. Ijspeert, CPG-RL: Learning Central Pattern Generators
+for Quadruped Locomotion, IEEE Robotics and Automation Letters 7 (4), 12547-12554, 2022: actions of
+a network are the oscillators' parameters.
 """
 
 import json
@@ -169,7 +169,7 @@ def save_policy(policy: Policy, path: Path) -> None:
 
 
 def observation_names(robot: RobotConfig) -> tuple[str, ...]:
-    """Of each number that a network observes on a robot, with its unit."""
+    """Name of each number that a network observes on a robot, with its unit."""
     kinds = ("measured", "goal")
     joints = [f"{of}_joint{k}_rad" for of in kinds for k in robot.yaw_joints]
     return ("phase_cos", "phase_sin", "heading_cos", "heading_sin", *joints)

@@ -20,7 +20,7 @@ from snakewalk.controller.motion.source import HEADROOM, Pace
 from snakewalk.controller.motion.stop_profile import StopProfile
 
 GAIN_PER_S = 25.0
-"""Of the rate limiter: a goal lags its wave by 40 ms where no limit binds (ours)."""
+"""Gain of the rate limiter: a goal lags its wave by 40 ms if no limit binds (ours)."""
 CHANGE_S = 0.1
 """In which the wave follows an action (ours)."""
 
@@ -73,7 +73,7 @@ class PolicyMotion:
         self._remaining_s = duration_s
         self._stop_profile = StopProfile()
         self.cycles = 0.0
-        """Of the wave, gone through so far."""
+        """Cycles of the wave so far."""
 
     @property
     def done(self) -> bool:
@@ -107,7 +107,7 @@ class PolicyMotion:
         return self.act(np.zeros(len(self._wave)), part_s)
 
     def observe(self, view: BodyView) -> Floats:
-        """Take the measured body; returns what a network observes, as ``observation_names``."""
+        """Measure the body; returns the observation of a network, as ``observation_names``."""
         self._measured_rad = chain_angles_rad(self._robot, view)[self._yaw]
         self._heading_rad = view.heading_rad
         told = [cos(self._phase_rad), sin(self._phase_rad)]

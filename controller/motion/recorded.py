@@ -57,7 +57,7 @@ class Recorded:
         fast = float(speed.max()) / (HEADROOM * robot.joint_speed_limit_rad_s)
         hard = float(bend.max()) / (HEADROOM * robot.joint_acceleration_limit_rad_s2)
         self.slowed = max(1.0, fast, float(np.sqrt(hard)))
-        """How many times longer it takes here than it took, without the time of the ramps."""
+        """Factor by which it is slower here than the recording, without the time of the ramps."""
         self._start_s, self._length_s = float(time_s[0]), float(time_s[-1] - time_s[0])
         most = HEADROOM * robot.joint_acceleration_limit_rad_s2
         self._ramp_s = min(RAMP_S, self._length_s * self.slowed)

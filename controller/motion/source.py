@@ -11,12 +11,12 @@ from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
 
 HEADROOM = 0.9
-"""Share of the robot's limits that a motion takes by itself: the rest is left for joins."""
+"""Share of the robot's limits that a motion uses by itself: the rest is left for joins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How fast joints go at most: what a source will ask, or what a robot may be asked."""
+    """Largest joint speeds: those that a source will request, or those that a robot allows."""
 
     speed_rad_s: Floats
     """(J,)"""
@@ -45,7 +45,7 @@ class MotionSource(Protocol):
 
     @property
     def needs(self) -> Needs:
-        """What it asks of the robot."""
+        """Joints that the motion needs."""
         ...
 
     @property
@@ -75,7 +75,7 @@ class StartsAnywhere(Protocol):
     """A ``MotionSource`` may offer this, too: it begins where the joints are found."""
 
     def start_at(self, joint_rad: Floats) -> None:
-        """Take the angles (J,) that were measured before the first cycle."""
+        """Start at the angles (J,) that were measured before the first cycle."""
         ...
 
 

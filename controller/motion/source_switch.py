@@ -23,7 +23,7 @@ class SourceSwitch(MotionWrapper):
 
     @property
     def source(self) -> MotionSource:
-        """What runs now."""
+        """Present source."""
         return self._blend.target
 
     @property
@@ -32,7 +32,7 @@ class SourceSwitch(MotionWrapper):
         return not self._blend.over
 
     def join(self, source: MotionSource) -> float:
-        """Hand over to ``source``; returns how long the join takes, s.
+        """Hand over to ``source``; returns the duration of the join, s.
 
         Raises:
             InputError: the robot lacks joints that it needs.

@@ -18,7 +18,7 @@ from snakewalk.controller.motion.refusals import NAME_MAX
 START_RAD: Final = 0.05
 """How far a joint may be from a first point at 0 s (ours)."""
 _SAMPLES: Final = 4
-"""Of each piece, at which the limits are checked."""
+"""Points of each piece at which the limits are checked."""
 _SLACK: Final = 1.0 + 1e-6
 _AT_REST_RAD_S: Final = 1e-3
 
@@ -26,7 +26,7 @@ JointNumbers = NDArray[np.intp]
 
 
 class JointsNow(NamedTuple):
-    """What the joints are commanded to do when a trajectory begins."""
+    """Commanded state of the joints when a trajectory begins."""
 
     angle_rad: Floats
     """(J,)"""
@@ -36,7 +36,7 @@ class JointsNow(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """What a command may ask of a robot's joints, and how it calls them."""
+    """Limits and names of a robot's joints for commands."""
 
     names: tuple[str, ...]
     """J names, head first."""
@@ -61,7 +61,7 @@ class JointLimits:
         """(K,) numbers of the joints named; ``joint0`` is accepted for the joint next to the head.
 
         Raises:
-            InputError: there is no name, a joint is named twice, or a name is unknown.
+            InputError: the name is missing, a joint is named twice, or a name is unknown.
 
         """
         if not names:
@@ -75,7 +75,7 @@ class JointLimits:
         unknown = [name for name in names if name not in numbers]
         if unknown:
             raise InputError(
-                f"{what}: {unknown[0][:NAME_MAX]} is no joint of {self.robot}; they are "
+                f"{what}: robot {self.robot} has no joint {unknown[0][:NAME_MAX]}; use "
                 f"{self.names[0]} to {self.names[-1]}"
             )
         joints = [numbers[name] for name in names]
@@ -84,7 +84,7 @@ class JointLimits:
         return np.array(joints, dtype=np.intp)
 
     def check_angles(self, angle_rad: Floats, joints: JointNumbers, what: str) -> None:
-        """Refuse angles (N, K) that are no numbers, or that the joints (K,) do not bend to.
+        """Reject angles (N, K) that are not numbers, or that the joints (K,) cannot reach.
 
         Raises:
             InputError: names the first.
@@ -104,7 +104,7 @@ class JointLimits:
 def spline_through(
     trajectory: JointTrajectory, now: JointsNow, limits: JointLimits
 ) -> tuple[PPoly, float]:
-    """Spline from what the joints do now through the points; returns it, and when it ends, s.
+    """Spline from the present motion of the joints through the points; returns it, and its end, s.
 
     Positions alone make a cubic spline that ends at rest; with velocities it is a cubic, and with
     accelerations a quintic from point to point.
@@ -142,7 +142,7 @@ def _checked(given: JointTrajectory) -> JointTrajectory:
         if rate is not None and not np.isfinite(rate).all():
             raise InputError("trajectory: a velocity or acceleration is not a number")
     if velocity is None and acceleration is not None:
-        raise InputError("trajectory: accelerations need velocities beside them")
+        raise InputError("trajectory: has accelerations but no velocities; add velocities")
     if velocity is not None and np.abs(velocity[-1]).max() > _AT_REST_RAD_S:
         raise InputError("trajectory: its last point is its end: the velocities there must be 0")
     return JointTrajectory(given.joints, time_s, *values)  # type: ignore[arg-type]

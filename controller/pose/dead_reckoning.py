@@ -11,18 +11,16 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.kinematics.links import (
-    body_in_world,
-    link_weights,
-    mean_heading_rad,
-    pose_at,
-)
-from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
+from snakewalk.controller.kinematics.links import BodyView, SpineLinks, link_weights
+from snakewalk.controller.mechanics.body_slide import BodySlide
 from snakewalk.drivers.attitude import rotation_by
 from snakewalk.drivers.types import BodyPose, JointState
 
 _NOWHERE = np.zeros(3)
+_LEVEL = np.eye(3)
 _UP = np.array([0.0, 0.0, 1.0])
+_STILL_M_S = 1e-6
+"""Speed of a link up to which the shape counts as unchanged (ours)."""
 
 
 class DeadReckoning:
@@ -47,36 +45,42 @@ class DeadReckoning:
             imu: take the attitude from the robot's IMU, from its first reading on.
 
         """
-        self._robot, self._friction = robot, friction
-        self._head_m = np.array(start_m, dtype=float)
+        self._spine = SpineLinks.of(robot)
+        self._slide = BodySlide(link_weights(robot), friction)
+        self._head_m = start_m
         self._heading_rad = heading_rad
         self._imu_link = robot.imu.link if imu and robot.imu is not None else None
         self._zero_rad: float | None = None
-        self._velocity = np.zeros(3)
-        self._tilt = np.eye(3)
-        self._last: tuple[float, Floats, Floats] | None = None
+        self._tilt = _LEVEL
+        self._last: tuple[float, BodyView] | None = None
 
     def __call__(self, state: JointState) -> BodyPose:
         """Advance to the state's time."""
-        joints = np.array(state.position_rad)
-        if self._last is None:
-            self._heading_rad -= mean_heading_rad(self._robot, joints)
+        joints, time_s, last = state.position_rad, state.time_s, self._last
+        if last is None:
+            level = self._spine.in_world(BodyPose(0.0, _NOWHERE, _LEVEL), joints)
+            self._heading_rad -= level.heading_rad
         turned_rad = self._take_attitude(state, joints)
-        if self._last is not None and state.time_s > self._last[0]:
-            rate_rad_s = self._integrate(state.time_s - self._last[0], *self._last[1:], joints)
+        body = self._spine.in_world(BodyPose(0.0, _NOWHERE, self._tilt), joints)
+        if last is not None and time_s > last[0]:
+            rate_rad_s = self._integrate(time_s - last[0], last[1], body)
             if turned_rad is None:
-                self._heading_rad += (state.time_s - self._last[0]) * rate_rad_s
+                self._heading_rad += (time_s - last[0]) * rate_rad_s
         if turned_rad is not None:
             self._heading_rad = turned_rad
-        self._last = (state.time_s, joints, self._tilt)
-        level = pose_at(self._head_m, self._heading_rad, state.time_s)
-        return level._replace(rotation=level.rotation @ self._tilt)
+        self._last = (time_s, body)
+        c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
+        rotation = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+        if self._tilt is not _LEVEL:
+            rotation = rotation @ self._tilt
+        x_m, y_m = self._head_m
+        return BodyPose(time_s, np.array((x_m, y_m, 0.0)), rotation)
 
     def _take_attitude(self, state: JointState, joints: Floats) -> float | None:
         """Take the head's tilt from the IMU; returns its heading, None where there is none."""
         if self._imu_link is None or state.imu is None:
             return None
-        behind = body_in_world(self._robot, BodyPose(0.0, _NOWHERE, np.eye(3)), joints)
+        behind = self._spine.in_world(BodyPose(0.0, _NOWHERE, _LEVEL), joints)
         head = BodyPose(0.0, _NOWHERE, state.imu.rotation @ behind.rotation[self._imu_link].T)
         heading_rad = head.heading_rad
         self._tilt = rotation_by(-heading_rad * _UP) @ head.rotation
@@ -84,24 +88,13 @@ class DeadReckoning:
             self._zero_rad = self._heading_rad - heading_rad
         return heading_rad + self._zero_rad
 
-    def _integrate(
-        self, step_s: float, before_rad: Floats, before_tilt: Floats, after_rad: Floats
-    ) -> float:
+    def _integrate(self, step_s: float, before: BodyView, after: BodyView) -> float:
         """Move the head as the shape change does; returns the rate at which the body turns."""
-        before = body_in_world(self._robot, BodyPose(0.0, _NOWHERE, before_tilt), before_rad)
-        after = body_in_world(self._robot, BodyPose(0.0, _NOWHERE, self._tilt), after_rad)
-        shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
-        if np.abs(shape_m_s).max() < 1e-6:
+        slide = self._slide
+        if slide.set_shapes(before, after, step_s) < _STILL_M_S:
             return 0.0
-        self._velocity = rigid_velocity(
-            before.link_m[:, :2],
-            before.headings_rad,
-            shape_m_s,
-            self._friction,
-            self._velocity,
-            normal=link_weights(self._robot),
-        )
+        u, v, rate_rad_s = slide.velocity().tolist()
         c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
-        u, v = self._velocity[:2]
-        self._head_m = self._head_m + step_s * np.array([c * u - s * v, s * u + c * v])
-        return float(self._velocity[2])
+        x_m, y_m = self._head_m
+        self._head_m = x_m + step_s * (c * u - s * v), y_m + step_s * (s * u + c * v)
+        return float(rate_rad_s)

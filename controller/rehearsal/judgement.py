@@ -121,17 +121,9 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
 
     The clocks are compared by the datagrams: the quickest one arrives when the server sent it.
     """
-    source, pose = record.pose_source, record.pose
-    none = np.zeros(0), np.zeros(0)
-    if not len(source.time_s):
-        return none
-    row = {int(sequence): k for k, sequence in enumerate(truth.sequence)}
-    rows = np.array([row.get(int(sequence), -1) for sequence in source.sequence])
-    known = (rows >= 0) & np.isfinite(source.arrival_s)
-    known[known] = np.isfinite(truth.sent_s[rows[known]])
-    if not known.any():
-        return none
-    offset_s = float((source.arrival_s[known] - truth.sent_s[rows[known]]).min())
+    pose, offset_s = record.pose, clock_offset_s(truth, record)
+    if offset_s is None:
+        return np.zeros(0), np.zeros(0)
     at_s = pose.time_s - offset_s
     within = (at_s >= truth.time_s[0]) & (at_s <= truth.time_s[-1])
     at_s = at_s[within]
@@ -144,6 +136,20 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
         np.hypot(*(pose.head_m[within, :2] - true_m).T),
         np.abs(np.arctan2(np.sin(turn), np.cos(turn))),
     )
+
+
+def clock_offset_s(truth: Truth, record: RunRecord) -> float | None:
+    """Return the run's time less the server's; None without datagrams that tell it."""
+    source = record.pose_source
+    if not len(source.time_s):
+        return None
+    row = {int(sequence): k for k, sequence in enumerate(truth.sequence)}
+    rows = np.array([row.get(int(sequence), -1) for sequence in source.sequence])
+    known = (rows >= 0) & np.isfinite(source.arrival_s)
+    known[known] = np.isfinite(truth.sent_s[rows[known]])
+    if not known.any():
+        return None
+    return float((source.arrival_s[known] - truth.sent_s[rows[known]]).min())
 
 
 def _off_path_m(truth: Truth, record: RunRecord) -> Floats:

@@ -3,6 +3,6 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "judge", "Compare a run with the truth of the served robot; 1 unless it truly arrived and says so.", "snakewalk.controller.rehearsal.commands.judge:judge", "The job"),
-    ("command", "rehearse", "Rehearse runs against served robots in simulated time; 1 if one did not truly arrive.", "snakewalk.controller.rehearsal.commands.rehearse:rehearse_runs", "The job"),
+    ("command", "judge", "Compare a run with the truth of the served robot; exit code 1 unless it truly arrived.", "snakewalk.controller.rehearsal.commands.judge:judge", "The job"),
+    ("command", "rehearse", "Rehearse runs against served robots in simulated time; exit code 1 if one did not arrive.", "snakewalk.controller.rehearsal.commands.rehearse:rehearse_runs", "The job"),
 )

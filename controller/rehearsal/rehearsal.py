@@ -1,6 +1,6 @@
 """Rehearsals of runs in simulated time: a served robot with errors, a tracker, and a judgement."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -11,6 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.rehearsal.judgement import judge
+from snakewalk.controller.rehearsal.metric_errors import metric_errors
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.execute import execute
@@ -115,8 +116,10 @@ def _judged(case: RehearsalCase, folder: Path) -> dict[str, Any]:
         return {"error": error.faults[0]}
     numbers = finished.summary
     found = judge(read_truth(truth), finished.record, finished.outcome.tripped, numbers.outcome)
+    metrics = metric_errors(read_truth(truth), finished.record, numbers)
     return {
         **found.facts(),
+        "metrics": None if metrics is None else asdict(metrics),
         "duration_s": round(finished.outcome.duration_s, 2),
         "missed": finished.outcome.missed,
         "latency_s": finished.pose.facts().get("pose_latency_s"),

@@ -1,4 +1,4 @@
-"""What each body of a crowd is up to ([YT] 5): it wanders over a ground and avoids the others."""
+"""Behaviour of each body of a crowd ([YT] 5): it wanders over a ground and avoids the others."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ AHEAD_LENGTHS = 1.0
 TURNING_S = 1.5
 """In which a body would turn to where it wants (ours)."""
 PAUSE_SHARE = 0.08
-"""Of arrivals after which a body rests for a while (ours)."""
+"""Share of arrivals after which a body rests for a while (ours)."""
 _OFFSETS_RAD = np.array([0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6, 2.4, -2.4])
 
 
@@ -89,7 +89,7 @@ class Wandering:
             crowd.segment[body] = self._controllers[body].choose(speed, rate)
 
     def _turn_rad(self, bodies: Indices, at: Floats, heading: Floats) -> Floats:
-        """(n,) turn of each body: towards its goal, or the nearest to that where there is room."""
+        """(n,) turn of each body: towards its goal, or the nearest free direction."""
         to = self._goal_m[bodies] - at
         goal = np.arctan2(to[:, 1], to[:, 0])
         tried = goal[:, None] + _OFFSETS_RAD

@@ -9,7 +9,7 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import bridge_frames, tip_travel_m
 
 LANES = 8
-"""Links are padded to a multiple of this, so that a vector unit takes them without a rest."""
+"""Links are padded to a multiple of this, so that vector units process them without a remainder."""
 
 
 class Crowd:
@@ -115,7 +115,7 @@ class Crowd:
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _orthonormalise(r):  # type: ignore[no-untyped-def]
-    """Remove rounding from the axes: x keeps its direction, y and z are made anew."""
+    """Remove rounding from the axes: x keeps its direction, y and z are computed again."""
     size = 1.0 / np.sqrt(r[0] * r[0] + r[3] * r[3] + r[6] * r[6])
     r[0], r[3], r[6] = r[0] * size, r[3] * size, r[6] * size
     along = r[0] * r[1] + r[3] * r[4] + r[6] * r[7]

@@ -1,4 +1,4 @@
-"""Film of a crowd on a ground: what bodies do, what the camera sees of them, and its cost."""
+"""Film of a crowd on a ground: motion of the bodies, view of the camera, and its cost."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ SIZE_PX: Final = (960, 540)
 SIZES: Final = (0.22, 0.42)
 """Lengths of the animals over the recorded robot's (ours): the world is a model of 9 m."""
 FLIGHT_S: Final = 40.0
-"""Of the camera around the field."""
+"""Time in which the camera circles the field."""
 
 
 @dataclass

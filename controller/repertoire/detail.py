@@ -20,7 +20,7 @@ MIDDLE_PX: Final = 45.0
 
 @dataclass(frozen=True, slots=True)
 class ViewFrustum:
-    """What a camera sees; it has no roll."""
+    """View of a camera without roll."""
 
     eye_m: Floats
     """(3,)"""

@@ -3,9 +3,9 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "repertoire crowd", "Film many animals that wander over a terrain by recorded actions, without physics.", "snakewalk.controller.repertoire.commands.crowd:crowd", ""),
-    ("command", "repertoire play", "Play recorded actions on servos or in the simulator, as wanted speed and turn ask for.", "snakewalk.controller.repertoire.commands.repertoire_play:play_actions", ""),
-    ("command", "repertoire record", "Run forward, left and right actions on the physics and keep a settled cycle of each.", "snakewalk.controller.repertoire.commands.repertoire_record:record", ""),
+    ("command", "repertoire crowd", "Make a film of many animals that cross a terrain by recorded actions, without physics.", "snakewalk.controller.repertoire.commands.crowd:crowd", ""),
+    ("command", "repertoire play", "Play recorded actions on servos or in the simulator for a requested speed and turn rate.", "snakewalk.controller.repertoire.commands.repertoire_play:play_actions", ""),
+    ("command", "repertoire record", "Simulate forward, left and right actions, and record a settled cycle of each.", "snakewalk.controller.repertoire.commands.repertoire_record:record", ""),
     ("command", "repertoire run", "Run a plan on servos or in the simulator, and compare predicted with measured poses.", "snakewalk.controller.repertoire.commands.repertoire_run:run_plan", ""),
     ("command", "repertoire show", "Show the actions of a repertoire: speed, turn and closure error of a cycle.", "snakewalk.controller.repertoire.commands.repertoire_show:show_file", ""),
     ("planner", "repertoire", "Search over recorded actions; show, and where asked save, time on the physics, and run.", "snakewalk.controller.repertoire.commands.plan_route:plan_with_repertoire", ""),

@@ -23,10 +23,10 @@ class Repertoire:
 
     robot: str
     joint_axes: str
-    """Of the recorded robot, as in its configuration."""
+    """Axes of the recorded robot, as in its configuration."""
     world: str
     length_m: float
-    """Of the recorded body: another body is scaled by the ratio of lengths."""
+    """Length of the recorded body: another body is scaled by the ratio of lengths."""
     segments: tuple[Segment, ...]
 
     @property
@@ -38,7 +38,7 @@ class Repertoire:
         """Return the place of the segment ``name``.
 
         Raises:
-            InputError: there is none.
+            InputError: the segment does not exist.
 
         """
         names = [segment.name for segment in self.segments]

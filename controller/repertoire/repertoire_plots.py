@@ -1,4 +1,4 @@
-"""Pictures of a repertoire: the actions' displacements, and a planned route beside the real one."""
+"""Pictures of a repertoire: the actions' displacements, and a planned and a measured route."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -57,7 +57,7 @@ def record(
     actions: tuple[Action, ...] = ACTIONS,
     on_progress: Callable[[str, float], None] = lambda name, share: None,
 ) -> Repertoire:
-    """Record every action; ``on_progress`` takes the name and its share, 0 to 1.
+    """Record every action; ``on_progress`` receives the name and its share, 0 to 1.
 
     Raises:
         InputError: joints are missing, or do not bend so far; the supply is not the servos'.
@@ -77,7 +77,7 @@ def record_action(
 ) -> Segment:
     """Run one action from rest, and keep the cycle after ``SETTLING`` others.
 
-    A brake takes two cycles' time for the next one, ever slower; a rest is kept after that.
+    A brake lasts as long as two cycles, with falling speed; a rest is recorded after it.
     """
     parameters: dict[str, Any] = {
         "turn_rad": action.turn_rad,

@@ -20,6 +20,7 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
 from snakewalk.controller.run.execute import Finished
+from snakewalk.controller.run.finish import by_evidence
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
@@ -162,7 +163,7 @@ class RouteRun:
 
     @property
     def follower(self) -> RouteFollower:
-        """Follower of the route, with what it predicted and measured."""
+        """Follower of the route, with its predicted and measured poses."""
         source = self.finished.source
         assert isinstance(source, RouteMotion), "a repertoire run has no other motion"
         return source.follower
@@ -177,7 +178,7 @@ class RouteRun:
         job, outcome, follower = self.job, self.finished.outcome, self.follower
         facts: dict[str, object] = {
             "waypoints": len(job.run.waypoints_m),
-            "waypoints_reached": outcome.reached,
+            **by_evidence(self.finished, {"waypoints_reached": outcome.reached}),
             "replanned": job.replan,
             "actions_planned": len(job.route.actions),
             "actions_run": len(follower.measured),
@@ -187,16 +188,18 @@ class RouteRun:
         }
         cycle, route = follower.errors(), follower.route_errors()
         if len(cycle):
-            facts |= {
+            errors = {
                 "cycle_error_median_m": round(float(np.median(cycle[:, 0])), 4),
                 "cycle_error_median_rad": round(float(np.median(cycle[:, 1])), 4),
             }
+            facts |= by_evidence(self.finished, errors)
         if len(route) and not job.replan:
-            facts |= {
+            errors = {
                 "open_loop_error_max_m": round(float(route[:, 0].max()), 4),
                 "open_loop_error_end_m": round(float(route[-1, 0]), 4),
                 "open_loop_error_end_rad": round(float(route[-1, 1]), 4),
             }
+            facts |= by_evidence(self.finished, errors)
         return facts
 
 

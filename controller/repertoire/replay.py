@@ -1,7 +1,7 @@
 """Kinematic replay of segments from any pose, and bridges between them ([YT] 4.1 and 4.2).
 
-The replay is exact; Eq. 10-12 are corrected (``Segment``). A bridge takes as many frames as the
-distance that the tail has to go asks for.
+The replay is exact; Eq. 10-12 are corrected (``Segment``). The number of frames of a bridge depends
+on the distance that the tail has to move.
 """
 
 import math

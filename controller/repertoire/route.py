@@ -1,4 +1,4 @@
-"""Following a route: the next action at the end of a cycle, planned before or searched anew."""
+"""Following a route: the next action at the end of a cycle, planned before or searched again."""
 
 from collections.abc import Sequence
 

@@ -12,13 +12,14 @@ from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
 AIM_SHARE = 0.75
-"""Of a waypoint's radius that is aimed at: the body does not end a cycle quite where predicted."""
+"""Share of a waypoint's radius that the search aims at: the body ends a cycle slightly off the
+prediction."""
 SAMPLES = 10
 """Moments of a cycle at which the distance to a waypoint is checked."""
 
 
 class MotionPrimitives:
-    """What each action of a repertoire does in a cycle, in the plane."""
+    """Displacement of each action of a repertoire in a cycle, in the plane."""
 
     def __init__(self, repertoire: Repertoire, scale: float = 1.0) -> None:
         travels = [segment.flat_travel() for segment in repertoire.segments]
@@ -79,9 +80,9 @@ def search(
 ) -> Route:
     """Beam search: the quickest sequence that passes within ``radius_m`` of all waypoints in order.
 
-    Each round tries every action after each of the ``beam`` best sequences; one is worth the time
-    that it has taken and a lower estimate of the rest: the distance at the largest speed, and the
-    turn towards the next waypoint.
+    Each round tries every action after each of the ``beam`` best sequences. The value of one is its
+    duration plus a lower estimate of the rest: the distance at the largest speed, and the turn
+    towards the next waypoint.
 
     Returns:
         the quickest that reaches all, or the best of the last round if none does within ``depth``.

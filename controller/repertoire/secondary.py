@@ -20,8 +20,8 @@ class SecondaryController:
     """Selects segments, and another one when one has been repeated too often.
 
     A requested speed has a direction: forward, backward, or at rest, which is below half of the
-    slowest recorded speed. A segment of another direction is selected only if there is no segment
-    of this direction.
+    slowest recorded speed. A segment of another direction is selected only if this direction has
+    none.
     """
 
     def __init__(

@@ -10,8 +10,8 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import Frame
 
 Kind = Literal["forward", "left", "right", "reverse", "brake", "rest"]
-"""[YT] 3.2: forward and turns; retreating and braking, which there are made of forward; and rest,
-what a brake ends in. All but a brake are one settled cycle."""
+"""[YT] 3.2: forward and turns; retreating and braking, which the paper makes from forward; and
+rest, the state after a brake. All but a brake are one settled cycle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Segment:
 
     @property
     def duration_s(self) -> float:
-        """Of a cycle."""
+        """Duration of a cycle."""
         return self.frames * self.frame_s
 
     def travel(self) -> tuple[Floats, Floats]:

@@ -38,8 +38,10 @@ def make_artifacts(
     simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
     pictures. Shows progress on standard error. ``look`` is the body in the film, as ``film_look``
     accepts it; ``made`` says at the page's foot what made it. Without ``folders`` the page contains
-    the names of the user's files, but no folders.
+    the names of the user's files, but no folders. Times in the page and in the film count from the
+    moment torque was switched on, as in the summary.
     """
+    record = record.from_torque_on()
     notes: list[str] = []
     numbers = write_summary(summary(record) if numbers is None else numbers, folder)
     path = folder / FILM
@@ -69,6 +71,7 @@ def build_report(
         InputError: the film cannot be used, or matplotlib is not installed.
 
     """
+    record = record.from_torque_on()
     numbers = write_summary(summary(record) if numbers is None else numbers, out_dir)
     return _write_page(record, out_dir, film, numbers, _draw(record))
 

@@ -48,7 +48,7 @@ def curves_html(record: RunRecord) -> str:
     return (
         "<section id='curves'><h2>Curves</h2><figure>"
         f"<p class='facts'><label>Last two panels: <select id='joint'>{joints}</select></label></p>"
-        "<div id='plot'><noscript>Curves need scripts; the pictures below do not.</noscript></div>"
+        "<div id='plot'><noscript>Curves need scripts. The pictures below do not.</noscript></div>"
         "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
         "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is the "
         f"film's time.{which}{constant}</figcaption></figure>"
@@ -108,6 +108,7 @@ def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dic
 
 def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
     count = len(titles)
+    reached = "solid" if record.header.pose_evidence.is_measured else "dash"
     tall = (1.0 - _GAP * (count - 1)) / count
     layout: dict[str, Any] = {
         "margin": {"l": 46, "r": 8, "t": 22, "b": 36},
@@ -124,11 +125,11 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
         },
         "annotations": [],
         "shapes": [
-            _line(time_s, colour)
-            for colour, times in (
-                (GREEN, list(waypoint_times_s(record.pose, record.header.plan))),
-                (AMBER, [e.time_s for e in record.events if e.level == "warning"][:100]),
-                (RED, [e.time_s for e in record.events if e.level == "error"][:100]),
+            _line(time_s, colour, dash)
+            for colour, dash, times in (
+                (GREEN, reached, list(waypoint_times_s(record.pose, record.header.plan))),
+                (AMBER, "solid", [e.time_s for e in record.events if e.level == "warning"][:100]),
+                (RED, "solid", [e.time_s for e in record.events if e.level == "error"][:100]),
             )
             for time_s in times
         ],
@@ -151,10 +152,10 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
     return layout
 
 
-def _line(time_s: float, colour: str) -> dict[str, Any]:
+def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
     return {
         "type": "line", "x0": time_s, "x1": time_s, "yref": "paper", "y0": 0.0, "y1": 1.0,
-        "line": {"color": colour, "width": 1}, "opacity": 0.6, "layer": "below",
+        "line": {"color": colour, "width": 1, "dash": dash}, "opacity": 0.6, "layer": "below",
     }  # fmt: skip
 
 

@@ -41,7 +41,8 @@ def film_run(
     Args:
         record: the run.
         path: of the film; its folder is made.
-        look: the body's skin; None is a capsule a link.
+        look: the body's skin; None is a capsule a link. The waypoints of a dead-reckoned run are
+            hollow, and the caption names its pose.
         fine: larger, smoother, and eight times slower to draw.
         on_progress: called with (frames done, of).
 
@@ -56,7 +57,7 @@ def film_run(
     if len(time_s) < 2:
         raise InputError("the log holds no two poses: there is nothing to film")
     path.parent.mkdir(parents=True, exist_ok=True)
-    plan = header.plan
+    plan, measured = header.plan, header.pose_evidence.is_measured
     drawn: int = film.render_film(
         header.robot,
         header.world,
@@ -68,7 +69,9 @@ def film_run(
             fps=FINE_FPS if fine else FPS,
             speed_up=speed_up(float(time_s[-1] - time_s[0])),
             size=FINE_SIZE if fine else SIZE,
-            title=header.run.name,
+            title=header.run.name
+            if measured
+            else f"{header.run.name}, {header.pose_evidence.text}",
             look=look,
             fine=fine,
         ),
@@ -77,6 +80,7 @@ def film_run(
             waypoint_radius_m=plan.waypoint_radius_m,
             reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
             paths=record.paths,
+            hollow=not measured,
         ),
         on_frame=on_progress,
     )

@@ -201,6 +201,8 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
         ("Missed deadlines", missed, wire),
         ("Safety", _count(n.clamps, "clamp"), f"{vetoes}, {_count(n.alarms, 'alarm')}"),
     ]  # fmt: skip
+    if n.carrier_share is not None:
+        tiles.insert(5, ("On wide waves", _pct(n.carrier_share), "of the walk's decisions"))
     found = n.friction_found
     if found is not None:
         (along, along_to), (across, across_to) = found.along_95, found.across_95

@@ -19,18 +19,26 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.motion.command import (
     LINE_BYTES,
     Command,
+    GoTo,
     HoldStill,
     JointGoals,
     JointTrajectory,
     Refused,
     StartGait,
+    Velocity,
 )
 
 LATE_S: Final = 0.5
 """A command that waited longer for the run is rejected (ours): nothing stale moves a joint."""
 _AHEAD_S: Final = 0.1
 """A command with a later time is rejected (ours): both processes read the same clock."""
-_NAMES: Final = {"goals": "joint goals", "trajectory": "trajectory", "gait": "gait"}
+_NAMES: Final = {
+    "goals": "joint goals",
+    "trajectory": "trajectory",
+    "gait": "gait",
+    "velocity": "velocity",
+    "goto": "goal pose",
+}
 
 
 def encode_command(command: Command) -> str:
@@ -48,6 +56,10 @@ def encode_command(command: Command) -> str:
     elif isinstance(command, StartGait):
         gait = command.gait
         row = {"kind": "gait", "name": gait.name, "parameters": gait.params.model_dump()}
+    elif isinstance(command, Velocity):
+        row = {"kind": "velocity", "velocity": list(command)}
+    elif isinstance(command, GoTo):
+        row = {"kind": "goto", "point_m": list(command)}
     elif isinstance(command, Refused):
         row = {"kind": "refused", "why": command.why}
     else:
@@ -107,6 +119,12 @@ def _command(kind: str, row: dict[str, Any]) -> Command:
         from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415  the node has none
 
         return StartGait(make_gait(row["name"], row["parameters"]))
+    if kind == "velocity":
+        forward_m_s, turn_rad_s = (float(value) for value in row["velocity"])
+        return Velocity(forward_m_s, turn_rad_s)
+    if kind == "goto":
+        x_m, y_m = (float(value) for value in row["point_m"])
+        return GoTo(x_m, y_m)
     if kind == "refused":
         return Refused(str(row["why"]))
     if kind == "hold":

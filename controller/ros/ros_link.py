@@ -9,10 +9,12 @@ from contextlib import AbstractContextManager, contextmanager
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
-from snakewalk.controller.motion.command import Command, Refused
+from snakewalk.controller.motion.command import Command, GoTo, Refused
 from snakewalk.controller.ros.command_codec import decode_command
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.watcher import WatcherProcess
+from snakewalk.controller.run.watchers import GOALS
+from snakewalk.controller.walk.live_course import NEXT
 
 
 class RosLink(WatcherProcess):
@@ -34,6 +36,14 @@ class RosLink(WatcherProcess):
         """Return what has been commanded since the last call; returns at once."""
         return [_decoded(line) for line in self._end.commands()]
 
+    def waypoint_commands(self) -> list[str | Refused]:
+        """Return the goal poses since the last call as commands of a ``LiveCourse``."""
+        return [
+            f"{NEXT}={command.x_m!r},{command.y_m!r}" if isinstance(command, GoTo) else command
+            for command in self.commands()
+            if isinstance(command, GoTo | Refused)
+        ]
+
 
 @contextmanager
 def open_ros(options: RosOptions) -> Iterator[RosLink]:
@@ -46,7 +56,9 @@ def open_ros(options: RosOptions) -> Iterator[RosLink]:
 @plugin("observer", "ros")
 def open_node(argument: str) -> AbstractContextManager[RosLink]:
     """ROS 2 node that publishes a run and offers a stop service."""
-    return open_ros(RosOptions())
+    if argument not in ("", GOALS):
+        raise InputError(f"--observe ros:{argument}: expected ros or ros:{GOALS}")
+    return open_ros(RosOptions(goals=argument == GOALS))
 
 
 def _decoded(line: str) -> Command:

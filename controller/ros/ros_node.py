@@ -8,8 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import cache
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,38 +19,28 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import InputError
+from snakewalk.config.ros import RosConfig
 from snakewalk.controller.exchange.ros_messages import (
     DIAGNOSTICS,
     ERROR,
+    FRAMES,
     HEAD_POSE,
     IMU,
     JOINT_GOALS,
     JOINT_STATES,
+    ODOMETRY,
     OK,
     PATH,
     TYPES,
     WARNING,
     RosMessages,
     Row,
+    pose_frame,
 )
-from snakewalk.controller.motion.command import (
-    JOINTS_MAX,
-    POINTS_MAX,
-    TIMEOUT_S,
-    Command,
-    HoldStill,
-    JointGoals,
-    JointTrajectory,
-    Refused,
-    StartGait,
-)
-from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
 from snakewalk.controller.ros.command_codec import encode_command
+from snakewalk.controller.ros.ros_commands import QUEUE, CommandTopics, in_words, message_type
 from snakewalk.controller.ros.ros_options import RosOptions
-from snakewalk.controller.run.factory import gait_by_name, is_gait
 from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.row_line import BUTTON, WatcherEnd
 from snakewalk.controller.runlog.tables import record_of
@@ -59,6 +48,7 @@ from snakewalk.controller.runlog.topics import (
     ConfigTable,
     CycleTable,
     EventTable,
+    PoseSourceTable,
     PoseTable,
     SlowTable,
 )
@@ -68,6 +58,7 @@ from snakewalk.drivers.safety.stop_button import PressedButton
 NAME: Final = "snakewalk"
 _CYCLE: Final = CycleTable.topic.name
 _SLOW: Final = SlowTable.topic.name
+_POSE_SOURCE: Final = PoseSourceTable.topic.name
 _WAIT_S: Final = 0.05
 _DIAGNOSTICS_S: Final = 1.0
 _OFFSET_SPAN_S: Final = 2.0
@@ -76,20 +67,18 @@ _STOP_S: Final = 1.0
 _LOOK_S: Final = 1e-3
 _LAST_S: Final = 0.2
 """For the last messages to leave."""
-_PENDING_MAX: Final = 16
-"""Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that
-newer ones of the same joints follow."""
-_QUEUE: Final = QoSProfile(depth=10)
 _LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TOPICS: Final = {
-    JOINT_STATES: ("robot_joint_states", _QUEUE),
-    JOINT_GOALS: ("robot_joint_goals", _QUEUE),
-    HEAD_POSE: ("head_pose", _QUEUE),
-    IMU: ("imu", _QUEUE),
+    JOINT_STATES: ("robot_joint_states", QUEUE),
+    JOINT_GOALS: ("robot_joint_goals", QUEUE),
+    HEAD_POSE: ("head_pose", QUEUE),
+    ODOMETRY: ("odom", QUEUE),
+    FRAMES: (FRAMES, QUEUE),
+    IMU: ("imu", QUEUE),
     PATH: ("path", _LATCHED),
-    DIAGNOSTICS: (DIAGNOSTICS, _QUEUE),
+    DIAGNOSTICS: (DIAGNOSTICS, QUEUE),
 }
-"""Topic of a bag to name and quality of service of a node's; all nodes share diagnostics."""
+"""Topic of a bag to name and quality of service of a node's; all nodes share the absolute names."""
 
 
 def serve(line: socket.socket, options: RosOptions) -> None:
@@ -106,7 +95,7 @@ def serve(line: socket.socket, options: RosOptions) -> None:
     hello = {"name": node.get_fully_qualified_name(), "domain": domain}
     line.sendall(json.dumps(hello).encode() + b"\n")
     robot = RobotNode(node, WatcherEnd(line), options)
-    with _spinning(node, robot.reject):
+    with _spinning(node, robot.commands.reject):
         with suppress(EOFError):
             while True:
                 try:
@@ -114,7 +103,7 @@ def serve(line: socket.socket, options: RosOptions) -> None:
                 except EOFError:
                     raise
                 except Exception as fault:  # the stop service stays
-                    robot.reject(f"a row of the run: {_in_words(fault)}")
+                    robot.commands.reject(f"a row of the run: {in_words(fault)}")
         robot.end()
     node.destroy_node()
     rclpy.shutdown()
@@ -145,7 +134,7 @@ def _spinning(node: Node, reject: Callable[[str], None]) -> Iterator[None]:
             except ExternalShutdownException:
                 return
             except Exception as fault:  # rclpy's own, of text that is not UTF-8 for one
-                reject(f"a message: {_in_words(fault)}")
+                reject(f"a message: {in_words(fault)}")
 
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
@@ -191,20 +180,12 @@ class RobotNode:
         self._publishers: dict[str, Any] = {}
         self._header: Header | None = None
         self._newest: dict[str, Mapping[str, Any]] = {}
+        self._tf = "none"
         self._button: PressedButton | None = None
-        self._cycles = 0
         self._told_s = -_DIAGNOSTICS_S
         self._said: dict[str, tuple[int, str]] = {}
-        self._pending: deque[Command] = deque(maxlen=_PENDING_MAX)
-        self._lock = threading.Lock()
-        node.create_service(_type("std_srvs/srv/Trigger"), "~/stop", self._stop)
-        if options.commands:
-            for kind, topic, take in (
-                ("sensor_msgs/msg/JointState", "robot_joint_command", self._goals),
-                ("trajectory_msgs/msg/JointTrajectory", "robot_joint_trajectory", self._trajectory),
-                ("std_msgs/msg/String", "robot_gait", self._gait),
-            ):
-                node.create_subscription(_type(kind), topic, self._guarded(topic, take), _QUEUE)
+        self.commands = CommandTopics(node, options)
+        node.create_service(message_type("std_srvs/srv/Trigger"), "~/stop", self._stop)
 
     def step(self, wait_s: float) -> None:
         """Take the rows that have come, publish them, and hand the run what was commanded."""
@@ -239,7 +220,13 @@ class RobotNode:
 
     def _begin(self, record: RunRecord) -> None:
         self._header = record.header
-        for topic in (JOINT_STATES, JOINT_GOALS, HEAD_POSE, DIAGNOSTICS):
+        self.commands.frame = pose_frame(record.header)
+        self._tf = (record.header.robot.ros or RosConfig()).tf
+        if self._tf != "none" and find_spec("tf2_msgs") is None:
+            self._tf = "none"
+            self._said["tf"] = WARNING, "tf2_msgs is not installed: /tf is not published"
+        frames = () if self._tf == "none" else (FRAMES,)
+        for topic in (JOINT_STATES, JOINT_GOALS, HEAD_POSE, ODOMETRY, *frames, DIAGNOSTICS):
             self._publisher(topic)  # others find them before the first cycle
         self._end.ask()
         if record.header.run.waypoints_m:
@@ -249,13 +236,26 @@ class RobotNode:
         rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == _SLOW}
         if self._header is None or _CYCLE not in rows:
             return
-        self._cycles += 1
+        self.commands.has_begun = True
         self._offset.add(self._ros_now_s(), rows[_CYCLE]["time_s"])
         record = self._record({topic: [row] for topic, row in rows.items()})
         self._publish(self._messages.joints(record))
         self._publish(self._messages.head_poses(record))
+        self._publish(self._messages.odometry(record, *self._deviations(rows.get(_POSE_SOURCE))))
+        if self._tf != "none" and len(record.pose.time_s):
+            self._publish(self._messages.transforms(record, links=self._tf == "links"))
         self._publish(self._messages.imu(record))
         self._said["cycle"] = OK, f"late by {1e3 * rows[_CYCLE]['lateness_s']:.1f} ms"
+
+    def _deviations(self, source: Mapping[str, Any] | None) -> tuple[float | None, float | None]:
+        """Return the standard deviations of position and heading of a cycle; None: unknown."""
+        assert self._header is not None
+        evidence = self._header.pose_evidence
+        if source is None:
+            return evidence.position_m, evidence.heading_rad
+        if source["fault"]:
+            return None, None
+        return source["position_sd_m"], source["heading_sd_rad"]
 
     def _record(self, rows: Mapping[str, list[Mapping[str, Any]]]) -> RunRecord:
         return record_of(rows, complete=False, note="", header=self._header)
@@ -269,7 +269,7 @@ class RobotNode:
         if topic not in self._publishers:
             name, quality = _TOPICS[topic]
             kind = TYPES[topic]
-            self._publishers[topic] = self._node.create_publisher(_type(kind), name, quality)
+            self._publishers[topic] = self._node.create_publisher(message_type(kind), name, quality)
         return self._publishers[topic]
 
     def _publish_diagnostics(self) -> None:
@@ -283,6 +283,7 @@ class RobotNode:
             self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, {})
             for name, (level, text) in self._said.items()
         ]
+        status.append(self._messages.pose_status(self._header))
         if _SLOW in self._newest:
             status += self._messages.servos(self._record({_SLOW: [self._newest[_SLOW]]}), 0)
         self._publisher(DIAGNOSTICS).publish(self._messages.diagnostics(run_s, status).message)
@@ -306,10 +307,7 @@ class RobotNode:
 
     def _send(self) -> None:
         """Hand over what was commanded since the last cycle, and ask for the next."""
-        with self._lock:
-            commands = list(self._pending)
-            self._pending.clear()
-        for command in commands:
+        for command in self.commands.take():
             self._end.command(encode_command(command))
         self._end.ask()
 
@@ -320,7 +318,7 @@ class RobotNode:
         """Press the run's stop button, and answer when torque is off."""
         button = self._button
         if button is None:
-            response.success, response.message = False, "there is no run to stop yet"
+            response.success, response.message = False, "no run has begun yet"
             return response
         began_s = self._clock.now_s()
         button.press(f"ROS service {self._node.get_fully_qualified_name()}/stop")
@@ -336,144 +334,10 @@ class RobotNode:
         )
         return response
 
-    def reject(self, why: str) -> None:
-        """Let the run report why a message was rejected."""
-        with self._lock:
-            self._pending.append(Refused(f"ROS: {why}"))
-
-    def _guarded(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return a callback that rejects a message on which ``take`` fails."""
-
-        def taken(message: Any) -> None:
-            try:
-                take(message)
-            except Exception as fault:  # else the thread ends, and the stop service with it
-                self.reject(f"{topic}: {_in_words(fault)}")
-
-        return taken
-
-    def _goals(self, message: Any) -> None:
-        if max(len(message.name), len(message.position)) > JOINTS_MAX:
-            why = (
-                f"joint goals: names {len(message.name)} joints; at most {JOINTS_MAX} are accepted"
-            )
-            self._command(Refused(why), message.header.stamp, "joint goals")
-            return
-        if message.name and not message.position:
-            why = "joint goals: no positions; velocities and efforts alone are not taken"
-            self._command(Refused(why), None, "joint goals")
-            return
-        goals = JointGoals(list(message.name), list(message.position))
-        self._command(goals, message.header.stamp, "joint goals")
-
-    def _trajectory(self, message: Any) -> None:
-        stamp, points = message.header.stamp, message.points
-        if not points:
-            self._command(HoldStill(), stamp, "trajectory")
-            return
-        if len(message.joint_names) > JOINTS_MAX:
-            why = (
-                f"trajectory: names {len(message.joint_names)} joints; at most {JOINTS_MAX} are "
-                "accepted"
-            )
-            self._command(Refused(why), stamp, "trajectory")
-            return
-        if len(points) > POINTS_MAX:
-            why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are taken"
-            self._command(Refused(why), stamp, "trajectory")
-            return
-        times = [each.time_from_start for each in points]
-        time_s = np.array([each.sec + 1e-9 * each.nanosec for each in times])
-        try:
-            values = (
-                _rows([each.positions for each in points]),
-                _rows([each.velocities for each in points]),
-                _rows([each.accelerations for each in points]),
-            )
-        except ValueError:
-            why = "trajectory: its points have different numbers of values"
-            self._command(Refused(why), stamp, "trajectory")
-            return
-        positions, velocities, accelerations = values
-        if positions is None:
-            self._command(Refused("trajectory: its points have no positions"), stamp, "trajectory")
-            return
-        names = list(message.joint_names)
-        command = JointTrajectory(names, time_s, positions, velocities, accelerations)
-        self._command(command, stamp, "trajectory")
-
-    def _gait(self, message: Any) -> None:
-        words = message.data.split()
-        if not words:
-            self._command(HoldStill(), None, "gait")
-            return
-
-        command: Command
-        try:
-            if not is_gait(words[0]):
-                raise InputError(f"gait: {words[0][:NAME_MAX]}: no such gait; snakewalk gait list")
-            values: dict[str, Any] = {}
-            for key, value in map(_value, words[1:]):
-                if key in values:
-                    raise InputError(f"gait: {key[:NAME_MAX]} is given twice; give it once")
-                values[key] = value
-            command = StartGait(gait_by_name(words[0], values)[0])
-        except InputError as error:
-            command = Refused(error.faults[0])
-        self._command(command, None, "gait")
-
-    def _command(self, command: Command, stamp: Any, what: str) -> None:
-        """Keep a command for the run; a stamp of 0 says nothing."""
-        if not self._cycles:
-            command = Refused(f"{what}: the run has not begun")
-        elif stamp is not None and (stamp.sec or stamp.nanosec):
-            age_s = self._ros_now_s() - (stamp.sec + 1e-9 * stamp.nanosec)
-            timeout_s = self._options.timeout_s
-            most_s = timeout_s if age_s > 0.0 else min(timeout_s, TIMEOUT_S)
-            if abs(age_s) > most_s:
-                when = "ago" if age_s > 0.0 else "ahead"
-                command = Refused(
-                    f"{what}: stamped {abs(age_s):.1f} s {when}; at most {most_s:g} s is taken, "
-                    "and 0 for now"
-                )
-        with self._lock:
-            last = self._pending[-1] if self._pending else None
-            newer = isinstance(command, JointGoals) and isinstance(last, JointGoals)
-            if newer and last.joints == command.joints:  # type: ignore[union-attr]
-                self._pending.pop()
-            self._pending.append(command)
-
-
-def _rows(values: list[Any]) -> Floats | None:
-    """(N, K) array of a trajectory's points; None where none has any."""
-    return np.array([list(each) for each in values], dtype=float) if any(values) else None
-
-
-def _value(word: str) -> tuple[str, Any]:
-    key, equals, text = word.partition("=")
-    if not (key and equals and text):
-        raise InputError(f"gait: {word[:NAME_MAX]}: expected PARAM=VALUE")
-    try:
-        return key, parse_json(text)
-    except ValueError:
-        return key, text
-
-
-def _in_words(fault: Exception) -> str:
-    """One line that says what failed."""
-    text = " ".join(str(fault).split())
-    return f"it cannot be used ({text[:TEXT_MAX] or type(fault).__name__})"
-
 
 def _doubles(values: Floats) -> Any:
     return array.array("d", np.ascontiguousarray(values, dtype=float).tobytes())
 
 
-@cache
-def _type(kind: str) -> Any:
-    package, folder, name = kind.split("/")
-    return getattr(import_module(f"{package}.{folder}"), name)
-
-
 def _message(kind: str, fields: Mapping[str, Any]) -> Any:
-    return _type(kind)(**fields)
+    return message_type(kind)(**fields)

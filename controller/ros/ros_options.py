@@ -23,6 +23,8 @@ class RosOptions:
     """Whether other machines see it; else only this one, unless the environment says where."""
     commands: bool = False
     """Whether it takes commands; the stop service is there in any case."""
+    goals: bool = False
+    """Whether it accepts goal poses, of a run along waypoints."""
     timeout_s: float = TIMEOUT_S
     """Commands with an older stamp are refused."""
 

@@ -1,4 +1,4 @@
-"""Poses of a ROS 2 topic as a pose source: PoseStamped, PoseWithCovarianceStamped or Odometry.
+"""Poses of a ROS 2 topic as a pose source: PoseStamped, Odometry, a transform of /tf and others.
 
 A process of its own subscribes to the topic and passes each pose on in the format of
 ``controller/pose/datagram.py``, so that the run imports no ROS and checks the poses as usual.
@@ -18,6 +18,7 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.child_process import pipe, start
 from snakewalk.controller.console.command import plugin
+from snakewalk.controller.exchange.ros_messages import FRAMES
 from snakewalk.controller.pose.udp_feed import PoseQueue
 from snakewalk.controller.ros.ros_options import READY, RosOptions
 from snakewalk.controller.run.external.external_source import ExternalSource
@@ -29,7 +30,7 @@ _END_S: Final = 2.0
 
 @plugin("pose", "ros")
 class RosPose(ExternalSource):
-    """Poses of a ROS 2 topic: ros:/TOPIC."""
+    """Poses of a ROS 2 topic: ros:/TOPIC, or ros:/tf:FRAME."""
 
     name = "ros"
 
@@ -56,15 +57,22 @@ class RosPose(ExternalSource):
         return RosPoseFeed(argument, clock)
 
 
-def check_topic(topic: str) -> None:
-    """Check the name of a topic.
+def check_topic(argument: str) -> None:
+    """Check the name of a topic, and of the body's frame if the topic has transforms.
 
     Raises:
         InputError: it is not the name of a topic.
 
     """
-    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", topic, re.ASCII):
-        raise InputError(f"--pose ros:{topic}: expected ros:/TOPIC; for example ros:/tracker/pose")
+    topic, colon, child = argument.partition(":")
+    is_name = re.fullmatch(r"(/[A-Za-z_]\w*)+", topic, re.ASCII)
+    if not is_name or (colon and not re.fullmatch(r"[\w/.-]{1,100}", child, re.ASCII)):
+        raise InputError(
+            f"--pose ros:{argument}: expected ros:/TOPIC or ros:/tf:FRAME; for example "
+            "ros:/tracker/pose or ros:/tf:snake_head"
+        )
+    if topic in (FRAMES, f"{FRAMES}_static") and not child:
+        raise InputError(f"--pose ros:{argument}: name the body's frame; ros:{topic}:FRAME")
 
 
 class RosPoseFeed(PoseQueue):

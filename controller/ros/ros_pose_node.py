@@ -1,16 +1,18 @@
 """The process that subscribes to a topic with poses, and passes each one on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
 
 from snakewalk.controller.pose.datagram import encode_pose
 from snakewalk.controller.pose.sample import PoseSample, UnusablePoseError, rotation_of
@@ -25,8 +27,15 @@ KINDS: Final[dict[str, tuple[Any, bool]]] = {
 SPIN_S: Final = 0.05
 
 
-def serve(line: Connection, topic: str) -> None:
+TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
+
+
+def serve(line: Connection, argument: str) -> None:
     """Pass the poses of a topic on until the run sends something, or ends."""
+    topic, _, child = argument.partition(":")
+    if child and find_spec("tf2_msgs") is None:
+        line.send_bytes(b"tf2_msgs is not installed; install ros-jazzy-tf2-msgs of ROS 2")
+        return
     rclpy.init()
     node = rclpy.create_node("snakewalk_pose")
     line.send_bytes(READY)
@@ -34,7 +43,7 @@ def serve(line: Connection, topic: str) -> None:
     is_subscribed = False
     with suppress(BrokenPipeError, EOFError, ConnectionError):
         while not line.poll(0.0):
-            is_subscribed = is_subscribed or _subscribe(node, topic, send)
+            is_subscribed = is_subscribed or _subscribe(node, topic, child, send)
             rclpy.spin_once(node, timeout_sec=SPIN_S)
     node.destroy_node()
     rclpy.shutdown()
@@ -64,6 +73,15 @@ def pose_of(message: Any, sequence: int, *, has_covariance: bool) -> bytes:
     )
 
 
+def poses_of(message: Any, child: str) -> Iterator[PoseStamped]:
+    """Return the transforms of a ``TFMessage`` to one frame as poses."""
+    for each in message.transforms:
+        if each.child_frame_id == child:
+            at, turn = each.transform.translation, each.transform.rotation
+            pose = Pose(position=Point(x=at.x, y=at.y, z=at.z), orientation=turn)
+            yield PoseStamped(header=each.header, pose=pose)
+
+
 class _Sender:
     """Counts the messages, and passes them on."""
 
@@ -74,11 +92,23 @@ class _Sender:
         self._line.send_bytes(pose_of(message, self._count, has_covariance=has_covariance))
         self._count += 1
 
+    def transforms(self, message: Any, child: str) -> None:
+        """Pass on the poses of one frame."""
+        for pose in poses_of(message, child):
+            self(pose, has_covariance=False)
 
-def _subscribe(node: Any, topic: str, send: Callable[..., None]) -> bool:
+
+def _subscribe(node: Any, topic: str, child: str, send: "_Sender") -> bool:
     """Subscribe if the topic exists with a known type; returns whether it does."""
+    on_message: Callable[[Any], None]
     for kind in dict(node.get_topic_names_and_types()).get(topic, []):
-        if kind in KINDS:
+        if kind == TRANSFORMS and child:
+            type_ = import_module("tf2_msgs.msg").TFMessage
+            on_message = partial(send.transforms, child=child)
+            # not best effort: on /tf a lost message may be the only one of a frame
+            node.create_subscription(type_, topic, on_message, QoSProfile(depth=100))
+            return True
+        if kind in KINDS and not child:
             type_, has_covariance = KINDS[kind]
             on_message = partial(send, has_covariance=has_covariance)
             node.create_subscription(type_, topic, on_message, qos_profile_sensor_data)

@@ -1,4 +1,4 @@
-"""What answers on the bus: simulated servos in the same process, or metal on a serial port.
+"""Bus of a run: simulated servos in the same process, or real ones on a serial port.
 
 Everything above the byte port is the same object for both.
 """
@@ -65,7 +65,7 @@ class Backend:
     wire_busy_s: Callable[[], float]
     """Time that bytes have spent on the wire so far; NaN where nobody counts."""
     energy: Callable[[], MotorEnergy] = MotorEnergy
-    """What the motors have taken in and done so far."""
+    """Energy that the motors have consumed, and work that they have done so far."""
     twin: Callable[[], Twin] | None = None
     """Makes a second body, on which motion is tried; None where time does not wait for it."""
     lay_down: Callable[[InitialPose], None] | None = None
@@ -286,7 +286,7 @@ def split(
 
 
 def is_split(robot: RobotConfig) -> bool:
-    """Whether some of the robot's servos are simulated, beside real ones."""
+    """Whether some of the robot's servos are simulated, and others real."""
     return any(each.port == SIMULATED for each in robot.ports)
 
 
@@ -302,7 +302,7 @@ def _bus_on(robot: RobotConfig, line: SerialPort | NetworkPort) -> DynamixelBus:
 def _bus_on_ports(
     robot: RobotConfig, clock: Clock, simulated_line: BytePort | None = None
 ) -> SegmentedBus:
-    """A bus for each segment; what is open is closed where another port cannot be opened."""
+    """A bus for each segment; open ports are closed if another port cannot be opened."""
     parts = []
     with ExitStack() as opened:
         for each in robot.ports:
@@ -320,7 +320,7 @@ def is_pseudo_terminal(ports: Sequence[str] | None) -> bool | None:
     """Return whether all ports are pseudo-terminals, as those of served simulations are.
 
     Returns:
-        None where there is no port.
+        None without a port.
 
     """
     if not ports:

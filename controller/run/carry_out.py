@@ -8,6 +8,7 @@ from typing import NamedTuple
 from snakewalk.controller.console.progress import PathBar, TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.run.watchers import Watchers, watched
@@ -20,9 +21,11 @@ class Carried(NamedTuple):
     folder: Path
 
 
-def watched_by(options: RunOptions, *others: str) -> AbstractContextManager[Watchers | None]:
+def watched_by(
+    options: RunOptions, *others: str, live: bool = False
+) -> AbstractContextManager[Watchers | None]:
     """Open the observers that the options name, and ``others``: ``NAME[:ARGUMENT]``."""
-    return watched(options.view, options.view_at, options.ros, others)
+    return watched(options.view, options.view_at, options.ros, others, live=live)
 
 
 def carry_out(
@@ -36,7 +39,7 @@ def carry_out(
     is_operated: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
-    waypoint_commands: Callable[[], Iterable[str]] | None = None,
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None = None,
 ) -> Carried:
     """Execute a run with a progress bar; a watched or operated simulation runs in real time.
 

@@ -14,6 +14,8 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
 from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.metrics.travel import Travel, travel
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.compliance import chatters
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.backend import (
@@ -75,7 +77,7 @@ class RunObserver(CycleObserver, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """What a run left behind."""
+    """Results of a run."""
 
     outcome: Outcome
     log: Path
@@ -83,11 +85,13 @@ class Finished:
     """The log, read back once: for the summary, the report and whoever asks more of it."""
     summary: RunSummary
     pose: PoseProvider
-    """What measured the pose, and how well where this is known."""
+    """Source of the pose, and its accuracy if this is known."""
     map: MapProvider
-    """What mapped the ground on the way, and how well, where something did."""
+    """Source of the map, and its accuracy, for a run that maps its ground."""
     source: MotionSource
     """The motion that ran, at its end."""
+    travel: Travel
+    """Travel of the centre of mass, of which the summary has the speed."""
 
 
 def execute(
@@ -101,7 +105,7 @@ def execute(
     shadow: bool = False,
     confirm: Callable[[str], bool] | None = None,
     stop_requested: Callable[[], str | None] = lambda: None,
-    waypoint_commands: Callable[[], Iterable[str]] | None = None,
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None = None,
     on_progress: OnProgress = lambda progress: None,
     on_event: OnEvent = lambda kind, text: None,
 ) -> Finished:
@@ -113,20 +117,19 @@ def execute(
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
     them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
-    the simulated runs of a study have none. ``view`` looks on: a page that shows the run, a ROS
-    node that tells of it. With ``shadow`` a simulated chain follows the same goals, and log and
-    ``on_event`` tell what differs.
-    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``);
-    ``stop_requested``, asked in every read and write, why torque goes off, or None;
-    ``waypoint_commands``, asked in every cycle, what a person sets of the waypoints, as
-    ``LiveCourse`` takes it: the run then holds at the last one until it is ended;
-    ``on_progress`` is called after each cycle, ``on_event`` with what the motion decides by itself:
-    a slower rate, an operator's change.
+    the simulated runs of a study have none. ``view`` observes the run: a page that shows it, a ROS
+    node that publishes it. With ``shadow`` a simulated chain follows the same goals, and log and
+    ``on_event`` report the differences. ``confirm`` asks an operator whether an interrupted chain
+    may go on (``safety.recovery``). ``stop_requested`` is called in every read and write and
+    returns why torque goes off, or None. ``waypoint_commands`` is called in every cycle and returns
+    a person's changes of the waypoints, as ``LiveCourse`` accepts them: the run then holds at the
+    last one until it is ended. ``on_progress`` is called after each cycle, ``on_event`` with
+    decisions of the motion: a slower rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
             the folder holds a run, or a shadow is asked for on ground where it means nothing.
-        KeyboardInterrupt: of an operator; its notes tell what became of torque, and the log's path.
+        KeyboardInterrupt: of an operator; its notes report the state of torque, and the log's path.
 
     """
     refuse_another_run(folder, force)
@@ -151,7 +154,7 @@ class _Execution:
     shadow: bool
     confirm: Callable[[str], bool] | None
     stop_requested: Callable[[], str | None]
-    waypoint_commands: Callable[[], Iterable[str]] | None
+    waypoint_commands: Callable[[], Iterable[str | Refused]] | None
     on_progress: OnProgress
     on_event: OnEvent
 
@@ -199,8 +202,8 @@ class _Execution:
             )
             outcome, pose, mapped, source = self._loop(robot, backend, log, button, initial_pose)
         LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
-        record, numbers = _read_back(log_path)
-        return Finished(outcome, log_path, record, numbers, pose, mapped, source)
+        record, numbers, moved = _read_back(log_path)
+        return Finished(outcome, log_path, record, numbers, pose, mapped, source, moved)
 
     def _backend(self, robot: RobotConfig, initial_pose: InitialPose | None) -> Backend:
         prepared, port = self.prepared, self.port
@@ -309,7 +312,7 @@ def _stop_output(
 def _live(
     prepared: PreparedRun,
     source: MotionSource,
-    commands: Callable[[], Iterable[str]],
+    commands: Callable[[], Iterable[str | Refused]],
     on_event: OnEvent,
 ) -> LiveCourse:
     """Put a person in charge of the waypoints.
@@ -344,11 +347,12 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
         raise
 
 
-def _read_back(log: Path) -> tuple[RunRecord, RunSummary]:
-    """Read the log of a run that is over, and write its summary beside it."""
+def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
+    """Read the log of a run that is over, and write its summary next to it."""
     try:
         record = read_log(log)
-        return record, write_summary(summary(record), log.parent)
+        moved = travel(record)
+        return record, write_summary(summary(record, moved), log.parent), moved
     except KeyboardInterrupt as stop:
         stop.add_note(f"the run is whole: {log}; its page: snakewalk report {log}")
         raise
@@ -358,7 +362,8 @@ def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
     """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
     if metal and prepared.run.deviation != DeviationConfig():
         raise InputError(
-            f"run {prepared.run.name}: deviation: a robot on a port is as it is; take the table out"
+            f"run {prepared.run.name}: deviation: changes a simulated robot only; remove the "
+            "table, or --port"
         )
     pose_faults(prepared.run, prepared.robot, prepared.world, metal=metal)
     map_faults(prepared, metal=metal)

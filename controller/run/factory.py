@@ -75,7 +75,7 @@ def _extension(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepar
     """Prepare a run whose motion is a plug-in: a kind of run, or a motion source.
 
     Raises:
-        InputError: there is no such motion.
+        InputError: the motion does not exist.
 
     """
     kind = find("run", run.motion)
@@ -99,7 +99,7 @@ def prepare_walk(
     on_paper: bool = False,
     **changes: object,
 ) -> WalkRun:
-    """Load a walk's run: as ``prepare_job``, which takes gaits along waypoints, too.
+    """Load a walk's run: as ``prepare_job``, which also accepts gaits along waypoints.
 
     Raises:
         ConfigError: every fault of a file at once.
@@ -113,8 +113,8 @@ def prepare_walk(
         )
     if not isinstance(found, WalkRun):
         raise InputError(
-            f"run {found.run.name}: motion {found.run.motion} is no walk; run it by: snakewalk "
-            f"run {name}"
+            f"run {found.run.name}: motion {found.run.motion} is not a walk; run it by: "
+            f"snakewalk run {name}"
         )
     return found
 
@@ -133,8 +133,8 @@ def prepare_job(
     itself.
 
     Raises:
-        ConfigError: every fault of a file at once.
-        InputError: what the configuration asks cannot be made, or does not fit the wire.
+        ConfigError: every fault of a file at once. InputError: the configuration cannot be
+        realised, or does not fit the wire.
 
     """
     keys = checked_keys(keys)
@@ -184,7 +184,7 @@ def prepare_job(
 
 
 def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
-    """Return keys of run, robot and world that a gait's run takes, angles in rad.
+    """Return keys of run, robot and world that a gait's run accepts, angles in rad.
 
     Raises:
         InputError: a key is of none of the files, or has an option of its own; one line each.
@@ -202,8 +202,8 @@ def _refuse_one_joint(robot: RobotConfig) -> None:
     """
     if len(robot.yaw_joints) == 1:
         raise InputError(
-            f"robot {robot.name}: has one yaw joint, which only bends to and fro; a walk takes two "
-            "at least, and more to steer"
+            f"robot {robot.name}: has one yaw joint, but a walk needs two, and more for "
+            "steering; choose another robot"
         )
 
 
@@ -337,8 +337,15 @@ def prepare_playback(
     scale: float = 1.0,
     clip: bool = False,
     keys: Mapping[str, object] | None = None,
+    joints: Mapping[str, str] | None = None,
+    unit: str | None = None,
+    topic: str | None = None,
+    episode: int | None = None,
 ) -> PlaybackRun:
     """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
+
+    ``joints``, ``unit``, ``topic`` and ``episode`` answer what a file of joint angles does not
+    state, as the keys of ``[playback]`` do.
 
     Raises:
         InputError: no such recording, joints that do not bend so far, too fast for them.
@@ -352,7 +359,10 @@ def prepare_playback(
         "world": world or "flat",
         "track": track,
         "motion": "playback",
-        "playback": {"speed": speed, "scale": scale, "clip": clip},
+        "playback": {
+            **{"speed": speed, "scale": scale, "clip": clip, "joints": dict(joints or {})},
+            **{"unit": unit, "topic": topic, "episode": episode},
+        },
     }
     _reject_legs(body)
     run, ground = assemble(fields, keys, body)
@@ -376,8 +386,8 @@ def prepare_source(
 ) -> SourceRun:
     """Prepare a run of your own motion source, of at most ``seconds``; it ends earlier when done.
 
-    ``make`` takes the robot and returns a fresh source at each call: one is stepped on paper before
-    torque is on, another one in the run; ``keys`` as of ``prepare_walk``.
+    ``make`` receives the robot and returns a fresh source at each call: one is stepped on paper
+    before torque is on, another one in the run. ``keys`` as for ``prepare_walk``.
 
     Raises:
         InputError: the robot lacks joints that the source needs, or its cycle does not fit the

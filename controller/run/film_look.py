@@ -13,7 +13,7 @@ SERVOS: Final = "servos"
 ANIMAL: Final = "animal"
 """The animal of the run's recording."""
 _BODY: Final = "body"
-"""The plug-in for looks that are no plug-in's name: names and files of bodies."""
+"""The plug-in for other looks: names and files of bodies."""
 
 
 class LookPlugin(Protocol):
@@ -32,7 +32,7 @@ def check_look(look: str) -> None:
     """Reject a look that cannot be made, before a run.
 
     Raises:
-        InputError: there is no such look, or an extra is missing.
+        InputError: the look does not exist, or an extra is missing.
 
     """
     if look != SERVOS:
@@ -43,7 +43,7 @@ def film_look(look: str, header: Header) -> "SkinLook | None":
     """Return the skin of a run's film; None is a capsule per link.
 
     Raises:
-        InputError: there is no such look, or an extra is missing.
+        InputError: the look does not exist, or an extra is missing.
 
     """
     return None if look == SERVOS else _plugin(look).make(look, header)

@@ -21,7 +21,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Artifacts:
-    """Files of a run beside its log; None for what is not there, and why in ``notes``."""
+    """Files of a run next to its log; None for missing ones, with the reason in ``notes``."""
 
     report: Path | None
     film: Path | None
@@ -79,7 +79,8 @@ def show_run(
     """Make the report and the film, and show a run's facts and files; exit 1 if safety tripped."""
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
-    show({**facts, **files, **artifacts.to_dict()}, as_json)
+    evidence = finished.summary.evidence
+    show({**facts, **evidence, **files, **artifacts.to_dict()}, as_json)
     if finished.outcome.tripped is not None:
         raise SystemExit(1)
 
@@ -89,13 +90,15 @@ NOT_MEASURED: Final = 3
 
 
 def by_evidence(finished: Finished, values: Mapping[str, object]) -> dict[str, object]:
-    """Return values that need a measured pose; without one, None and ``dead_reckoned_*``."""
+    """Return values that need a measured pose, and its evidence.
+
+    Without a measured pose the values are None, each with its counterpart ``dead_reckoned_*``.
+    """
     numbers = finished.summary
-    evidence = {"pose_evidence": numbers.pose_evidence, "pose_source": numbers.pose_source}
     if numbers.is_measured:
-        return {**values, **evidence}
+        return {**values, **numbers.evidence}
     believed = {f"dead_reckoned_{key}": value for key, value in values.items()}
-    return {**dict.fromkeys(values), **believed, **evidence}
+    return {**dict.fromkeys(values), **believed, **numbers.evidence}
 
 
 def summarized(numbers: RunSummary, *keys: str) -> dict[str, object]:

@@ -109,7 +109,7 @@ def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
         and not prepared.config.then
         and prepared.config.by == "blend"
     ):
-        displacement = gait_displacement(finished.record)
+        displacement = finished.travel.gait or gait_displacement(finished.record)
         result |= {
             "frequency_hz": round(displacement.frequency_hz, 3),
             "cycles": displacement.cycles,
@@ -134,7 +134,7 @@ def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
 
 
 def _names(prepared: GaitRun, hands: Hands | None) -> Callable[[float], str]:
-    """What moves at a time of the run: gaits change by keys or as planned."""
+    """Return the motion at a time of the run: gaits change by keys or as planned."""
     name = prepared.run.name
     if hands is not None:
         return lambda gone_s: hands.gait or name

@@ -20,7 +20,7 @@ from snakewalk.controller.runtime.drive import OnEvent
 
 
 class Hands:
-    """What an operator has in hand: keyboard, gamepad, page."""
+    """Devices of an operator: keyboard, gamepad, page."""
 
     def __init__(
         self, devices: list[Keyboard | Gamepad | PageControls], page: PageControls | None

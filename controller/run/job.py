@@ -45,8 +45,10 @@ class Job:
 
         """
         check_look(look)
-        if self.live and not self.options.view:
-            raise InputError("--live: waypoints are set in the page: add --view")
+        if self.live and not (self.options.view or self.options.ros):
+            raise InputError(
+                "--live: waypoints come from the page or from ROS; add --view or --ros"
+            )
         prepared = self._prepared()
         name = self._name(prepared)
         finished, folder = self._execute(prepared, name)
@@ -94,10 +96,10 @@ class Job:
         return "-".join(parts)
 
     def _execute(self, prepared: PreparedRun, name: str) -> Carried:
-        with watched_by(self.options, *(self.observe or ())) as watchers:
-            page = watchers.page if watchers is not None and self.live else None
-            if page is not None:
-                page.on_course()
+        with watched_by(self.options, *(self.observe or ()), live=self.live) as watchers:
+            commanded = watchers if self.live else None
+            if commanded is not None and commanded.page is not None:
+                commanded.page.on_course()
             return carry_out(
                 prepared,
                 name,
@@ -106,7 +108,7 @@ class Job:
                 watchers,
                 shadow=self.shadow,
                 confirm=_confirm if sys.stdin.isatty() else None,
-                waypoint_commands=None if page is None else page.pressed,
+                waypoint_commands=None if commanded is None else commanded.waypoint_commands,
             )
 
 

@@ -20,7 +20,7 @@ from snakewalk.controller.terrain.growing_map import GrowingMap
 
 @dataclass(frozen=True, slots=True)
 class MapContext:
-    """What a map source may use of a run."""
+    """Parts of a run that a map source may use."""
 
     prepared: PreparedRun
     backend: Backend
@@ -65,17 +65,17 @@ def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
 
 @dataclass
 class MapProvider:
-    """What a run sees of its ground beside its pose, and afterwards how well."""
+    """Map of a run's ground in addition to its pose, and its accuracy afterwards."""
 
     measure: PoseSource
-    """Measures the pose, and takes pictures when they are due."""
+    """Measures the pose, and captures pictures when they are due."""
     ground_map: GrowingMap | None = None
     """None where the walk knows its ground from the world."""
     true_ground: HeightField | None = None
     head_m: float = 0.0
     """Way of the head so far, in plan."""
     head_over_unknown_m: float = 0.0
-    """Of it, over ground that was not in the map when the head came there."""
+    """Part of it over ground that was not in the map when the head came there."""
     _last_m: Floats | None = None
 
     def follow(self, head_m: Floats) -> None:

@@ -29,7 +29,7 @@ OnPicture = Callable[[Image, float], None]
 
 @dataclass(frozen=True, slots=True)
 class PoseContext:
-    """What a pose source may use of a run."""
+    """Parts of a run that a pose source may use."""
 
     prepared: PreparedRun
     backend: Backend
@@ -64,7 +64,7 @@ def pose_plugin(pose: str) -> tuple[PosePlugin, str]:
     """Return the pose source that ``pose`` or ``--pose`` names, and its argument.
 
     Raises:
-        InputError: there is no such source.
+        InputError: the source does not exist.
 
     """
     name, _, argument = pose.partition(":")
@@ -145,7 +145,7 @@ class PoseProvider:
 
 @dataclass
 class PoseComparison:
-    """An estimated pose beside the simulator's, which is recorded but never used by the run."""
+    """An estimated pose with the simulator's, which is recorded but never used by the run."""
 
     prepared: PreparedRun
     estimate: PoseSource
@@ -179,9 +179,9 @@ def pose_provider(
     on_event: OnEvent,
     on_picture: OnPicture = lambda picture, time_s: None,
 ) -> Iterator[PoseProvider]:
-    """Make the provider that the run asks for; at its end ``on_event`` takes how good it was.
+    """Make the provider that the run asks for; at its end ``on_event`` receives its accuracy.
 
-    ``on_picture`` takes each picture of a camera with its time.
+    ``on_picture`` receives each picture of a camera with its time.
 
     Raises:
         InputError: the camera is not there, does not show the robot, or cannot work here.

@@ -1,4 +1,4 @@
-"""What is known of a run before a servo moves: the interface of every kind of motion."""
+"""Preparation of a run before a servo moves: the interface of every kind of motion."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -46,7 +46,7 @@ class PreparedRun(Protocol):
 
     @property
     def gain(self) -> float:
-        """Predicted speed over pulse speed; NaN where there is no prediction."""
+        """Predicted speed over pulse speed; NaN without a prediction."""
         ...
 
     @property
@@ -68,7 +68,7 @@ class PreparedRun(Protocol):
         ...
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
-        """Return a fresh motion; it tells ``on_event`` what it decides by itself."""
+        """Return a fresh motion; it reports its own decisions to ``on_event``."""
         ...
 
 
@@ -85,7 +85,7 @@ def plan_without_path(run: RunConfig) -> PlanSummary:
 
 @dataclass(frozen=True)
 class GroundedRun:
-    """Base of prepared runs: what is configured, and the ground of it."""
+    """Base of prepared runs: the configuration and its ground."""
 
     run: RunConfig
     robot: RobotConfig

@@ -27,8 +27,7 @@ def check_supply(robot: RobotConfig) -> None:
         if not low_v <= robot.servo.supply_v <= high_v:
             raise InputError(
                 f"robot {robot.name}: servo.supply_v = {robot.servo.supply_v:g}: {facts.model} "
-                f"takes {low_v:g} to {high_v:g} V; recommended: supply_v = "
-                f"{facts.motor.nominal_v:g}"
+                f"accepts {low_v:g} to {high_v:g} V; use supply_v = {facts.motor.nominal_v:g}"
             )
 
 

@@ -13,7 +13,7 @@ from snakewalk.controller.console.child_process import start
 from snakewalk.controller.runlog.row_line import BUTTON, RunEnd
 
 _START_S: Final = 60.0
-"""How long it may take to start: a busy machine imports slowly (ours)."""
+"""Longest time until it starts: a busy machine imports slowly (ours)."""
 _END_S: Final = 2.0
 
 
@@ -41,7 +41,7 @@ class WatcherProcess:
         far.close()
         ours.settimeout(_START_S)
         try:
-            # unbuffered: what follows the line is the run's to read
+            # unbuffered: the bytes after the line are for the run
             said = json.loads(ours.makefile("rb", buffering=0).readline() or "{}")
         except OSError:
             said = {}
@@ -49,7 +49,7 @@ class WatcherProcess:
             self._process.kill()
             raise InputError(f"{fault}: {said.get('fault', 'it did not start')}")
         self.said: dict[str, Any] = said
-        """What it said of itself."""
+        """Its description of itself."""
         self._end = RunEnd(ours)
         self._what = what
 
@@ -80,12 +80,12 @@ class WatcherProcess:
         return [f"{self._what}: {why}" for why in self._end.rejected()]
 
     def on_row(self, topic: str, row: bytes) -> None:
-        """Take a row of the log; returns at once."""
+        """Queue a row of the log; returns at once."""
         self._end.add(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:
         """Let a picture go by."""
 
     def on_button(self, path: Path) -> None:
-        """Take the run's stop button, which the watcher presses."""
+        """Store the run's stop button, which the watcher presses."""
         self._end.add(BUTTON, json.dumps({"path": str(path)}).encode())

@@ -3,15 +3,18 @@
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.plugins import require
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.run.observer_watch import OffersStop, Watcher
 
 PAGE, ROS, SHADOW = "page", "ros", "shadow"
 """Observers that have an option of their own."""
+GOALS = "goals"
+"""Argument of the ROS node of a live run: it accepts goal poses."""
 
 
 class PageControls(Watcher, OffersStop, Protocol):
@@ -35,6 +38,15 @@ class PageControls(Watcher, OffersStop, Protocol):
         ...
 
 
+@runtime_checkable
+class OffersWaypoints(Protocol):
+    """An observer that commands the waypoints of a live run."""
+
+    def waypoint_commands(self) -> list[str | Refused]:
+        """Return what was commanded since the last call, as ``LiveCourse`` accepts it."""
+        ...
+
+
 class Watchers:
     """A ``Watcher`` that passes on what it receives."""
 
@@ -42,6 +54,9 @@ class Watchers:
         self.page = page
         """The page of the run, which may also command it; None without a page."""
         self._watchers: list[Watcher] = [one for one in (page, *others) if one is not None]
+        self._with_waypoints = [
+            one for one in self._watchers if one is not page and isinstance(one, OffersWaypoints)
+        ]
         self._with_stop = [one for one in self._watchers if isinstance(one, OffersStop)]
 
     def on_row(self, topic: str, row: bytes) -> None:
@@ -63,6 +78,13 @@ class Watchers:
         """Return why commands were rejected since the last call."""
         return [why for each in self._with_stop for why in each.rejected()]
 
+    def waypoint_commands(self) -> list[str | Refused]:
+        """Return what was commanded of the waypoints since the last call."""
+        commands: list[str | Refused] = [] if self.page is None else [*self.page.pressed()]
+        for each in self._with_waypoints:
+            commands += each.waypoint_commands()
+        return commands
+
     def on_button(self, path: Path) -> None:
         """Pass the stop button on."""
         for each in self._watchers:
@@ -73,7 +95,7 @@ def open_observer(name: str, argument: str = "") -> AbstractContextManager[Any]:
     """Return the observer that a plug-in opens.
 
     Raises:
-        InputError: there is no such observer.
+        InputError: the observer does not exist.
 
     """
     opened: AbstractContextManager[Any] = require("observer", name, "--observe").load()(argument)
@@ -82,7 +104,12 @@ def open_observer(name: str, argument: str = "") -> AbstractContextManager[Any]:
 
 @contextmanager
 def watched(
-    view: bool, view_at: str, ros: bool, observe: Sequence[str] | None = None
+    view: bool,
+    view_at: str,
+    ros: bool,
+    observe: Sequence[str] | None = None,
+    *,
+    live: bool = False,
 ) -> Iterator[Watchers | None]:
     """Open the observers that are asked for; None without any.
 
@@ -91,14 +118,15 @@ def watched(
         view_at: HOST:PORT of the page.
         ros: open the ROS node.
         observe: ``NAME[:ARGUMENT]`` of further observers.
+        live: let page and ROS node command the waypoints of the run.
 
     Raises:
-        InputError: there is no such observer, or it cannot be opened.
+        InputError: the observer does not exist, or it cannot be opened.
 
     """
     with ExitStack() as stack:
         page = stack.enter_context(open_observer(PAGE, view_at)) if view else None
-        others = [stack.enter_context(open_observer(ROS))] if ros else []
+        others = [stack.enter_context(open_observer(ROS, GOALS if live else ""))] if ros else []
         for text in observe or ():
             name, _, argument = text.partition(":")
             if name in (PAGE, ROS, SHADOW):

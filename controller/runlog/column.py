@@ -51,7 +51,7 @@ class Panel(StrEnum):
     CHAIN = "whole chain, A"
     FRICTION = "estimated friction"
     JOINT_ANGLE = "joint's angle, rad"
-    """Of the joint that the reader of the page selects."""
+    """Angle of the joint that the reader of the page selects."""
     JOINT_CURRENT = "joint's current, A"
 
     @property
@@ -61,7 +61,7 @@ class Panel(StrEnum):
 
     @property
     def unit(self) -> str:
-        """Unit of the values; empty if there is none."""
+        """Unit of the values; empty without one."""
         return self.partition(", ")[2]
 
 
@@ -95,7 +95,7 @@ class Column:
     """Goes into the topic's JSON schema."""
     kind: Kind = "rounded"
     shape: tuple[str | int, ...] = ()
-    """Of one row: numbers, ``JOINT``, ``LINK`` or ``ANY``."""
+    """Shape of one row: numbers, ``JOINT``, ``LINK`` or ``ANY``."""
     default: Any = REQUIRED
     """Value of a row that lacks the field, written now or read from an older log."""
     is_known: bool = False
@@ -169,7 +169,7 @@ class Table:
     __slots__ = ()
     topic: ClassVar[Topic]
     time_s: Floats
-    """Of all tables but ``ConfigTable``."""
+    """Times of all tables but ``ConfigTable``."""
 
 
 T = TypeVar("T", bound=Table)
@@ -204,7 +204,7 @@ def registered_tables() -> tuple[type[Table], ...]:
 
 
 def unit_of(name: str) -> str:
-    """Unit in the name of a field; empty if there is none."""
+    """Unit in the name of a field; empty without one."""
     return next((unit for unit in UNITS if name.endswith(f"_{unit}")), "")
 
 

@@ -1,8 +1,8 @@
 """Numbers to JSON: rounded below any sensor's resolution, NaN as null, valid JSON only.
 
 Goals keep every digit, so that a replay can use and compare them exactly. The rows of every cycle
-are printed with a fixed number of digits, ``%.6f`` by a compiled loop and ``%.17g`` by a template:
-the same numbers, quicker than the shortest text that gives a number back.
+are printed with a fixed number of digits, ``%.6f`` by a compiled loop and ``%.17g`` by a template.
+The numbers are the same, and this is quicker than the shortest exact text.
 """
 
 import json
@@ -29,7 +29,7 @@ encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 
 
 def number(value: float) -> float | None:
-    """One rounded float, or None for what is not finite."""
+    """One rounded float, or None for a value that is not finite."""
     return round(float(value), _DECIMALS) if np.isfinite(value) else None
 
 
@@ -120,8 +120,8 @@ def _lists(shapes: tuple[tuple[int, ...], ...]) -> Ints:
 def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:
     """Print finite ``values`` as ``_template`` does; how many bytes, or -1 where it must be used.
 
-    It must for large numbers, and for those so near the middle between two of six digits that their
-    product with a million, which is rounded, does not tell which is printed.
+    The template is needed for large numbers, and for those so near the middle between two of six
+    digits that their rounded product with a million does not decide which is printed.
     """
     at = k = 0
     for a in range(len(lists)):

@@ -41,8 +41,15 @@ class PoseEvidence:
     def text(self) -> str:
         """The evidence for a reader: ``measured by simulator``."""
         by = "from" if self.kind is Kind.DEAD_RECKONED else "by"
-        off = "" if self.position_m is None else f", {100.0 * self.position_m:.1f} cm"
+        off = "" if not self.position_m else f", {100.0 * self.position_m:.1f} cm"
         return f"{self.kind} {by} {self.source}{off}"
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """Kind, source and uncertainty as texts; an unknown uncertainty is left out."""
+        off = {"pose_position_sd_m": self.position_m, "pose_heading_sd_rad": self.heading_rad}
+        known = {name: f"{value:g}" for name, value in off.items() if value is not None}
+        return {"pose_evidence": str(self.kind), "pose_source": self.source, **known}
 
     def row(self) -> dict[str, Any]:
         """The evidence as it is written to the log."""

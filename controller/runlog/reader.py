@@ -1,4 +1,4 @@
-"""Reads a log back, up to the break if a kill or a bad disk cut it."""
+"""Reads a log back, up to the break if a kill cut it, and without the parts that are damaged."""
 
 import json
 import struct
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, McapRecord, Message
+from mcap.records import Channel, Chunk, Header, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from pydantic import ValidationError
 from zstandard import ZstdError, decompress, frame_content_size
@@ -29,19 +29,22 @@ _CHUNK: Final = 6
 _CHUNK_HEAD: Final = struct.Struct("<16xQ4xI")  # two times, bytes unpacked, CRC, length of a name
 _CHUNK_LENGTH: Final = 8  # after the packing's name, before the packed bytes
 _ZSTD_HEAD: Final = 18  # at most
+_PACKED: Final = ("zstd", "")
+_NAMED: Final = 8
+"""Topics that a message names at most (ours)."""
 _BROKEN = (McapError, ZstdError, ValueError, KeyError, RecursionError, struct.error)
 Rows = dict[str, list[dict[str, Any]]]
 
 
 class LogError(InputError):
-    """A log is missing, is none, or breaks off before it says what ran."""
+    """A log is missing, is another kind of file, or breaks off before its header ends."""
 
 
 def read_log(path: Path) -> RunRecord:
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
 
     Raises:
-        LogError: there is no such file, it is no log of ours, or not even its start is left.
+        LogError: the file does not exist, is not a log of ours, or its start is missing.
         InputError: it would expand too far (``archive.check_expansion``).
 
     """
@@ -50,7 +53,7 @@ def read_log(path: Path) -> RunRecord:
     try:
         with path.open("rb") as file:
             data = file.read(len(_MAGIC))
-            if data == _MAGIC:  # a device that has no end is no log
+            if data == _MAGIC:  # a device without an end is not a log
                 data += file.read()
     except OSError as error:
         part = part_path(path)
@@ -58,30 +61,55 @@ def read_log(path: Path) -> RunRecord:
         raise LogError(f"{path}: {error.strerror or error}{hint}") from None
     if not data.startswith(_MAGIC[: len(data)]) or not data:
         raise LogError(f"{path}: is not an MCAP log")
-    rows, last_s, complete = _rows(path, data)
+    rows, last_s, complete, lost = _rows(path, data)
     configs = rows[ConfigTable.topic.name]
     if not configs:
+        if _whole_records(data)[1] and _crcs_agree(data) and not lost:
+            raise LogError(f"{path}: {_foreign(data)}")
         raise LogError(f"{path}: breaks off before it says what ran: nothing can be recovered")
     if configs[0].get("format") != FORMAT:
         raise LogError(
             f"{path}: has format {configs[0].get('format')}, this version reads {FORMAT}"
         )
     note = "" if complete else f"the log is cut or damaged; its last row is of {last_s:.2f} s"
+    if lost:
+        note += f"; {lost} damaged parts are left out"
     try:
         return record_of(rows, complete=complete, note=note)
     except (LookupError, TypeError, ValueError, AttributeError, ValidationError) as error:
         raise LogError(f"{path}: is not a log of this version: {error}") from None
 
 
-def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool]:
-    """Rows by topic, time of the last one, and whether the file is whole."""
+def _foreign(data: bytes) -> str:
+    """Return the sentence about a complete MCAP that another program wrote."""
+    profile, topics = "", set[str]()
+    for record in StreamReader(BytesIO(data), emit_chunks=True).records:
+        if isinstance(record, Header):
+            profile = record.profile
+        elif isinstance(record, Channel):
+            topics.add(record.topic)
+    for record in _records(data, []):
+        if isinstance(record, Channel):
+            topics.add(record.topic)
+    listed = ", ".join(sorted(topics)[:_NAMED]) + (", ..." if len(topics) > _NAMED else "")
+    with_topics = f"with topics {listed}" if topics else "without topics"
+    return (
+        f"is a complete MCAP of profile {profile!r} {with_topics}, but no log of snakewalk; "
+        "`snakewalk play` accepts one with joint states"
+    )
+
+
+def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool, int]:
+    """Rows by topic, time of the last one, whether the file is whole, and its damaged parts."""
     end, complete, unpacked = _whole_records(data)
     check_expansion(path, len(data), unpacked, text=True)
+    complete = complete and _crcs_agree(data)
     rows: Rows = defaultdict(list)
-    topics: dict[int, str] = {}
+    lost = list[str]()
+    topics = _topics(path, data[:end])
     last_ns = 0
     try:
-        for record in _records(path, data[:end]):
+        for record in _records(data[:end], lost):
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
@@ -92,23 +120,59 @@ def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool]:
                 last_ns = max(last_ns, record.log_time)
     except _BROKEN:
         complete = False  # the end of a cut file comes as an error too; damage fails a CRC
-    return rows, last_ns * 1e-9, complete
+    return rows, last_ns * 1e-9, complete and not lost, len(lost)
 
 
-def _records(path: Path, data: bytes) -> Iterator[McapRecord]:
-    """Records of a log, also those in chunks; no chunk is unpacked to more than it says."""
-    chunks = 0
-    for record in StreamReader(BytesIO(data), emit_chunks=True, validate_crcs=True).records:
+def _crcs_agree(data: bytes) -> bool:
+    """Whether a whole file has the checksums that it states, those in its chunks apart."""
+    try:
+        for _ in StreamReader(BytesIO(data), emit_chunks=True, validate_crcs=True).records:
+            pass
+    except _BROKEN:
+        return False
+    return True
+
+
+def _topics(path: Path, data: bytes) -> dict[int, str]:
+    """Topics by number, of the summary: a damaged chunk may have been the first to name one.
+
+    Raises:
+        LogError: chunks are packed in a way that logs are not.
+
+    """
+    topics, chunks = dict[int, str](), 0
+    try:
+        for record in StreamReader(BytesIO(data), emit_chunks=True).records:
+            if isinstance(record, Channel):
+                topics[record.id] = record.topic
+            if isinstance(record, Chunk):
+                chunks += 1
+                if chunks == 1 and record.compression not in _PACKED:
+                    raise LogError(
+                        f"{path}: is packed with {record.compression!r}; a log is with zstd"
+                    )
+    except _BROKEN:
+        pass
+    return topics
+
+
+def _records(data: bytes, lost: list[str]) -> Iterator[McapRecord]:
+    """Records of a log, also those in chunks; no chunk is unpacked to more than it says.
+
+    The faults of damaged chunks go into ``lost``; a chunk's records come all or not at all.
+    """
+    for record in StreamReader(BytesIO(data), emit_chunks=True).records:
         if not isinstance(record, Chunk):
             yield record
             continue
-        if record.compression not in ("zstd", ""):
-            name = f"{record.compression!r}; a log is with zstd"
-            if chunks:  # no CRC covers a chunk's head
-                raise ValueError(f"after {chunks} chunks one is packed with {name}")
-            raise LogError(f"{path}: is packed with {name}")
-        chunks += 1
-        yield from breakup_chunk(_unpacked(record), validate_crc=True)
+        try:
+            if record.compression not in _PACKED:  # no CRC covers a chunk's head
+                raise ValueError(f"packed with {record.compression!r}")
+            inner = list(breakup_chunk(_unpacked(record), validate_crc=True))
+        except _BROKEN as error:
+            lost.append(str(error))
+            continue
+        yield from inner
 
 
 def _unpacked(chunk: Chunk) -> Chunk:
@@ -122,7 +186,7 @@ def _unpacked(chunk: Chunk) -> Chunk:
 
 
 def _said_bytes(chunk: bytes) -> int:
-    """Bytes that a chunk says it takes unpacked; the lesser, where its frame says otherwise."""
+    """Unpacked bytes that a chunk states; the lesser, if its frame states otherwise."""
     said, name_length = _CHUNK_HEAD.unpack_from(chunk)
     frame = _CHUNK_HEAD.size + name_length + _CHUNK_LENGTH
     try:
@@ -133,7 +197,7 @@ def _said_bytes(chunk: bytes) -> int:
 
 
 def _whole_records(data: bytes) -> tuple[int, bool, int]:
-    """Bytes of whole records, whether the footer ends them, and their bytes unpacked, as told."""
+    """Bytes of complete records, whether the footer ends them, and their stated unpacked bytes."""
     at, opcode, unpacked = len(_MAGIC), 0, 0
     while at + _HEAD.size <= len(data) and opcode != _FOOTER:
         opcode, length = _HEAD.unpack_from(data, at)

@@ -1,8 +1,8 @@
 """A run as its log describes it: one table for each topic, rows in order of time."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, NamedTuple, Self
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -36,9 +36,14 @@ class MotorEnergy(NamedTuple):
     """Energy of all motors since they were switched on; NaN where nothing adds it up."""
 
     electrical_j: float = float("nan")
-    """Taken in; what a motor gives back is lost, not deducted. Without the servos' electronics."""
+    """Consumed energy; energy that a motor returns is lost, not deducted. Without the servos'
+    electronics."""
     mechanical_j: float = float("nan")
     """Net work at the shafts."""
+
+
+POSE_CHECK: Final = "pose check"
+"""Backend of a log that contains only the poses of a source, before torque."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,7 @@ class Winding:
 
 @dataclass(frozen=True, slots=True)
 class PlanSummary:
-    """What the plan promises."""
+    """Figures of the plan."""
 
     path_m: Floats
     """(n, 2) or (n, 3) points of the path that the run starts with."""
@@ -71,14 +76,14 @@ class InitialPose:
     """Pose in which a simulated robot was put on the ground."""
 
     heading_rad: float
-    """Of the head link."""
+    """Heading of the head link."""
     joint_rad: Floats
     """(J,)"""
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What ran, with what."""
+    """Software and configuration of a run."""
 
     software: str
     backend: str
@@ -92,7 +97,7 @@ class Header:
     """Thinned; None on a flat floor."""
     torque_constant_n_m_a: float
     winding: Winding | None
-    """Of the robot's servos; None where the log does not say it."""
+    """Winding of the robot's servos; None if the log does not state it."""
     initial_pose: InitialPose | None
     """None on servos."""
     pose_evidence: PoseEvidence
@@ -212,7 +217,7 @@ class RunRecord:
     complete: bool
     """Whether the file was closed properly."""
     note: str
-    """What is missing, if it was not; empty otherwise."""
+    """Missing part, if the plan was incomplete; empty otherwise."""
 
     def tables(self) -> tuple[Table, ...]:
         """Tables of all topics but ``ConfigTable``; those of the plan begin at 0 s."""
@@ -242,3 +247,50 @@ class RunRecord:
         ends = [t.time_s[-1] for t in (self.cycle, self.pose, self.walk) if len(t.time_s)]
         ends += [e.time_s for e in self.events[-1:]]
         return float(max(ends, default=0.0))
+
+    @property
+    def torque_on_s(self) -> float:
+        """Time at which torque was switched on; 0 if it was not."""
+        return next((event.time_s for event in self.events if event.kind == "start"), 0.0)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from torque on to torque off, or to the last row of a log that breaks off."""
+        stops = [event.time_s for event in self.events if event.kind == "stop"]
+        return (stops[-1] if stops else self.end_s) - self.torque_on_s
+
+    def from_torque_on(self) -> Self:
+        """Return the record with times that count from the moment torque was switched on.
+
+        The times of a log count from the moment the connection was opened.
+        """
+        start_s = self.torque_on_s
+        if start_s == 0.0:
+            return self
+        moved: dict[str, Any] = {}
+        for field in fields(self):
+            table = getattr(self, field.name)
+            if isinstance(table, Table):
+                moved[field.name] = _earlier(table, start_s)
+        plan = self.header.plan
+        if plan.set_s is not None:
+            plan = replace(plan, set_s=plan.set_s - start_s)
+        return replace(
+            self,
+            **moved,
+            header=replace(self.header, plan=plan),
+            paths=tuple((time_s - start_s, points_m) for time_s, points_m in self.paths),
+            waypoints=tuple((time_s - start_s, points_m) for time_s, points_m in self.waypoints),
+            events=tuple(replace(event, time_s=event.time_s - start_s) for event in self.events),
+        )
+
+
+_TIMES: Final = ("time_s", "deadline_s", "arrival_s")
+"""Fields of tables that are points in time."""
+
+
+def _earlier(table: Table, start_s: float) -> Table:
+    known: Any = table
+    names = [name for name in _TIMES if hasattr(table, name)]
+    earlier: Table = replace(known, **{name: getattr(known, name) - start_s for name in names})
+    return earlier

@@ -1,7 +1,7 @@
 """The line between a run and an observer, e.g. its page: rows of the log out, commands back.
 
-The run never waits: what does not fit the socket stays here, of each kind of measurement only the
-newest row, and it is sent when the observer asks for it. An observer that is slow, stopped or dead
+The run never waits: rows that do not fit the socket stay here, only the newest of each kind of
+measurement, and are sent when the observer asks for them. An observer that is slow, stopped or dead
 is not sent anything. A request is a line of text: an empty one asks for the newest rows, any other
 is a command of an operator at the page, such as ``frequency_hz=0.4``, or of a ROS graph.
 """
@@ -36,9 +36,9 @@ SILENT_S: Final = 3.0
 """An observer that has not asked for rows for this time does not respond (ours): it asks 20 times a
 second, and a page on a busy machine may be late by a second."""
 _START_S: Final = 60.0
-"""The same before it has shown a cycle (ours): building a scene takes seconds."""
+"""The same before it has shown a cycle (ours): building a scene needs seconds."""
 _STEP_MAX_S: Final = 0.1
-"""Of the time between two checks this much counts (ours)."""
+"""Largest part of the time between two checks that counts (ours)."""
 _RECEIVE_BYTES: Final = 1 << 18
 _HEAD: Final = 4
 _END: Final = b"\n"

@@ -1,7 +1,7 @@
 """Rows of a topic as JSON."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,24 +30,23 @@ class RowPrinter:
         self._required = {name for name, each in columns.items() if each.default is REQUIRED}
         self._defaults = {name: each.default for name, each in columns.items()}
         self._arrays = [
-            (name, (-1, 3) if each.shape == (LINK, 3) else (-1,))
-            for name, each in columns.items()
+            (at, (-1, 3) if each.shape == (LINK, 3) else (-1,))
+            for at, each in enumerate(columns.values())
             if _is_printed_together(each)
         ]
-        """Arrays of a fast topic that one call prints, and their shapes."""
+        """Places of the arrays of a fast topic that one call prints, and their shapes."""
         row_of_goals = _exact_row()
         self._numbers = [
-            name for name, each in columns.items() if each.kind in DIGITS and not each.shape
+            at for at, each in enumerate(columns.values()) if each.kind in DIGITS and not each.shape
         ]
-        """Single numbers, which the template prints if all are finite."""
+        """Places of single numbers, which the template prints if they are finite."""
         self._printers = [
-            (at, None if _is_printed_together(each) else _printer(each, row_of_goals))
-            for at, (name, each) in enumerate(columns.items())
-            if name not in self._numbers
+            (at, _printer(each, row_of_goals))
+            for at, each in enumerate(columns.values())
+            if at not in self._numbers and not _is_printed_together(each)
         ]
-        formats = {name: DIGITS[columns[name].kind] for name in self._numbers}
-        self._template = _row_template({name: formats.get(name, "s") for name in columns})
-        self._unknown_template = _row_template(dict.fromkeys(columns, "s"))
+        self._templates: dict[tuple[int, ...], str] = {}
+        """Templates of rows, by the places of the unknown numbers."""
 
     def row(self, values: Mapping[str, Any]) -> str:
         """Return the JSON of a row; a field that has a default may be missing.
@@ -78,28 +77,47 @@ class RowPrinter:
             )
 
     def _fast_row(self, values: Mapping[str, Any]) -> str:
-        arrays = [
-            np.asarray(values[name], dtype=float).reshape(shape)
-            for name, shape in self._arrays
-            if values[name] is not None
-        ]
-        printed = iter(rounded_texts(arrays))
         cells = [values[name] for name in self._defaults]
+        places, arrays = [], []
+        for at, shape in self._arrays:
+            value = cells[at]
+            if value is None:
+                cells[at] = "null"
+                continue
+            array = np.asarray(value, dtype=float)
+            arrays.append(array if array.ndim == len(shape) else array.reshape(shape))
+            places.append(at)
+        for at, printed in zip(places, rounded_texts(arrays), strict=True):
+            cells[at] = printed
         for at, print_one in self._printers:
-            if print_one is not None:
-                cells[at] = print_one(cells[at])
-            else:
-                cells[at] = "null" if cells[at] is None else next(printed)
-        if math.isfinite(sum([values[name] for name in self._numbers])):
-            return self._template % tuple(cells)
-        for at, (name, column) in enumerate(self._topic.columns.items()):
-            if name in self._numbers:
-                cells[at] = text(cells[at]) if column.kind == "exact" else rounded_text(cells[at])
-        return self._unknown_template % tuple(cells)
+            cells[at] = print_one(cells[at])
+        unknown: tuple[int, ...] = ()
+        if not math.isfinite(sum([cells[at] for at in self._numbers])):
+            unknown = tuple([at for at in self._numbers if not math.isfinite(cells[at])])
+            for at in unknown:
+                cells[at] = self._unknown_text(at, cells[at])
+        template = self._templates.get(unknown)
+        if template is None:
+            template = self._templates[unknown] = self._row_template(unknown)
+        return template % tuple(cells)
 
+    def _unknown_text(self, at: int, value: float) -> str:
+        """Return the JSON of a number that is not finite.
 
-def _row_template(formats: Mapping[str, str]) -> str:
-    return "{" + ",".join(f'"{name}":%{each}' for name, each in formats.items()) + "}"
+        Raises:
+            ValueError: it is an exact number.
+
+        """
+        column = list(self._topic.columns.values())[at]
+        return text(value) if column.kind == "exact" else rounded_text(value)
+
+    def _row_template(self, unknown: Sequence[int]) -> str:
+        known = set(self._numbers) - set(unknown)
+        fields = [
+            f'"{name}":%{DIGITS[column.kind] if at in known else "s"}'
+            for at, (name, column) in enumerate(self._topic.columns.items())
+        ]
+        return "{" + ",".join(fields) + "}"
 
 
 def json_value(column: Column, value: Any) -> Any:

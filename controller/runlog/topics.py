@@ -136,7 +136,7 @@ class CycleTable(Table):
         ),
     ]
     electrical_j: Annotated[
-        Floats, _optional("taken in by all motors so far; what they give back is lost")
+        Floats, _optional("consumed by all motors so far; energy that they return is lost")
     ]
     """``MotorEnergy`` since the start; NaN on servos, which do not measure it."""
     mechanical_j: Annotated[Floats, _optional("net work at all shafts so far")]
@@ -192,7 +192,7 @@ class ImuTable(Table):
             "(9,) rows of the rotation matrix of the link of the IMU; any heading", shape=(3, 3)
         ),
     ]
-    """Of the IMU's link; the heading has an unknown offset and drifts."""
+    """Rotation of the IMU's link; the heading has an unknown offset and drifts."""
     rate_rad_s: Annotated[
         Floats, Column("(3,) about the link's forward, left and up axes", shape=(3,))
     ]
@@ -234,7 +234,7 @@ class PoseTable(Table):
     target: Annotated[Ints, Column("index of the next waypoint", "integer", default=0)]
 
 
-@topic("/pose_source", is_optional=True, watched="")
+@topic("/pose_source", is_optional=True, watched="newest")
 class PoseSourceTable(Table):
     """State of an external pose source; times are those of the cycles."""
 
@@ -280,6 +280,9 @@ class WalkTable(Table):
     ramp_rad: Annotated[Floats, Column("bend added to cancel it")]
     candidates: Annotated[Ints, Column("states within the heading tolerance", "integer")]
     eta_q: Annotated[Floats, _optional("quasi-static gain of the state")]
+    carrier_rad: Annotated[
+        Floats, _optional("amplitude of the wide wave on which the state rides; 0: none")
+    ]
 
 
 @topic("/friction")

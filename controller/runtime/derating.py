@@ -2,7 +2,7 @@
 
 The rate is 1 while everything is well and falls to ``LEAST`` where a limit would be reached, so a
 motion goes on slower, cooler and with less current instead of stopping. It falls quickly and comes
-back slowly. Safety below stays as it is: what gets worse all the same still trips.
+back slowly. The safety layer is unchanged: a state that still gets worse trips.
 """
 
 import math
@@ -30,10 +30,10 @@ VOLTAGE_BAND, VOLTAGE_EDGE = 1 / 15, 1 / 60
 FALL_S, RISE_S = 0.4, 6.0
 """Time constants of the rate."""
 LAG_START, LAG_END = 0.6, 0.95
-"""Shares of the limit of the following error; an honest lag takes half of it at most. A joint whose
-current is limited is left out: the ground may hold it off its goal, at any rate."""
+"""Shares of the limit of the following error; a lag without a fault uses half of it at most. A
+joint whose current is limited is left out: the ground may hold it off its goal, at any rate."""
 AVERAGE_S = 0.2
-"""Over which current and lag are averaged: a peak is no load."""
+"""Averaging time of current and lag: a peak is not a load."""
 WINDING_BAND_C, WINDING_EDGE_C = 25.0, 5.0
 """From so far below the limit of a winding on, down to so far below it."""
 REPORT_BELOW, REPORT_ABOVE = 0.95, 0.99
@@ -41,12 +41,12 @@ REPORT_BELOW, REPORT_ABOVE = 0.95, 0.99
 
 @dataclass(frozen=True, slots=True)
 class Allowed:
-    """What a state allows."""
+    """Rate that a state allows."""
 
     rate: float
     """1 down to ``LEAST``."""
     reason: str
-    """What limits it, one line; empty at 1."""
+    """Limiting quantity, one line; empty at 1."""
 
 
 UNLIMITED = Allowed(1.0, "")
@@ -59,7 +59,7 @@ def allowed(
     safety: SafetyConfig,
     robot: RobotConfig,
 ) -> Allowed:
-    """Return what a state allows; what was not read yet (NaN) limits nothing.
+    """Return the rate that a state allows; values that were not read yet (NaN) limit nothing.
 
     Args:
         state: of the servos.
@@ -135,7 +135,7 @@ def _is_unlimited(
 ) -> bool:
     """Average ``mean_a`` and ``lag_rad`` on; return whether ``allowed`` finds nothing to limit.
 
-    What was not read yet (NaN) limits nothing; a mean current that is NaN is not well.
+    Values that were not read yet (NaN) limit nothing; a mean current that is NaN is not well.
     """
     well = True
     for joint in range(len(mean_a)):
@@ -183,9 +183,9 @@ class Derating:
         self._is_reported = False
 
     def update(self, state: JointState, goal_rad: Floats, dt_s: float) -> float:
-        """Take in a state and the goals before it; return the rate, LEAST to 1.
+        """Process a state and the goals before it; return the rate, LEAST to 1.
 
-        ``on_event`` takes large changes.
+        ``on_event`` receives large changes.
         """
         safety = self._safety
         if len(self._current_a) != len(state.current_a):
@@ -227,12 +227,12 @@ class Derating:
     def _allowed_by_load(self, load: LoadEstimate, state: JointState) -> Allowed:
         """Return the rate that the supply's fuse and the windings allow."""
         fuse_a, limit_c = self._fuse_a, self._safety.winding_limit_c
-        windings_c = load.winding_c(state)
         if (
             load.current_a <= CURRENT_START * fuse_a
-            and not (windings_c > limit_c - WINDING_BAND_C).any()
+            and not load.hottest_c > limit_c - WINDING_BAND_C
         ):
             return UNLIMITED
+        windings_c = load.winding_c(state)
         rates = _falling(windings_c, limit_c - WINDING_BAND_C, limit_c - WINDING_EDGE_C)
         joint = int(np.argmin(rates))
         by_fuse = 1.0

@@ -86,12 +86,13 @@ class Progress(NamedTuple):
     """State of a run after the command of a cycle has been sent."""
 
     time_s: float
+    """Since torque on."""
     speed_m_s: float
     """Forward speed of the body, smoothed."""
     reached: int
     """Number of waypoints reached."""
     along_m: float
-    """Arc length on the path; NaN where there is no path."""
+    """Arc length on the path; NaN without a path."""
     done: bool
     """Whether the motion has come to its end and rests."""
     waypoints: int = 0
@@ -100,7 +101,7 @@ class Progress(NamedTuple):
 
 OnProgress = Callable[[Progress], None]
 OnEvent = Callable[[str, str], None]
-"""Takes the kind of an event, and a line of text."""
+"""Receives the kind of an event, and a line of text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +111,7 @@ class Outcome:
     reached: int
     missed: int
     duration_s: float
+    """Time from torque on to torque off, as ``RunRecord.duration_s``."""
     alarms: int
     tripped: str | None
     waypoints: int
@@ -134,7 +136,7 @@ class CycleObserver(Protocol):
         ...
 
     def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
-        """Take a cycle: when it was due, the goals (J,) that safety let through, what was read."""
+        """Process a cycle: its due time, the goals (J,) that safety passed, and the readings."""
         ...
 
 
@@ -195,7 +197,7 @@ class Drive:
         self._speed_m_s = 0.0
         self._last: BodyView | None = None
         self._displacement_m = 0.0
-        self._end_s = 0.0
+        self._start_s = self._end_s = 0.0
 
     @property
     def _waypoints(self) -> int:
@@ -220,7 +222,7 @@ class Drive:
                 self._robot.joint_speed_limit_rad_s,
                 self._robot.joint_acceleration_limit_rad_s2,
             )
-            start_s = clock.now_s()
+            start_s = self._start_s = clock.now_s()
             log.event(start_s, "start", f"torque on; ramp of {ramp.duration_s:.1f} s to the shape")
             walk_s = start_s + ramp.duration_s + _SETTLE_S
             self._end_s = walk_s + self._run.time_limit_s
@@ -255,12 +257,12 @@ class Drive:
             if self._link.tripped:
                 self._hold_out(period_s)
                 tripped = self._link.tripped
-        log.event(clock.now_s(), "stop", f"torque off; {self._end_text()}")
-        duration_s = clock.now_s() - start_s
+        stop_s = clock.now_s()
+        log.event(stop_s, "stop", f"torque off; {self._end_text()}")
         return Outcome(
             path.reached,
             path.missed,
-            duration_s,
+            stop_s - start_s,
             self._alarms,
             tripped,
             self._waypoints,
@@ -387,6 +389,7 @@ class Drive:
                 heading_error_rad=d.heading_error_rad,
                 ramp_rad=d.ramp_rad,
                 candidates=d.candidates,
+                carrier_rad=d.carrier_rad,
             )
         if self._slip_monitor.update(path.pulse_m_s * period_s, self._displacement_m):
             self._alarms += 1
@@ -448,7 +451,7 @@ class Drive:
         self._last = view
         self._on_progress(
             Progress(
-                tick.deadline_s,
+                tick.deadline_s - self._start_s,
                 self._speed_m_s,
                 path.reached,
                 along_m,

@@ -39,14 +39,14 @@ class Slide:
     slope_rad: float
     """Mean slope under the body, where it was held least."""
     held_rad: float
-    """What it could have held there, in that shape."""
+    """Torque that it could have held there, in that shape."""
     lasted_s: float
     """All the time that nothing held it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """What the plan should do, if the friction is as configured."""
+    """Predicted course of the plan, if the friction is as configured."""
 
     time_s: Floats
     """(T,)"""

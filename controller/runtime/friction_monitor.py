@@ -1,8 +1,8 @@
-"""Friction monitor: what the friction under the body is, found while it moves.
+"""Friction monitor: estimates the friction under the body while it moves.
 
-Every second and a half, less often while the file's friction holds, the motion that was measured
-is replayed by a model under three frictions, one a cycle; which of them brings the body to where it
-came tells the ground's. The model is a twin, or the balance of forces on a level floor.
+Every second and a half, less often while the file's friction holds, a model replays the measured
+motion under three frictions, one a cycle. The one that brings the body to its measured place gives
+the ground's. The model is a twin, or the balance of forces on a level floor.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,15 +20,15 @@ from snakewalk.controller.mechanics.rigid_motion import planar_slide
 from snakewalk.controller.walk.twin_rollout import Twin, seen_state
 
 SPAN_S = 1.5
-"""Of motion that is replayed (ours): in less the speed that it begins with counts too much, in more
-bodies go apart."""
+"""Duration of motion that is replayed (ours): in a shorter span the initial speed counts too much,
+in a longer one bodies diverge."""
 _SETTLED, _RESTS = 4, 3
-"""After so many spans in a row in which the file's friction held, so many are passed over behind
-each that is replayed (ours): a quarter of the cost, and up to 4.5 s until a change is seen."""
+"""After this number of spans in a row in which the file's friction held, this number is skipped
+behind each replayed one (ours): a quarter of the cost, and up to 4.5 s until a change is seen."""
 _STRIDE = 5
 """Cycles in a step on paper."""
 _NOTABLE = 0.25
-"""Change of a friction, over what was last told, from which on it is told."""
+"""Change of a friction since the last report that is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Span:
     views: tuple[BodyView, ...]
     """(C + 2) at the cycles: the first is the one before it begins."""
     goals_rad: tuple[Floats, ...]
-    """C of (J,): what was sent in each."""
+    """C of (J,): goals sent in each cycle."""
     cycle_s: float
 
     @property
@@ -64,7 +64,7 @@ class SlideModel(Protocol):
         ...
 
     def slid(self, span: Span, friction: FrictionConfig) -> Floats:
-        """(3,) as ``Span.slid``, on ground with this friction; NaN where it cannot tell."""
+        """(3,) as ``Span.slid``, on ground with this friction; NaN without a prediction."""
         ...
 
 
@@ -73,7 +73,7 @@ class OnTwin:
 
     sigma: Final = (0.012, 0.012, 0.035)
     """A little more than the median error with the true friction on rough slopes, 3 mm and 0.6
-    degrees in a second, calls for (ours): now and then a link that gets stuck is far off."""
+    degrees in a second (ours): sometimes a link that gets stuck is far off."""
 
     def __init__(self, robot: RobotConfig, make_twin: Callable[[], Twin]) -> None:
         self._robot, self._make_twin = robot, make_twin
@@ -97,8 +97,8 @@ class OnPaper:
     """A ``SlideModel`` of a level floor: friction under the measured shapes is in balance."""
 
     sigma: Final = (0.02, 0.02, 0.05)
-    """With room for what a camera is off (ours). On hills it is no model: few links bear the body,
-    and it would be taken for friction."""
+    """Includes the error of a camera (ours). On hills it is not a valid model: few links bear the
+    body, and the error would look like friction."""
 
     def __init__(self) -> None:
         self._span: Span | None = None
@@ -159,7 +159,7 @@ class FrictionMonitor:
         self._used = self._reported = file
 
     def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
-        """Take the measured body, and the goals (J,) that were sent in the cycle before.
+        """Process the measured body, and the goals (J,) that were sent in the cycle before.
 
         Returns:
             What is found now, when a span has been judged; else None.
@@ -207,7 +207,7 @@ class FrictionMonitor:
         )
 
     def _judge(self, span: Span) -> Iterator[FoundFriction | None]:
-        """Replay a span, a hypothesis a cycle; what is found comes last."""
+        """Replay a span, a hypothesis a cycle; the result comes last."""
         foretold = []
         for friction in self._filter.hypotheses():
             foretold.append(self._model.slid(span, friction))

@@ -1,4 +1,4 @@
-"""Roll monitor: tells when the body lies on its side or its back, and when it has come round."""
+"""Roll monitor: reports when the body lies on its side or its back, and when it has come round."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ OVER_RAD = np.deg2rad(75.0)
 UPRIGHT_RAD = np.deg2rad(50.0)
 """Mean roll below which it lies well again (ours)."""
 _LASTS_S = 1.5
-"""How long it must lie so before this is told (ours): a body that rolls uphill passes by."""
+"""Time that it must lie so before this is reported (ours): a body that rolls uphill passes by."""
 
 
 class RollMonitor:
@@ -21,7 +21,7 @@ class RollMonitor:
         self._since_s: float | None = None
 
     def update(self, view: BodyView, time_s: float) -> str | None:
-        """Take the body's pose at a time; returns what is new, or None."""
+        """Process the body's pose at a time; returns a change, or None."""
         roll_rad = abs(body_roll_rad(view))
         changed = roll_rad > OVER_RAD if not self._over else roll_rad < UPRIGHT_RAD
         if not changed:

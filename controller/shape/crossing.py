@@ -10,7 +10,7 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
     """Whether each body (S, N) of ``length_m`` and ``radius_m`` comes within its own thickness.
 
     Two segments count when they are nearer than a diameter in the plane though at least half the
-    circumference of the body apart along it: nearer ones are joined by the bend itself, and a curve
+    circumference of the body apart along it. Nearer ones are joined by the bend itself, and a curve
     that bends no sharper than ``radius_m`` keeps such parts a diameter apart (Schur). Crossings of
     a thin body count too. Returns (S,).
     """

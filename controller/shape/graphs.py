@@ -118,7 +118,7 @@ def threshold_graph(states: Complexes, threshold: float | None) -> Graph:
 
     """
     distance = squareform(pdist(np.concatenate([states.real, states.imag], axis=1)))
-    # + 1: the spanning tree takes a distance of 0 for no edge
+    # + 1: the spanning tree treats a distance of 0 as a missing edge
     tree = minimum_spanning_tree(distance + 1.0).tocoo()
     needed = distance[tree.row, tree.col].max(initial=0.0)
     limit = needed if threshold is None else threshold

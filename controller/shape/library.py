@@ -30,7 +30,7 @@ class StateLibrary:
     shapes_rad: Floats
     """(S, N) tangent angles, head first, zero mean."""
     recorded: int
-    """The first so many come from the recording, the rest are random."""
+    """Number of states from the recording, which come first; the rest are random."""
     rejected: dict[str, int]
     """Random and recorded states refused, by the first reason."""
     curvature: float
@@ -58,8 +58,8 @@ def build_library(
 ) -> StateLibrary:
     """Turn tangent angles (T, N) into states, add ``random_count`` random ones, filter all.
 
-    Bends are scaled by ``curvature``; None takes the least of 1, 1.2, ... 2 at which a fifth of
-    random states passes the filters, or where most do.
+    Bends are scaled by ``curvature``; None selects the least of 1, 1.2, ... 2 at which a fifth of
+    random states passes the filters, or the one at which most do.
 
     Where kinds of waves are wanted ([PT] 2.6.6), the library holds random states of these only, in
     the wanted parts.
@@ -91,9 +91,9 @@ def build_library(
     if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
         raise InputError(
-            f"states: only {len(fresh)} of {random_count} random states can be used by this robot "
-            f"(refused for {reasons}); raise behaviour.curvature if it is traction, lower it if it "
-            "is anything else, or take another track"
+            f"states: this robot can use only {len(fresh)} of {random_count} random states "
+            f"(refused for {reasons}); raise behaviour.curvature for traction, lower it for any "
+            "other reason, or use another track"
         )
     kept = float(energy_kept(track_rad, coefficients).mean())
     shapes_rad = np.concatenate([recorded, fresh])

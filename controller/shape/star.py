@@ -1,9 +1,9 @@
 """W on a star: the next state where every other state is a leaf ([PT] 2.6.2, Eq. 4-7).
 
 Every leaf has degree 1, so W only orders by: unvisited; then F = 0 with fewest M; then the smallest
-M 2^F. Here F counts the times that a state was left for an already *visited* one. The
-star is rebuilt at each step, so that M may exceed deg + F and the printed value of W may fall below
-that of a state with F > 0; the classes are what the paper says of W, and they are kept.
+M 2^F. Here F counts the times that a state was left for an already *visited* one. The star is
+rebuilt at each step, so that M may exceed deg + F and the printed value of W may fall below that of
+a state with F > 0. The classes are those that the paper describes, and they are kept.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from snakewalk.config.arrays import Floats, Ints
 
 
 class StarVisits:
-    """What a walk on the star remembers of its V states: M, F, and the order of the last ones."""
+    """Memory of a walk on the star of its V states: M, F, and the order of the last ones."""
 
     def __init__(self, count: int) -> None:
         self._visits = np.zeros(count, dtype=np.int64)
@@ -57,7 +57,7 @@ class StarVisits:
 
 
 def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
-    """Candidates, best first; the first takes O(V), only then are the others sorted.
+    """Candidates, best first; the first costs O(V), only then are the others sorted.
 
     Args:
         M: (V,) times that each was selected.

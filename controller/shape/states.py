@@ -1,8 +1,8 @@
 """Shape states: a body's tangent angles as a few Fourier coefficients ([PT] 2.5).
 
 Corrections to the printed text: angles are unwrapped first, or rotation invariance fails across
-+-pi; coefficient 0 belongs to the padded signal and is not the body's mean heading; and 99 % of the
-energy in seven coefficients holds up to four or five waves on the body, not beyond.
++-pi. Coefficient 0 belongs to the padded signal and is not the body's mean heading. The 99 % of the
+energy in seven coefficients hold up to four or five waves on the body, not beyond.
 """
 
 from dataclasses import dataclass
@@ -117,7 +117,7 @@ def limit_to_waves(states: Complexes, first: int, last: int, share: float) -> Co
     inside[first - 1 : last] = True
     energy = np.abs(states) ** 2
     kept, rest = energy[..., inside].sum(axis=-1), energy[..., ~inside].sum(axis=-1)
-    most = kept * (1.0 - share) / share  # energy outside that the share leaves room for
+    most = kept * (1.0 - share) / share  # energy outside that the share allows
     down = np.sqrt(np.minimum(1.0, most / np.where(rest > 0.0, rest, 1.0)))
     up = np.sqrt((kept + rest) / np.where(kept > 0.0, kept + down**2 * rest, 1.0))
     return np.asarray(states * up[..., None] * np.where(inside, 1.0, down[..., None]))

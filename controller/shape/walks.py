@@ -1,16 +1,16 @@
 """Walks that cover a graph: the snake walk, its rivals ([PT] 2.6.2, [KP] 4.2.1), and one of ours.
 
 ``W(q) = deg / (1 - sign M + deg (sign M + sign F) + M 2^F)``, the neighbour with the largest W is
-next. Correction: F(q) counts the times that q was left for an already *visited* state; with the
-printed "unvisited" Eq. 3 and the properties of W fail (``snake-printed`` keeps it for comparison).
+next. Correction: F(q) counts the times that q was left for an already *visited* state. With the
+printed "unvisited", Eq. 3 and the properties of W fail (``snake-printed`` keeps it for comparison).
 2^F overflows floats, so W is compared by integers. Ties go to the least recently visited neighbour,
 then to the first in the list. Algorithm 2's ``until n < N`` is read as "until the target is met":
 here, until all states are seen.
 
 ``frontier`` (ours) knows what the snake walk knows of its neighbours, and remembers it. Like a
-knight's tour by Warnsdorff's rule it takes the unvisited neighbour that has fewest unvisited
-neighbours itself; where there is none, it goes through the states visited so far to an unvisited
-one, by the way of fewest short returns, then of fewest steps.
+knight's tour by Warnsdorff's rule it goes to the unvisited neighbour with the fewest unvisited
+neighbours. Without one, it goes through visited states to an unvisited one, by the path of fewest
+short returns, then of fewest steps.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from snakewalk.controller.shape.graphs import Graph
 
 RULES = ("snake", "snake-printed", "frontier", "stack", "random", "degree")
 SHORT_RETURN = 0.05
-"""Of |V|: [PT] 2.6.2 wants at least so many steps between two visits of a state."""
+"""Share of |V|: [PT] 2.6.2 demands at least this number of steps between two visits of a state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def walk(
         max_steps: default V^2, what a random walk may need.
 
     Raises:
-        InputError: unknown rule, or the start is no state.
+        InputError: unknown rule, or the start is not a state.
 
     """
     check_rule(rule)
@@ -95,7 +95,7 @@ def walk(
 
 
 def check_rule(rule: str) -> None:
-    """Raise InputError where ``rule`` is none of ``RULES``."""
+    """Raise InputError if ``rule`` is not one of ``RULES``."""
     if rule not in RULES:
         raise InputError(f"rule {rule!r}: expected one of {', '.join(RULES)}")
 

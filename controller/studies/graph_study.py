@@ -52,7 +52,7 @@ class StudyResult:
     grid: Floats
     """(G,) steps over |V|."""
     visited: Floats
-    """(G,) share of states seen after so many steps, mean over the repeats."""
+    """(G,) share of states visited after each number of steps, mean over the repeats."""
 
     def to_dict(self) -> dict[str, object]:
         """Plain numbers, for JSON."""
@@ -151,7 +151,7 @@ _FORMS = (
 
 
 def graph_source(spec: str) -> Draw:
-    """What draws the graphs of a spec.
+    """Return a function that draws the graphs of a spec.
 
     - ``er:1000:9``: random (Erdos-Renyi), mean degree 9;
     - ``ws:1000:6:0.1``: small world (Watts-Strogatz), 3 neighbours on either side, a tenth rewired;
@@ -160,7 +160,7 @@ def graph_source(spec: str) -> Draw:
     - ``mine.graphml``: a graph of your own (GraphML, GML or an edge list), taken as undirected.
 
     Sparse random graphs are hardly ever connected (at mean degree 3 one state in twenty has no edge
-    at all), so the largest part is what walks are run on: V is then less than asked.
+    at all). So walks run on the largest part, and V is smaller than requested.
 
     Raises:
         InputError: none of these; a recording that cannot be read, or falls apart.

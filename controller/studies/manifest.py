@@ -3,13 +3,13 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "compare", "Put runs side by side: their numbers, and what differs in run, robot and world.", "snakewalk.controller.studies.commands.compare:compare", "The job"),
+    ("command", "compare", "Compare runs: their numbers, and the differences of run, robot and world.", "snakewalk.controller.studies.commands.compare:compare", "The job"),
     ("command", "identify", "Find a servo's constants from its pendulum, or friction and mass from logs of runs.", "snakewalk.controller.studies.commands.identify:identify", "The bus"),
-    ("command", "replay", "Send a log's commands to simulated servos again; exit code 1 where the answers differ.", "snakewalk.controller.studies.commands.replay:replay", "The job"),
-    ("command", "shadow", "Send a log's goals to a simulated robot, and name the cause of what differs; 1 if one is.", "snakewalk.controller.studies.commands.shadow:shadow", "The job"),
+    ("command", "replay", "Send a log's commands to simulated servos again; exit code 1 if the replies differ.", "snakewalk.controller.studies.commands.replay:replay", "The job"),
+    ("command", "shadow", "Send a log's goals to a simulated robot; exit code 1 if it names a cause of differences.", "snakewalk.controller.studies.commands.shadow:shadow", "The job"),
     ("command", "sweep", "Measure gaits over their parameters: speed, cost of transport, torque, heat, slip.", "snakewalk.controller.studies.commands.sweep:sweep", "Motion"),
-    ("command", "trials", "Simulate runs or gaits over seeds; tabulate what was reached, and why not.", "snakewalk.controller.studies.commands.trials:trials", "The job"),
+    ("command", "trials", "Simulate runs or gaits over seeds; list how many arrived, and why others failed.", "snakewalk.controller.studies.commands.trials:trials", "The job"),
     ("command", "tune", "Search a gait's parameters for speed or efficiency, and compare with the defaults.", "snakewalk.controller.studies.commands.tune:tune", "Motion"),
-    ("command", "walk", "Walk graphs of states until all are seen: how many steps, and how soon states come again.", "snakewalk.controller.studies.commands.walk:walk", "Motion"),
+    ("command", "walk", "Walk graphs of states until all are visited: number of steps, and how soon states repeat.", "snakewalk.controller.studies.commands.walk:walk", "Motion"),
     ("observer", "shadow", "The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.", "snakewalk.controller.studies.shadow.run_shadow:RunShadow", ""),
 )

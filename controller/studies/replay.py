@@ -1,7 +1,7 @@
 """A log run again: the commands that were sent, at their times, to simulated servos.
 
-Nothing decides anew: no pilot, no safety. What differs from the log is the servos, the body and the
-ground; for a log of the simulator nothing may.
+Nothing decides again: no pilot, no safety. Differences from the log come from the servos, the body
+and the ground; a log of the simulator must not differ.
 """
 
 from collections.abc import Callable
@@ -64,7 +64,6 @@ def replay(
             initial_pose=header.initial_pose,
         )
         chain.enable()
-        chain.checks_in_read = False  # the loop of a run makes the check after the goals, too
         wire_s, start_s = backend.wire_busy_s(), clock.now_s()
         for k in range(total):
             due_s = start_s + numbers[k] * period_s

@@ -1,4 +1,4 @@
-"""Runs side by side: their numbers, what differs in their configurations, and their curves."""
+"""Comparison of runs: their numbers, differences of their configurations, and their curves."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,26 +17,28 @@ from snakewalk.controller.runlog.record import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class ComparedRun:
-    """What a comparison keeps of a log, which may be large."""
+    """Extract of a log, which may be large."""
 
     name: str
-    """That tells it from the others."""
+    """Name that separates it from the others."""
     summary: RunSummary
     settings: Mapping[str, Any]
     """Values of run, robot and world by dotted key, with the bus and the software."""
+    pose: str
+    """Evidence of its poses: ``measured by simulator``."""
     waypoints_m: Floats
     """(w, 2)"""
     waypoint_radius_m: float
     centre_m: Floats
     """(P, 2) track of the centre of mass."""
     pose_s: Floats
-    """(P,) times of what the pose tells:"""
+    """(P,) times of the values from poses:"""
     path_error_m: Floats
     """(P,)"""
     speed_m_s: Floats
     """(P,)"""
     cycle_s: Floats
-    """(T,) times of what the control cycles tell:"""
+    """(T,) times of the values from control cycles:"""
     current_a: Floats
     """(T,) of the joint with the highest, without its sign."""
     tracking_rms_rad: Floats
@@ -61,6 +63,7 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
         name=name,
         summary=summary(record),
         settings=settings,
+        pose=header.pose_evidence.text,
         waypoints_m=header.plan.waypoints_m,
         waypoint_radius_m=header.plan.waypoint_radius_m,
         centre_m=pose.centre_m[:, :2],
@@ -74,7 +77,7 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
 
 
 def log_names(logs: Sequence[Path]) -> list[str]:
-    """Names that tell logs apart: the folder of ``log.mcap``, else the file, else the path."""
+    """Distinct names of logs: the folder of ``log.mcap``, else the file, else the path."""
     short = [log.absolute().parent.name if log.stem == "log" else log.stem for log in logs]
     twice = {name for name, count in Counter(short).items() if count > 1}
     return [str(log) if name in twice else name for log, name in zip(logs, short, strict=True)]

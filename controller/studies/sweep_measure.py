@@ -42,6 +42,9 @@ class Measurement:
     peak_temperature_c: float | None = None
     tracking_max_rad: float | None = None
     least_rate: float | None = None
+    pose_evidence: str | None = None
+    """How the poses are known that speeds and costs follow from."""
+    pose_source: str | None = None
 
 
 FRICTION_SPREAD = 0.15
@@ -69,9 +72,11 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
             finished = execute(prepared, Path(folder), stoppable=False)
     except InputError as error:
         return Measurement(f"refused: {error.faults[0]}")
-    record = finished.record
-    moved, cost = gait_displacement(record), effort(record)
-    numbers = finished.summary
+    numbers, record = finished.summary, finished.record
+    if not numbers.is_measured:
+        return Measurement(f"refused: {numbers.pose_evidence} pose; a sweep needs a measured one")
+    moved = finished.travel.gait or gait_displacement(record)
+    cost = effort(record, finished.travel)
     return Measurement(
         ended=finished.outcome.tripped or "ran to its end",
         cycles=moved.cycles,
@@ -90,6 +95,8 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
         peak_temperature_c=_digits(numbers.peak_temperature_c),
         tracking_max_rad=_digits(numbers.tracking_max_rad),
         least_rate=_digits(finished.outcome.least_rate),
+        pose_evidence=numbers.pose_evidence,
+        pose_source=numbers.pose_source,
     )
 
 
@@ -114,5 +121,5 @@ def varied(prepared: P, rng: np.random.Generator) -> P:
 
 
 def _digits(value: float | None) -> float | None:
-    """Five digits, and None for what is not known: a table is read by people too."""
+    """Five digits, and None for unknown values: a table is also read by people."""
     return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

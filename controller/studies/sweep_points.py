@@ -40,7 +40,7 @@ class Point:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """What tells it from other points of a table, as text."""
+        """Key that separates it from other points of a table, as text."""
         place = (self.gait, self.robot, self.world)
         replaced = " ".join(f"{key}={value}" for key, value in self.keys)
         return (*place, replaced, str(self.number), str(self.seed), f"{self.seconds:g}")
@@ -55,7 +55,7 @@ class Space:
 
     @classmethod
     def of(cls, gait: type[Gait]) -> "Space":
-        """All numbers of the gait; mirroring is no new gait."""
+        """All numbers of the gait; mirroring does not make a new gait."""
         spans = {k: span for k, span in ranges(gait.model).items() if span.kind is not bool}
         return cls(gait, spans)
 
@@ -130,7 +130,7 @@ ROBOTS = ("yaw16", "alternating16")
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """What will be run."""
+    """Points to run."""
 
     points: list[Point]
     left_out: list[str]

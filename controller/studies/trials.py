@@ -15,7 +15,6 @@ from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest
 from snakewalk.controller.console.pool import each
-from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.run.execute import execute
@@ -39,7 +38,7 @@ _START_DRAWS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What distinguishes one row of the table; None leaves the run's own."""
+    """Parameters of one row of the table; None leaves the run's own."""
 
     run: str
     motion: str
@@ -75,7 +74,7 @@ class Trial:
     """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
     duration_s: float = math.nan
     slope_median_deg: float = math.nan
-    """Of the surface in the strip along the path that the body stands on."""
+    """Slope of the surface in the strip along the path that the body lies on."""
     path_error_m: float = math.nan
     """Mean."""
     path_error_max_m: float = math.nan
@@ -86,7 +85,7 @@ class Trial:
     lead_max_rad: float = math.nan
     """Largest difference between an asked and a measured joint angle."""
     speed_m_s: float = math.nan
-    """Of a gait over the ground, net, at full rate."""
+    """Speed of a gait over the ground, net, at full rate."""
     current_max_a: float = math.nan
     roll_max_deg: float = math.nan
     in_air: float = math.nan
@@ -95,10 +94,13 @@ class Trial:
     """Waypoints that the body came to, where its pose was estimated; NaN of a measured one."""
     head_error_m: float = math.nan
     """How far the estimated head is off, root of the mean square; NaN of a measured one."""
+    pose_evidence: str = ""
+    """How the poses that the walk used are known; ``measured``, ``dead-reckoned``, ..."""
+    pose_source: str = ""
     alarms: int = 0
     """For missing advance."""
     cause: str = ""
-    """Of a run that is not complete: that of ``metrics.failure``, or ``refused`` or ``error``."""
+    """Cause of an incomplete run: that of ``metrics.failure``, or ``refused`` or ``error``."""
     why: str = ""
     """The same in a sentence."""
 
@@ -231,7 +233,7 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
         reached=reached,
         missed=outcome.missed,
         duration_s=outcome.duration_s,
-        speed_m_s=gait_displacement(finished.record).speed_m_s if trial.case.is_gait else math.nan,
+        speed_m_s=_number(numbers.speed_m_s) if trial.case.is_gait else math.nan,
         path_error_m=_number(numbers.path_error_mean_m),
         path_error_max_m=_number(numbers.path_error_max_m),
         eta=_number(numbers.eta),
@@ -242,6 +244,8 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
         in_air=stood.in_air,
         truly_reached=math.nan if off is None else float(off.waypoints_reached),
         head_error_m=math.nan if off is None else off.head_rms_m,
+        pose_evidence=numbers.pose_evidence,
+        pose_source=numbers.pose_source,
         alarms=outcome.alarms,
         cause="" if ended is None else ended.cause,
         why="" if ended is None else ended.text,
@@ -331,6 +335,8 @@ class CaseSummary:
     """Of an estimated pose, mean over the runs."""
     world: str = ""
     """Where one was chosen."""
+    pose: str = ""
+    """Evidence of the poses: ``measured (simulator)``."""
     rolled: int = 0
     """Runs in which the head link was over 90 degrees on its side at some time."""
 
@@ -374,10 +380,16 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
                 truly_complete=_truly_complete(some),
                 head_error_m=_mean([t.head_error_m for t in some], 3),
                 world=case.world or "",
+                pose=_evidence(some),
                 rolled=sum(t.roll_max_deg > 90.0 for t in some),
             )
         )
     return rows
+
+
+def _evidence(some: Sequence[Trial]) -> str:
+    known = {f"{t.pose_evidence} ({t.pose_source})": None for t in some if t.pose_evidence}
+    return ", ".join(known)
 
 
 def _truly_complete(some: Sequence[Trial]) -> str:

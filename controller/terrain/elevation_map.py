@@ -228,13 +228,13 @@ def _shape(size_m: Floats, spacing_m: float, *, floor: bool = False) -> tuple[in
     if columns * rows > MOST_SAMPLES:
         enough = spacing_m * math.sqrt(columns * rows / MOST_SAMPLES)
         raise InputError(
-            f"map: {columns} by {rows} samples {spacing_m:g} m apart are over {MOST_SAMPLES}: take "
-            f"a spacing of {enough:.2g} m or more, or a smaller crop"
+            f"map: {columns} by {rows} samples {spacing_m:g} m apart are over {MOST_SAMPLES}; "
+            f"use a spacing of {enough:.2g} m or more, or a smaller crop"
         )
     if min(columns, rows) < 2:
         raise InputError(
-            f"map: {size_m[0]:.3g} m by {size_m[1]:.3g} m hold fewer than 2 by 2 samples "
-            f"{spacing_m:g} m apart: take a smaller spacing or a larger scale"
+            f"map: {size_m[0]:.3g} m by {size_m[1]:.3g} m contain fewer than 2 by 2 samples "
+            f"{spacing_m:g} m apart; use a smaller spacing or a larger scale"
         )
     return columns, rows
 

@@ -110,7 +110,7 @@ class _Knowledge:
     @cached_property
     def cautious(self) -> TerrainPlanner:
         """Takes nothing unknown for safe."""
-        return TerrainPlanner(self._ground, self._config)
+        return TerrainPlanner(self._ground, self._config, exact=False)
 
     @cached_property
     def open_relief(self) -> Relief:

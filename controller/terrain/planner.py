@@ -11,9 +11,12 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.bends import widen_in_steps
 from snakewalk.controller.terrain.dubins import PathTurns
+from snakewalk.controller.terrain.exact_route import exact_route
 from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.relief import Relief
+from snakewalk.controller.terrain.rounded import rounded
+from snakewalk.controller.terrain.route_advice import route_advice
 from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
@@ -29,7 +32,19 @@ class TerrainPlanner:
     where the head is, and may lie anywhere.
     """
 
-    def __init__(self, ground: HeightField | None, config: PlannerConfig) -> None:
+    def __init__(
+        self, ground: HeightField | None, config: PlannerConfig, *, exact: bool = True
+    ) -> None:
+        """Build fields and graph.
+
+        Args:
+            ground: None for a flat floor.
+            config: limits of safe ground.
+            exact: search all safe ground where the graph's nodes find no way or no smooth one;
+                else such points are refused, which needs less time.
+
+        """
+        self._exact = exact
         self.relief = None if ground is None else Relief(ground, config)
         self.graph = None if self.relief is None else SafeGraph(self.relief)
         self._least_per_m = 1.0 if self.graph is None else self.graph.length_weight
@@ -103,8 +118,33 @@ class TerrainPlanner:
         faults = [f for k in range(1, len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
-        corners = yield from self._polygon(points, graph)
-        return (yield from self._spline(corners, points, self.relief))
+        return (yield from self._through(points, graph, self.relief))
+
+    def _through(self, points: Floats, graph: SafeGraph, relief: Relief) -> Steps[SplinePath]:
+        """Path through safe points: by the graph's nodes, or else by all safe ground."""
+        fault = ""
+        try:
+            corners = yield from self._polygon(points, graph)
+            return (yield from self._spline(corners, points, relief))
+        except InputError as error:
+            if not self._exact:
+                raise
+            fault = str(error)
+        legs = []
+        for k in range(1, len(points)):
+            yield _EXACT_STEP
+            leg = exact_route(relief, graph, points[k - 1], points[k])
+            if leg is None:
+                raise InputError(self._blocked(k, points))
+            legs.append(leg)
+        for shorten in (True, False):
+            shown = [_shortened(leg, graph) if shorten else leg for leg in legs]
+            corners = np.vstack([shown[0], *(leg[1:] for leg in shown[1:])])
+            free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
+            path = rounded(corners, free, lambda at: relief.safe(*at.T))
+            if not len(self._unsafe(path, points[0], relief)):
+                return path
+        raise InputError(fault)
 
     def _again(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
         """Path from elsewhere: a new leg to the next waypoint, then the path that was planned.
@@ -212,8 +252,7 @@ class TerrainPlanner:
         x, y = (round(float(at), 2) + 0.0 for at in worst)  # no -0.00
         raise InputError(
             f"path: no smooth way over safe ground: ({x:.2f}, {y:.2f}) "
-            f"{_unsafe_because(relief, worst)}; move a waypoint, or allow more by "
-            "world.planner.slope_limit_rad or world.planner.variance_limit_m2"
+            f"{_unsafe_because(relief, worst)}; move a waypoint"
         )
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
@@ -227,11 +266,12 @@ class TerrainPlanner:
     def _blocked(self, k: int, points: Floats) -> str:
         assert self.relief is not None
         config = self.relief.config
+        advice = route_advice(self.relief, points[k - 1 : k + 1])
         return (
             f"{self._name(k, points[k])} cannot be reached from "
             f"{self._name(k - 1, points[k - 1])}: no way "
             f"stays under a slope of {np.degrees(config.slope_limit_rad):.1f} deg and an elevation "
-            f"variance of {config.variance_limit_m2:.2g} m2"
+            f"variance of {config.variance_limit_m2:.2g} m2; {advice}"
         )
 
     def _fault(self, k: int, point: Floats) -> list[str]:
@@ -291,7 +331,15 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
 
 _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
 _SAMPLES_IN_STEP = 6000
+_EXACT_STEP = 50_000  # a search of all safe ground is one step; it is rare
 _CORNER_M = 1.0  # what a corner costs, as metres of path: few corners make wide bends
+
+
+def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:
+    """Return corners straightened again and again, until none can be left out."""
+    while len(shorter := at_once(straighten_in_steps(corners_m, graph))) < len(corners_m):
+        corners_m = shorter
+    return corners_m
 
 
 def straighten_in_steps(nodes_m: Floats, graph: SafeGraph) -> Steps[Floats]:

@@ -51,6 +51,20 @@ class Relief:
         """(rows, columns, 2) risk without the edge margin, and elevation variance."""
         return np.stack([self._risk, self._variance], axis=-1)
 
+    def risk_at_samples(
+        self, *, slope_factor: float, variance_factor: float, filled: bool = False
+    ) -> Floats:
+        """(rows, columns) risk if both limits were multiplied by factors; without the margin.
+
+        With ``filled`` the filled-in values count as if they had been measured.
+        """
+        config = self.config
+        risk = np.maximum(
+            self._variance / (variance_factor * config.variance_limit_m2),
+            self._slope / (slope_factor * config.slope_limit_rad),
+        )
+        return risk if filled else np.where(self._unknown > 0.0, self._risk, risk)
+
     def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation variance in a disc of ``variance_window_m`` around each point."""
         return self._at(self._variance, x_m, y_m)

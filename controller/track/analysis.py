@@ -17,7 +17,7 @@ from snakewalk.controller.track.undulation import (
     even_points,
     measure_undulation,
 )
-from snakewalk.controller.track.wave import Wave, measure_wave
+from snakewalk.controller.track.wave import Wave, below, measure_wave
 
 TARGET_SHIFT = 4.0
 """Points that the pattern should move between the frames that are compared."""
@@ -67,8 +67,8 @@ class Analysis:
             return "the pattern does not move along the body"
         if travel < LEAST_TRAVEL:
             return (
-                f"over the ground the body goes at {travel:.2f} of the pulse speed: it holds "
-                "station in a flow, drifts, or bends on the spot"
+                f"over the ground the body goes at {below(travel, LEAST_TRAVEL, 2)} of the pulse "
+                "speed: it holds station in a flow, drifts, or bends on the spot"
             )
         return None
 
@@ -144,10 +144,13 @@ class Analysis:
             "recording": track.name,
             "frames": track.frames,
             "frames_left_out": track.dropped,
+            "frames_missing": track.absent,
             "frames_bridged": track.bridged,
+            "every_nth_frame": track.every,
             "rate_hz": round(track.rate_hz, 3),
             "rate_assumed": track.rate_assumed,
             "times_uneven": track.uneven,
+            "notes": list(track.notes),
             "length_m": None if track.length_m is None else round(track.length_m, 6),
             "frequency_hz": of_wave(wave.frequency_hz),
             "waves_on_body": of_wave(wave.waves),

@@ -1,6 +1,7 @@
 """The bones of a spine over time: segments of a recorded skeleton, links of a robot, or a wave."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,6 +28,8 @@ class BoneMotion:
     """(T, K, 3, 3) columns: forward (towards the head), left, up."""
     bone_m: Floats
     """(K,) lengths at rest."""
+    pose: Mapping[str, str] = field(default_factory=dict)
+    """Kind, source and uncertainty of a robot's poses; empty of an animal."""
 
     @property
     def length_m(self) -> float:

@@ -18,13 +18,16 @@ class FrameStatus(StrEnum):
     LOOP = "touches itself: the silhouette has a hole"
     BRANCH = "touches itself: the medial axis branches"
     SHORT = "touches itself: much shorter or thicker than in the other frames"
-    COIL_TWO_WAYS = "touches itself: what comes before and what comes after solve it in two ways"
+    COIL_TWO_WAYS = "touches itself: the frames before and after it give two different solutions"
     COIL_UNLIKE = "touches itself: the film's body does not explain the picture"
     COIL_ALONE = "touches itself: no good frame on one of both sides"
     LARGER = "touches something: longer or larger than in the other frames"
     PART = "a part is missing: something goes on beyond its end"
     GHOST = "the background shows the animal"
     BLOB = "not a long body"
+    EMPTY = "rejected: the body does not stand out from the ground along the line"
+    KNOT = "rejected: a bend or a loop is tighter than the body's width allows"
+    LENGTH = "rejected: the length lies outside the film's range"
     LEFT_OUT = "left out by a person"
 
     @property

@@ -29,7 +29,7 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
         return stored
     recording = load_track(track)
     if recording.frames < 2:
-        raise InputError(f"{track}: one frame is no motion")
+        raise InputError(f"{track}: has one frame; a motion needs two")
     joints = Retarget(robot).joints_rad(recording.angles_rad)
     known_s = recording.time_s - recording.time_s[0]
     time_s = np.arange(0.0, known_s[-1] + 0.5 / recording.rate_hz, 1.0 / recording.rate_hz)

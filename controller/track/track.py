@@ -8,6 +8,11 @@ from scipy.interpolate import make_interp_spline
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.track.frame_runs import (
+    common_step,
+    is_mostly_every_nth,
+    missing_frames,
+)
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.resample import equal_arc_length, tangent_angles
 
@@ -34,6 +39,12 @@ class Track:
     """Body length; None where the recording has no scale."""
     dropped: int
     """Frames that were left out because points were missing."""
+    absent: int = 0
+    """Frames between the first and the last for which the file has no row."""
+    every: int = 1
+    """Frames of the camera from one row of the file to the next; ``rate_hz`` counts rows."""
+    notes: tuple[str, ...] = ()
+    """Lines about parts that the reader left out or changed."""
     rate_assumed: bool = False
     """Whether the file states no rate, so that the default of its format was taken."""
     uneven: bool = False
@@ -42,6 +53,11 @@ class Track:
     """(T,) of the kept frames; empty where the file says nothing of them."""
     source: str = "not stated"
     licence: str = "not stated"
+    places_recorded: bool = True
+    """Whether the points of different frames share one origin; not of images cropped to the animal,
+    nor of a camera that moves: they contain no travel."""
+    head_sure: float | None = None
+    """How surely the first point is the head, 0 to 1; None where the file does not say."""
 
     @property
     def frames(self) -> int:
@@ -68,6 +84,10 @@ class Track:
         return int(np.count_nonzero((flipped < same) & joined))
 
 
+UNSURE_HEAD = 0.3
+"""``head_sure`` below which head and tail may be exchanged."""
+
+
 def track_from_points(
     name: str,
     points: Floats,
@@ -80,6 +100,7 @@ def track_from_points(
     status: Sequence[FrameStatus] = (),
     source: str = "not stated",
     licence: str = "not stated",
+    notes: Sequence[str] = (),
 ) -> Track:
     """Build a ``Track`` from points (T, P, 2), head first, in any unit.
 
@@ -89,13 +110,13 @@ def track_from_points(
         rate_hz: frames a second.
         scale_m: metres per unit; None where it is unknown (points become body lengths).
         frame: (T,) frame numbers, increasing; default 0, 1, 2...
-        time_s: (T,) when the frames were taken, increasing. Where these are not the times of an
-            even rate, they decide: bodies are put between them (a cubic spline of each point) at
-            an even rate, that of their median step.
+        time_s: (T,) when the frames were taken, increasing. Uneven times decide: bodies are put
+            between them (a cubic spline of each point) at the rate of their median step.
         rate_assumed: whether ``rate_hz`` is a guess.
         status: of every frame (T,), or nothing.
         source: origin of the recording.
-        licence: under which it may be used.
+        licence: its terms of use.
+        notes: lines about parts that the reader left out or changed.
 
     Raises:
         InputError: wrong shape, bad rate, or fewer than 2 whole frames.
@@ -106,16 +127,19 @@ def track_from_points(
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise InputError(f"{name}: the frame rate must be above 0 Hz, not {rate_hz}")
     number = np.arange(len(points)) if frame is None else frame
-    _check_span(name, number)
-    uneven = time_s is not None and _is_uneven(name, time_s, number)
-    if time_s is not None and uneven:
-        rate_hz = 1.0 / float(np.median(np.diff(time_s)))
-        number = np.rint(np.clip((time_s - time_s[0]) * rate_hz, 0.0, 2.0**53)).astype(np.int64)
-        _check_span(name, number)
-    elif np.any(number[1:] <= number[:-1]):
-        raise InputError(f"{name}: frame numbers must increase, one row of points for each frame")
+    number, rate_hz, uneven = _timed(name, number, time_s, rate_hz)
     whole = np.asarray(np.isfinite(points).all(axis=(1, 2)))
     whole[whole] = [_distinct(body) for body in points[whole]]
+    every = 1 if uneven else common_step(number[whole])
+    if every > 1:
+        listed = (number - number[whole][0]) % every == 0
+        points, whole, number = points[listed], whole[listed], number[listed] // every
+        status = [status[k] for k in np.flatnonzero(listed).tolist()] if status else ()
+        rate_hz /= every
+    elif not uneven and is_mostly_every_nth(number[whole]):
+        time_s, uneven = number / rate_hz, True
+        rate_hz = 1.0 / float(np.median(np.diff(time_s[whole])))
+    absent = _absent(number, time_s if uneven else None, rate_hz)
     dropped = int(len(points) - whole.sum())
     if time_s is not None and uneven:
         points, number, nearest = _between(points, time_s - time_s[0], whole, rate_hz)
@@ -124,8 +148,7 @@ def track_from_points(
     if int(whole.sum()) < 2:
         raise InputError(f"{name}: only {int(whole.sum())} of {len(points)} frames hold a midline")
     kept = points[whole]
-    even = np.stack([equal_arc_length(body) for body in kept])
-    length = float(np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1)))
+    even, length = _evenly(kept)
     return Track(
         name=name,
         angles_rad=_over_time(tangent_angles(even)),
@@ -134,12 +157,43 @@ def track_from_points(
         rate_hz=float(rate_hz),
         length_m=None if scale_m is None else length * scale_m,
         dropped=dropped,
+        absent=absent,
+        every=every,
+        notes=tuple(notes),
         rate_assumed=rate_assumed,
         uneven=uneven,
         status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),
         source=source,
         licence=licence,
     )
+
+
+def _evenly(bodies: Floats) -> tuple[Floats, float]:
+    """Bodies (T, 101, 2) at equal arc lengths, and the median of their lengths."""
+    even = np.stack([equal_arc_length(body) for body in bodies])
+    return even, float(np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1)))
+
+
+def _timed(
+    name: str, number: Ints, time_s: Floats | None, rate_hz: float
+) -> tuple[Ints, float, bool]:
+    """Frame numbers, rate, and whether the times (T,) are uneven and decide about both."""
+    _check_span(name, number)
+    if time_s is not None and _is_uneven(name, time_s, number):
+        rate_hz = 1.0 / float(np.median(np.diff(time_s)))
+        number = np.rint(np.clip((time_s - time_s[0]) * rate_hz, 0.0, 2.0**53)).astype(np.int64)
+        _check_span(name, number)
+        return number, rate_hz, True
+    if np.any(number[1:] <= number[:-1]):
+        raise InputError(f"{name}: frame numbers must increase, one row of points for each frame")
+    return number, rate_hz, False
+
+
+def _absent(number: Ints, time_s: Floats | None, rate_hz: float) -> int:
+    """Frames between the first and the last row that have none of their own."""
+    if time_s is None:
+        return missing_frames(number)
+    return max(0, round(float(time_s[-1] - time_s[0]) * rate_hz) + 1 - len(time_s))
 
 
 def _check_span(name: str, number: Ints) -> None:
@@ -200,8 +254,8 @@ def frame_numbers(name: str, values: Floats) -> Ints:
     odd = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
     if odd.any():
         raise InputError(
-            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are no whole numbers, such "
-            f"as {values[odd][0]:g}"
+            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are not whole numbers, "
+            f"such as {values[odd][0]:g}"
         )
     return values.astype(np.int64)
 

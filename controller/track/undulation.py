@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.track.frame_runs import consecutive
 from snakewalk.controller.track.resample import body_points, equal_arc_length
 from snakewalk.controller.track.track import Track
 
@@ -23,8 +24,11 @@ class Undulation:
 def even_points(track: Track) -> Floats | None:
     """Points (T, 101, 2) at equal arc lengths, body lengths; None where places are not recorded.
 
-    Files of joint angles, and figures without travel, put every head at the same place.
+    Files of joint angles, and figures without travel, put every head at the same place; images that
+    are cropped to the animal share no origin.
     """
+    if not track.places_recorded:
+        return None
     heads = track.points[:, 0]
     if np.ptp(heads, axis=0).max() <= 1e-9:
         return None
@@ -46,13 +50,14 @@ def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
     """
     heading = track.angles_rad.mean(axis=1)
     cycle = track.rate_hz / max(frequency_hz, 1e-9)
-    slow = _slow(heading, cycle)
+    number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
+    slow = _slow(number, heading, cycle)
     swing = track.angles_rad - slow[:, None]
     body = even_points(track)
     if body is None:
         body = body_points(track.angles_rad)
         body = body - body.mean(axis=1, keepdims=True)
-    centre = np.stack([_slow(column, cycle) for column in body.mean(axis=1).T], axis=-1)
+    centre = np.stack([_slow(number, column, cycle) for column in body.mean(axis=1).T], axis=-1)
     across = np.stack([-np.sin(slow), np.cos(slow)], axis=-1)
     side = ((body - centre[:, None]) * across[:, None]).sum(axis=-1)
     return Undulation(np.sqrt(2.0) * swing.std(axis=0), np.sqrt(2.0) * side.std(axis=0))
@@ -109,8 +114,25 @@ def advance_of(body: Floats, number: Ints, step: int) -> Advance:
     )
 
 
-def _slow(values: Floats, cycle: float) -> Floats:
-    """What is left of a series without what happens within a cycle of so many frames."""
+def _slow(number: Ints, values: Floats, cycle: float) -> Floats:
+    """Return a series without what happens within a cycle of this many frames.
+
+    Parts between gaps are smoothed each for itself; those shorter than a cycle keep to one line
+    through all frames.
+    """
+    runs = consecutive(number)
+    if len(runs) == 1:
+        return _slow_run(values, cycle)
+    line = np.polynomial.Polynomial.fit(number, values, 1)(number)
+    slow = np.asarray(line, dtype=float)
+    for run in runs:
+        if len(run) >= max(cycle, 2.0):
+            slow[run] = _slow_run(values[run], cycle)
+    return slow
+
+
+def _slow_run(values: Floats, cycle: float) -> Floats:
+    """Return a series of consecutive frames without what happens within a cycle."""
     trend = np.polynomial.Polynomial.fit(np.arange(len(values)), values, 1)
     line = trend(np.arange(len(values)))
     if len(values) < 3.0 * cycle:

@@ -1,12 +1,16 @@
 """The body wave of a recording: its direction, length and speed, one number each."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import fft, ifft
 from scipy.ndimage import gaussian_filter1d
 
-from snakewalk.config.arrays import Complexes, Floats
+from snakewalk.config.arrays import Complexes, Floats, Ints
+from snakewalk.controller.track.curvature import analytic_signal, smooth_curvature
+from snakewalk.controller.track.frame_runs import missing_frames
+from snakewalk.controller.track.gapped_wave import gapped_wave
+from snakewalk.controller.track.resample import SEGMENTS
 from snakewalk.controller.track.slowing import CUT_CYCLES
 from snakewalk.controller.track.track import Track
 
@@ -16,8 +20,8 @@ LEAST_FRAMES = 4.0
 """Frames a cycle: from 2 on a wave looks like another that runs the other way."""
 LEAST_CYCLES = 2.0
 """In the recording: a wave by formula has its frequency within 1.5 % from here on."""
-_SMOOTH = 4.0  # of 100 segments: a wave of half the body keeps 88 % of its size
-_END = 8  # segments at either end whose smoothed curvature leans on what is not there
+LEAST_RUN_CYCLES = 1.0
+"""In the longest part without a gap (ours)."""
 _NO_BEND = 1e-9  # rad a segment: a straight body that turns leaves rounding errors
 _STEPS = 6  # until frequency and smoothing fit each other
 
@@ -39,7 +43,9 @@ class Wave:
     lists the tail first."""
     frames_a_cycle: float
     cycles: float
-    """How many the recording lasts."""
+    """How many the recording lasts, without its gaps."""
+    longest_cycles: float | None = None
+    """Cycles of the longest part without a gap; None where the recording has no gap."""
 
     @property
     def coarse(self) -> bool:
@@ -50,17 +56,26 @@ class Wave:
     def not_told(self) -> str | None:
         """Why frequency, length and direction are no measurement; None where they are one."""
         if self.share < LEAST_SHARE:
+            share = below(100.0 * self.share, 100.0 * LEAST_SHARE, digits=0)
             return (
-                f"one wave is only {self.share:.0%} of the bending ({LEAST_SHARE:.0%} are needed): "
+                f"one wave is only {share}% of the bending ({LEAST_SHARE:.0%} are needed): "
                 "noise, or a body that bends otherwise"
             )
         if self.coarse:
             return (
-                f"{self.frames_a_cycle:.1f} frames a cycle are too few ({LEAST_FRAMES:g} are "
-                "needed): record at a higher rate"
+                f"{below(self.frames_a_cycle, LEAST_FRAMES)} frames a cycle are too few "
+                f"({LEAST_FRAMES:g} are needed): record at a higher rate"
             )
         if self.cycles < LEAST_CYCLES:
-            return f"{self.cycles:.1f} cycles are too short a recording ({LEAST_CYCLES:g} needed)"
+            return (
+                f"{below(self.cycles, LEAST_CYCLES)} cycles are too short a recording "
+                f"({LEAST_CYCLES:g} needed)"
+            )
+        if self.longest_cycles is not None and self.longest_cycles < LEAST_RUN_CYCLES:
+            return (
+                f"the longest part without a gap has {below(self.longest_cycles, LEAST_RUN_CYCLES)}"
+                f" cycles ({LEAST_RUN_CYCLES:g} needed)"
+            )
         return None
 
     @property
@@ -70,42 +85,69 @@ class Wave:
         return speed if self.towards_tail else -speed
 
 
+def below(value: float, limit: float, digits: int = 1) -> str:
+    """Return a number below a limit with as many digits as show that it is below."""
+    while float(text := f"{value:.{digits}f}") >= limit and digits < 12:
+        digits += 1
+    return text
+
+
 def measure_wave(track: Track) -> Wave:
     """Fit one travelling wave: first complex principal component of the analytic curvature.
 
     Its phase falls along the body when the wave runs from head to tail; the slope is the number of
     waves. A reversal within the recording lowers ``share`` and is counted in ``headward``.
     """
+    number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
+    if missing_frames(number):
+        return _of_runs(track, number)
     even = np.arange(track.time_s[0], track.time_s[-1] + 0.5 / track.rate_hz, 1.0 / track.rate_hz)
     angles = np.stack([np.interp(even, track.time_s, column) for column in track.angles_rad.T])
-    curvature = _smooth_curvature(angles.T)
-    analytic = _analytic(curvature - curvature.mean(axis=0))
+    curvature = smooth_curvature(angles.T)
+    analytic = analytic_signal(curvature - curvature.mean(axis=0))
     energy, modes = np.linalg.eigh(analytic.T @ analytic.conj())
     mode = modes[:, -1]
-    s = np.arange(len(mode)) / len(angles)
-    slope = np.polyfit(s, np.unwrap(np.angle(mode)), 1, w=np.abs(mode))[0] / (2.0 * np.pi)
+    slope = _slope(mode)
     turns = _turns_a_frame(analytic @ mode.conj())
     cycle = 1.0 / max(abs(turns), 1e-9)
-    bends = float(np.abs(curvature - curvature.mean(axis=0)).max()) > _NO_BEND
     return Wave(
         waves=float(abs(slope)),
         frequency_hz=abs(turns) * track.rate_hz,
         towards_tail=bool(slope * turns < 0.0),
-        share=float(energy[-1] / energy.sum()) if bends else 0.0,
-        headward=_headward(curvature, cycle),
+        share=float(energy[-1] / energy.sum()) if _bends(curvature) else 0.0,
+        headward=_headward([curvature], cycle),
         frames_a_cycle=cycle,
         cycles=len(even) / cycle,
     )
 
 
-def _smooth_curvature(angles_rad: Floats) -> Floats:
-    """(T, N - 16) change of the tangent angles (T, N) from segment to segment, smoothed.
+def _of_runs(track: Track, number: Ints) -> Wave:
+    """Wave of a recording with gaps: only runs of frames count."""
+    curvature = smooth_curvature(track.angles_rad)
+    found = gapped_wave(number, curvature)
+    slope = _slope(found.mode)
+    cycle = 1.0 / max(abs(found.turns_a_frame), 1e-9)
+    return Wave(
+        waves=float(abs(slope)),
+        frequency_hz=abs(found.turns_a_frame) * track.rate_hz,
+        towards_tail=bool(slope * found.turns_a_frame < 0.0),
+        share=found.share if _bends(curvature) else 0.0,
+        headward=_headward(found.runs, cycle),
+        frames_a_cycle=cycle,
+        cycles=sum(len(run) for run in found.runs) / cycle,
+        longest_cycles=max(len(run) for run in found.runs) / cycle,
+    )
 
-    Noise of the points grows with the square of how closely they lie: without smoothing, 0.2 % of
-    the length is more than the bending itself. The ends, where it has one side only, are left out.
-    """
-    smooth = gaussian_filter1d(angles_rad, _SMOOTH, axis=1, order=1, mode="nearest")
-    return np.asarray(smooth[:, _END:-_END])
+
+def _slope(mode: Complexes) -> float:
+    """Signed waves on the body, by the phase of a mode (N,) along it."""
+    s = np.arange(len(mode)) / SEGMENTS
+    fitted = np.polyfit(s, np.unwrap(np.angle(mode)), 1, w=np.abs(mode))
+    return float(fitted[0] / (2.0 * np.pi))
+
+
+def _bends(curvature: Floats) -> bool:
+    return float(np.abs(curvature - curvature.mean(axis=0)).max()) > _NO_BEND
 
 
 def _turns_a_frame(phasor: Floats) -> float:
@@ -126,24 +168,17 @@ def _turns_a_frame(phasor: Floats) -> float:
     return turns
 
 
-def _headward(curvature: Floats, cycle: float) -> float:
-    """Part of the frames (T, N) whose pulse speed is negative, [PT] 2.4 over the whole body.
+def _headward(runs: Sequence[Floats], cycle: float) -> float:
+    """Part of the frames of runs (T, N) whose pulse speed is negative ([PT] 2.4, whole body).
 
     Least squares of ``curvature_t = -U curvature_s``, its two sums taken over a quarter of a cycle
     around each frame, as a single frame's difference is mostly noise.
     """
-    in_time, along = np.gradient(curvature, axis=0), np.gradient(curvature, axis=1)
-    pulse = gaussian_filter1d(-(in_time * along).sum(axis=1), min(cycle, len(curvature)) / 8.0)
-    return float((pulse < 0.0).mean())
-
-
-def _analytic(values: Floats) -> Complexes:
-    """Analytic signal (T, N) of each column: the positive frequencies alone, doubled.
-
-    To the bit as ``scipy.signal.hilbert`` makes it, whose import takes a second.
-    """
-    count = len(values)
-    share = np.zeros(count)
-    share[0] = share[count // 2] = 1.0
-    share[1 : (count + 1) // 2] = 2.0
-    return np.asarray(ifft(fft(values, axis=0) * share[:, None], axis=0))
+    negative = []
+    for curvature in runs:
+        if len(curvature) < 2:
+            continue
+        in_time, along = np.gradient(curvature, axis=0), np.gradient(curvature, axis=1)
+        width = min(cycle, len(curvature)) / 8.0
+        negative.append(gaussian_filter1d(-(in_time * along).sum(axis=1), width) < 0.0)
+    return float(np.concatenate(negative).mean()) if negative else 0.0

@@ -9,10 +9,12 @@ import viser
 from viser import uplot
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.metrics.ground_slope import carrier_share, ground_slope
 from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import CurveValues, panel_curves
 from snakewalk.controller.runlog.record import Event, Header, RunRecord
 from snakewalk.controller.runlog.topics import TABLES
+from snakewalk.controller.view.scene import contour_step_m
 
 SPAN_S: Final = 30.0
 """How much of the past the curves show (ours)."""
@@ -37,6 +39,10 @@ class Dashboard:
         self._robot, self._run = header.robot, header.run
         safety = header.run.safety
         self._limit_a = safety.current_limit_of_a(header.robot)
+        self._evidence = header.pose_evidence
+        step_m = None if header.ground is None else contour_step_m(header.ground)
+        self._contours = "" if step_m is None else f"<br>contours every {100.0 * step_m:g} cm"
+        self._ground = header.ground
         self._limit_c = safety.temperature_limit_c
         self._volts = safety.voltage_limits_v(header.robot.servo)
         self._stale_s = safety.stale_limit_s
@@ -85,14 +91,25 @@ class Dashboard:
         """Show how the run is doing, in words."""
         where, time_s = record.pose, float(record.cycle.time_s[cycle])
         waypoints, reached = len(record.waypoints_at(time_s)), int(where.target[pose])
-        facts = [f"{time_s:.1f} s"]
+        facts = []
         if waypoints:
             facts.append(f"waypoint {min(reached + 1, waypoints)} of {waypoints}")
         if np.isfinite(where.speed_m_s[pose]):
             facts.append(f"{where.speed_m_s[pose]:.2f} m/s")
+        if self._ground is not None:
+            ahead_rad, steepest_rad = ground_slope(self._ground, where.links_m[pose][None])
+            if np.isfinite(ahead_rad[0]):
+                ahead, steepest = np.degrees([ahead_rad[0], steepest_rad[0]])
+                facts.append(f"slope {steepest:.0f}°, {ahead:+.0f}° ahead")
+        if np.isfinite(share := carrier_share(record)):
+            facts.append(f"{share:.0%} of the walk on wide waves")
+        believes = "" if self._evidence.is_measured or not facts else "believed: "
+        colour = _INK if self._evidence.is_measured else _WARN
+        known = f"<span style='color:{colour}'>pose: {escape(self._evidence.text)}</span>"
         self._state.content = (
             f"<div style='padding:0 .8em .4em'><b>{escape(self._run.name)}</b> on "
-            f"{escape(self._robot.name)}<br>{', '.join(facts)}<br>{escape(text)}</div>"
+            f"{escape(self._robot.name)}<br>{time_s:.1f} s, {believes}{', '.join(facts)}<br>{known}"
+            f"{self._contours}<br>{escape(text)}</div>"
         )
 
     def show_servos(self, record: RunRecord, cycle: int, slow: int | None) -> None:

@@ -10,8 +10,8 @@ from snakewalk.controller.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.view.dead_man import WITHOUT
 
 _NONE: Final = (
-    "No gamepad. Press a button on one that is attached to the computer of this browser, which "
-    "tells of it only then."
+    "No gamepad. Press a button of a gamepad at the computer of this browser; the browser "
+    "reports it only then."
 )
 _STOP: Final = "right stick pressed: E-STOP"
 

@@ -143,7 +143,7 @@ class _LivePage:
             self._header = record_of({topic: [row]}, complete=False, note="").header
             with self._server.atomic():
                 self._scene = BodyScene(self._server, self._header)
-                self._scene.first_camera(self._server)
+                self._scene.first_camera()
                 self._dashboard = Dashboard(self._server, self._header)
             self._show_gait()
             self._take_waypoints()
@@ -218,6 +218,6 @@ class _LivePage:
 
     def _press(self, who: str) -> str:
         if self._button is None:
-            return "there is no run to stop yet"
+            return "no run has begun yet"
         self._button.press(who)
         return "stop requested"

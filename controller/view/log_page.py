@@ -106,7 +106,7 @@ class LogPage:
             scene = BodyScene(self.server, record.header, number)
             with nullcontext() if tabs is None else tabs.add_tab(name):
                 self._shown.append(_Shown(record, scene, Dashboard(self.server, record.header)))
-        self._shown[0].scene.first_camera(self.server)
+        self._shown[0].scene.first_camera()
         self.playing = False
         self.time_s = self._begin_s
         self._curves_s = -np.inf

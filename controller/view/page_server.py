@@ -26,8 +26,8 @@ def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser
     """
     if not _is_here(host):  # viser would wait for ever
         raise OSError(
-            f"{host} is no address of this machine, which has 127.0.0.1 (for itself) and 0.0.0.0 "
-            "(all of its addresses)"
+            f"{host} is not an address of this machine; use 127.0.0.1 (this machine only) or "
+            "0.0.0.0 (all of its addresses)"
         )
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # each refusal is a trace
     gate = Gate(host, insert)

@@ -1,5 +1,6 @@
 """The body on its ground in 3-D: links and their goals, path, waypoints, and where the body was."""
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Final
@@ -14,7 +15,8 @@ from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.kinematics.legs import leg_segments_m
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.controller.pose.sample import quaternion_of
+from snakewalk.controller.runlog.record import POSE_CHECK, Header, RunRecord
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.solids import Solid, solids
 
@@ -31,6 +33,10 @@ _WAYPOINT: Final = (40, 160, 80)
 _REACHED: Final = (150, 150, 150)
 _GROUND: Final = np.array([(96, 104, 84), (214, 208, 182)])
 """Colours (ours); a link's hot at full current, the ground's from lowest to highest."""
+_CONTOUR: Final = (92, 84, 66)
+_CONTOUR_ABOVE_M: Final = 0.002
+_CONTOURS: Final = 12
+"""Most contours of a ground (ours)."""
 _ABOVE_M: Final = 0.006
 """How far lines lie above the ground, so that they are seen (ours)."""
 _GOAL_ABOVE, _GOAL_WIDTH = 1.4, 0.14
@@ -48,7 +54,9 @@ class BodyScene:
 
     def __init__(self, server: viser.ViserServer, header: Header, number: int = 0) -> None:
         """Draw ground and waypoints; ``number`` is that of the run in its page."""
-        self._scene, self._header = server.scene, header
+        self._server, self._scene, self._header = server, server.scene, header
+        self._is_measured = header.pose_evidence.is_measured
+        self._frames_body = False
         self._root = f"/run{number}"
         self.aside_m: Floats = np.zeros(3)
         """(3,) by which all is moved: where another run is drawn beside it."""
@@ -59,6 +67,7 @@ class BodyScene:
         self._reached = -1
         self._waypoints_m: Floats = np.zeros((0, 2))
         self._waypoints: list[viser.IcosphereHandle] = []
+        self._axes = self._draw_axes() if header.backend == POSE_CHECK else None
         self._scene.set_up_direction("+z")
         self._draw_ground()
         self._draw_water()
@@ -74,6 +83,15 @@ class BodyScene:
         self._legs = self._leg_links() if self._robot.limbs else None
         self._joint_of = np.minimum(np.arange(links), links - 2)
 
+    def _draw_axes(self) -> viser.FrameHandle:
+        """Draw the axes of the ground, and return those of the head: x red, y green, z blue."""
+        length_m = 0.3 * self._robot.length_m
+        for name in ("ground", "head"):
+            axes = self._scene.add_frame(
+                f"{self._root}/axes_{name}", axes_length=length_m, axes_radius=0.02 * length_m
+            )
+        return axes
+
     def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
         """Draw the body at a row of the cycles and of the poses."""
         where, rows = record.pose, record.cycle
@@ -83,6 +101,9 @@ class BodyScene:
             return
         measured = body_in_world(self._robot, head, np.nan_to_num(rows.measured_rad[cycle, :spine]))
         _place(self._body, measured)
+        if self._axes is not None:
+            self._axes.position = tuple(head.head_in_world_m)
+            self._axes.wxyz = quaternion_of(head.rotation)
         load = np.nan_to_num(np.abs(rows.current_a[cycle, :spine])) / self._limit_a
         share = np.clip(load, 0.0, 1.0)[self._joint_of, None]
         shown = self._colors + share * (np.array(_HOT) - self._colors)
@@ -98,6 +119,9 @@ class BodyScene:
             _place(self._goals, body_in_world(self._robot, head, sent), self._goal_above_m)
         if follow:
             self._frame.position = tuple(self.aside_m - [*measured.centre_m[:2], 0.0])
+        if self._frames_body:
+            self._frames_body = False
+            self._frame_body(measured)
         self._show_waypoints(
             record.waypoints_at(float(rows.time_s[cycle])), int(where.target[pose])
         )
@@ -154,17 +178,23 @@ class BodyScene:
         """Leave the ground to another run, whose own is the same and lies there."""
         self._floor.visible = not hidden
 
-    def first_camera(self, server: viser.ViserServer) -> None:
-        """Look from behind and above at the start, far enough to see body and path."""
-        plan, run, camera = self._header.plan, self._header.run, server.initial_camera
-        at = np.array([*run.start_m, 0.0])
+    def first_camera(self) -> None:
+        """Have the camera frame the body when it is first shown."""
+        self._frames_body = True
+
+    def _frame_body(self, body: BodyView) -> None:
+        """Look along the body from behind and above: it fills half of the picture."""
+        centre_m = body.centre_m + self._frame.position
+        ahead = body.link_m[0, :2] - body.link_m[-1, :2]
+        ahead /= max(float(np.linalg.norm(ahead)), 1e-9)
+        forward, left = np.array([*ahead, 0.0]), np.array([-ahead[1], ahead[0], 0.0])
         length_m = self._robot.length_m
-        if len(plan.path_m) > 1:
-            at[:2] = 0.5 * (at[:2] + plan.path_m[:, :2].mean(axis=0))
-            length_m = max(length_m, float(np.ptp(plan.path_m[:, :2], axis=0).max()))
-        at[2] = self._height_m(at[None, :2])[0]
-        camera.look_at = tuple(at)
-        camera.position = tuple(at + length_m * np.array([-0.35, -0.75, 0.55]))
+        at_m = centre_m + 0.15 * length_m * forward
+        eye_m = centre_m + length_m * (-0.65 * forward + 0.35 * left + np.array([0.0, 0.0, 0.55]))
+        first = self._server.initial_camera
+        first.position, first.look_at = tuple(eye_m), tuple(at_m)
+        for client in self._server.get_clients().values():
+            client.camera.position, client.camera.look_at = tuple(eye_m), tuple(at_m)
 
     def _links(
         self, name: str, colors: np.ndarray, radii_m: Floats, share: float
@@ -217,6 +247,15 @@ class BodyScene:
         self._floor = self._scene.add_mesh_trimesh(
             f"{self._root}/ground", _ground_mesh(self._ground)
         )
+        lines_m = contours_m(self._ground, contour_step_m(self._ground))
+        if len(lines_m):
+            self._scene.add_line_segments(
+                f"{self._root}/ground/contours",
+                lines_m + np.array([0.0, 0.0, _CONTOUR_ABOVE_M]),
+                _CONTOUR,
+                thickness=1.5,
+                thickness_units="screen",
+            )
 
     def _draw_water(self) -> None:
         surface_m = water_surface_m(self._header.world, self._ground)
@@ -270,7 +309,13 @@ class BodyScene:
             name = f"{self._root}/waypoints/{number}"
             self._waypoints.append(
                 self._scene.add_icosphere(
-                    name, radius_m, color=_WAYPOINT, opacity=0.35, position=at
+                    name,
+                    radius_m,
+                    color=_WAYPOINT,
+                    subdivisions=3 if self._is_measured else 2,
+                    opacity=0.35,
+                    wireframe=not self._is_measured,
+                    position=at,
                 )
             )
             self._scene.add_label(f"{name}/label", str(number + 1), position=(0.0, 0.0, radius_m))
@@ -329,3 +374,32 @@ def _ground_mesh(field: HeightField) -> trimesh.Trimesh:
         vertex_colors=np.column_stack([colors, np.full(len(colors), 255.0)]).astype(np.uint8),
         process=False,
     )
+
+
+def contour_step_m(field: HeightField) -> float:
+    """Return a round difference in height (1, 2 or 5) that gives at most 12 contours."""
+    least_m = max(float(np.ptp(field.z_m)) / _CONTOURS, 1e-4)
+    power = 10.0 ** math.floor(math.log10(least_m))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= least_m)
+
+
+def contours_m(field: HeightField, step_m: float) -> Floats:
+    """Pieces (n, 2, 3) of the contours at multiples of a height; they lie in the triangles."""
+    corners_m, faces = surface(field)
+    height = corners_m[:, 2]
+    first, last = math.ceil(height.min() / step_m), math.floor(height.max() / step_m)
+    found = []
+    for level_m in step_m * np.arange(first, last + 1):
+        above = height > level_m
+        count = above[faces].sum(axis=1)
+        cut = faces[(count == 1) | (count == 2)]
+        # the corner that is alone on its side of the level comes first
+        is_alone = above[cut] == (above[cut].sum(axis=1) == 1)[:, None]
+        turned = (np.argmax(is_alone, axis=1)[:, None] + np.arange(3)) % 3
+        alone, *others = np.moveaxis(corners_m[np.take_along_axis(cut, turned, axis=1)], 1, 0)
+        ends = []
+        for other in others:
+            share = (level_m - alone[:, 2]) / (other[:, 2] - alone[:, 2])
+            ends.append(alone + share[:, None] * (other - alone))
+        found.append(np.stack(ends, axis=1))
+    return np.concatenate(found) if found else np.zeros((0, 2, 3))

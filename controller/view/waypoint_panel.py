@@ -74,7 +74,7 @@ class WaypointPanel:
             return
         point_m = self._scene.ground_m(event.ray_origin, event.ray_direction)
         if point_m is None:
-            self._show("refused: there is no ground where you clicked", _BAD)
+            self._show("refused: you did not click on the ground", _BAD)
             return
         self._commands.put(f"{word}={point_m[0]:.3f},{point_m[1]:.3f}")
         self._show("asked of the run")

@@ -13,6 +13,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.path_progress import Decision, PathProgress
 from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import MotionSource
@@ -50,7 +51,7 @@ class LiveCourse(MotionWrapper, OnCourse):
     def __init__(
         self,
         motion: MotionOnCourse,
-        commands: Callable[[], Iterable[str]],
+        commands: Callable[[], Iterable[str | Refused]],
         check: Callable[[Floats], None],
         on_event: Callable[[str, str], None],
     ) -> None:
@@ -58,8 +59,8 @@ class LiveCourse(MotionWrapper, OnCourse):
 
         Args:
             motion: along a course.
-            commands: set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``; others are
-                rejected.
+            commands: set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``; others, and
+                those that could not be read, are reported as rejected.
             check: raises ``InputError`` for a point (2,) where no waypoint may be, whatever path
                 leads there.
             on_event: takes ("operator", text) of what was done, ("refused", text) of what was not.
@@ -122,7 +123,10 @@ class LiveCourse(MotionWrapper, OnCourse):
         self._told_complete = self.course.complete
         return goal_rad
 
-    def _carry_out(self, command: str, view: BodyView) -> None:
+    def _carry_out(self, command: str | Refused, view: BodyView) -> None:
+        if isinstance(command, Refused):
+            self._refusals.add(command.why, self._time_s)
+            return
         word, _, value = command.partition("=")
         if self._ends:
             return
@@ -167,7 +171,7 @@ class LiveCourse(MotionWrapper, OnCourse):
         if not np.isfinite(point_m).all():
             raise InputError(f"waypoint {text}: expected X,Y in metres")
         if len(self.waypoints_m) >= WAYPOINTS_MAX:
-            raise InputError(f"waypoint {_shown(point_m)}: a run takes {WAYPOINTS_MAX} at most")
+            raise InputError(f"waypoint {_shown(point_m)}: a run accepts {WAYPOINTS_MAX} at most")
         self._check(point_m)
         before_m = left_m[-1] if len(left_m) else view.link_m[0, :2]
         if np.hypot(*(point_m - before_m)) < _APART_M:

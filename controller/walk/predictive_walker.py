@@ -110,6 +110,7 @@ class PredictiveWalker:
         self._walked = max(1, round(walk.decision_fraction * points))
         self._at = self._until = 0
         self._option: _Option | None = None
+        self._carrier_rad = 0.0
         self._base_rad = 0.0
         self._bends = np.zeros(2)
         self._tried: list[_Tried] = []
@@ -178,6 +179,8 @@ class PredictiveWalker:
             if option.state != SERPENOID:
                 self._star.take(option.state)
             self._at, self._option = 0, option
+            wide = option.carrier if option.carrier in CLIMBING else None
+            self._carrier_rad = 0.0 if wide is None else wide.amplitude_rad
             self._until = self._walked
         self.track.append(best.piece_rad[:keep])
         bend = best.bends[0] * self._walk.bend_limit_rad
@@ -185,7 +188,8 @@ class PredictiveWalker:
         self._at += keep
         self._bends = best.bends
         error = float(wrap(self._base_rad + pose.offset_rad - pose.aim_rad))
-        return Decision(option.state, error, float(bend), option.near, self._star.distinct)
+        near, seen = option.near, self._star.distinct
+        return Decision(option.state, error, float(bend), near, seen, self._carrier_rad)
 
     @property
     def _is_new(self) -> bool:

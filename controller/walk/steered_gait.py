@@ -9,7 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.gaits.gait import CYCLE_SAMPLES, Gait, Needs
+from snakewalk.controller.gaits.gait import Gait, Needs
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.kinematics.links import BodyView
@@ -19,6 +19,12 @@ from snakewalk.controller.motion.path_progress import Decision
 from snakewalk.controller.motion.rate_limiter import RateLimiter
 from snakewalk.controller.motion.source import Pace
 from snakewalk.controller.motion.stop_profile import StopProfile
+from snakewalk.controller.motion.turned_gait import (
+    TURN_PER_S2,
+    TURN_RATE_PER_S,
+    rate_beside_turn,
+    turned,
+)
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 
 TURN_LIMIT = 1.4
@@ -26,9 +32,6 @@ TURN_LIMIT = 1.4
 by as many radians."""
 TURN_PER_RAD = 3.0
 """Turn per error of the heading (ours)."""
-TURN_RATE_PER_S = 0.5
-"""How fast the turn changes (ours): within a cycle of 4 s it goes from straight to its limit."""
-_TURN_PER_S2 = 1.0
 CYCLES_PER_BODY = 4.0
 """Cycles that go by while a body goes its length: a trot makes 0.24 to 0.42 lengths a cycle."""
 
@@ -63,10 +66,12 @@ class SteeredGait(OnCourse):
         """
         check_turns(gait, robot)
         super().__init__(course)
+        assert gait.steered_by is not None
+        self._key = gait.steered_by
         self._gait, self._robot, self._carrot_m = gait, robot, carrot_m
         cycle = GaitCycle(gait, robot)
-        self._rate_rad_s = cycle.rate_rad_s * _rate_beside_turn(gait, robot, cycle.pace())
-        self._turn = RateLimiter(np.zeros(1), TURN_RATE_PER_S, _TURN_PER_S2)
+        self._rate_rad_s = cycle.rate_rad_s * rate_beside_turn(gait, self._key, robot, cycle.pace())
+        self._turn = RateLimiter(np.zeros(1), TURN_RATE_PER_S, TURN_PER_S2)
         self._stop_profile = StopProfile()
         self._phase_rad = 0.0
         self.cycles = cycles
@@ -133,8 +138,8 @@ class SteeredGait(OnCourse):
         return self.goal_rad()
 
     def _joints_rad(self, phase_rad: float, turn: float) -> Floats:
-        turned = _turned(self._gait, turn)
-        return np.asarray(turned.joints_rad(self._robot, np.array([phase_rad]))[0])
+        bent = turned(self._gait, self._key, turn)
+        return np.asarray(bent.joints_rad(self._robot, np.array([phase_rad]))[0])
 
 
 def check_turns(gait: Gait, robot: RobotConfig) -> None:
@@ -156,26 +161,4 @@ def check_turns(gait: Gait, robot: RobotConfig) -> None:
             f"gait {gait.name}: {gait.steered_by} is what steers it along waypoints; leave it out"
         )
     for turn in (-TURN_LIMIT, 0.0, TURN_LIMIT):
-        _turned(gait, turn).check(robot)
-
-
-def _turned(gait: Gait, turn: float) -> Gait:
-    turn = -turn if gait.params.mirror else turn
-    return type(gait)(gait.params.model_copy(update={gait.steered_by: turn}))
-
-
-def _rate_beside_turn(gait: Gait, robot: RobotConfig, pace: Pace) -> float:
-    """Share of the gait's rate that leaves the joints room for a change of the turn."""
-    phases = np.linspace(0.0, TURN, CYCLE_SAMPLES)
-    turned = _turned(gait, 1.0).joints_rad(robot, phases) - gait.joints_rad(robot, phases)
-    reach_rad = float(np.abs(turned).max())  # of a joint, for a turn of 1
-    room = Pace.limit(robot)
-    speed = room.speed_rad_s - reach_rad * TURN_RATE_PER_S
-    # a leg's swing is a product with the turn: both rates together count twice
-    spent = reach_rad * _TURN_PER_S2 + 2.0 * TURN_RATE_PER_S * pace.speed_rad_s
-    hard = np.maximum(room.acceleration_rad_s2 - spent, 1e-3)
-    share = np.minimum(
-        speed / np.maximum(pace.speed_rad_s, 1e-9),
-        np.sqrt(hard / np.maximum(pace.acceleration_rad_s2, 1e-9)),
-    )
-    return float(np.clip(share.min(), 0.05, 1.0))
+        turned(gait, gait.steered_by, turn).check(robot)

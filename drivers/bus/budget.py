@@ -1,6 +1,6 @@
 """Wire time of a control cycle, computed before a run, and the rate that it allows.
 
-A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte takes ten
+A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte lasts ten
 bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
@@ -25,12 +25,12 @@ STATE_BYTES = 10
 SLOW_STATE_BYTES = 3
 """Slow state block, read in every 16th cycle: Present Input Voltage, Present Temperature."""
 CHECK_BYTES = 4
-"""Longest register that is compared with what was set, in cycles without the slow state."""
+"""Longest register that is compared with its setting, in cycles without the slow state."""
 
 
 @dataclass(frozen=True, slots=True)
 class WireBudget:
-    """Bytes and seconds that one cycle takes on the wire."""
+    """Bytes and seconds of one cycle on the wire."""
 
     servos: int
     baud: int
@@ -84,9 +84,9 @@ class WireBudget:
         if self.share(rate_hz) > 1.0:
             fast = "" if self.fast else ", use fast sync read"
             raise BudgetError(
-                f"{rate_hz:g} Hz: {self.servos} servos at {self.baud} baud take "
-                f"{self.cycle_s * 1e3:.2f} ms of wire a cycle; at most {self.limit_hz:.0f} Hz: "
-                f"lower the rate, raise the baud rate{fast}"
+                f"{rate_hz:g} Hz: a cycle of {self.servos} servos at {self.baud} baud occupies "
+                f"the wire for {self.cycle_s * 1e3:.2f} ms, which allows at most "
+                f"{self.limit_hz:.0f} Hz; lower the rate, raise the baud rate{fast}"
             )
 
 

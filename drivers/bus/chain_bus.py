@@ -1,4 +1,4 @@
-"""What a chain's servos answer on: one port, or a port for each segment of the chain."""
+"""Bus of a chain: one port, or a port for each segment of the chain."""
 
 from collections.abc import Iterable, Sequence
 from typing import Protocol
@@ -46,7 +46,7 @@ class GroupCycle(Protocol):
 
 
 class ChainBus(Protocol):
-    """What start-up, cycle and shutdown of a chain need: ``DynamixelBus`` describes it."""
+    """Interface for start-up, cycle and shutdown of a chain; ``DynamixelBus`` describes it."""
 
     @property
     def parts(self) -> Sequence[DynamixelBus]:
@@ -114,5 +114,5 @@ class ChainBus(Protocol):
         ...
 
     def device_block(self, device_id: int, address: int, length: int) -> GroupCycle:
-        """Group read of one device that is no servo."""
+        """Group read of one device that is not a servo."""
         ...

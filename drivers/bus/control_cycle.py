@@ -105,7 +105,7 @@ class ControlCycle:
         self._order = self._default_order
         self._requests: dict[tuple[bool, int, tuple[int, ...]], GroupReadRequest] = {}
         self.read_address, self.read_bytes = read_address, read_bytes
-        """Of the block."""
+        """First address and length of the block."""
         self._latency_s = latency_s
         self._failed_in_a_row = 0
         self._clean_in_a_row = 0
@@ -346,7 +346,7 @@ class ControlCycle:
         *,
         timed_out: bool,
     ) -> None:
-        """Count, and prepare for late replies; ``responded``: who sent any status packet at all."""
+        """Count, and prepare for late replies of the servos that have ``responded`` at all."""
         self.counters.timeouts += timed_out
         self.counters.unclean += not timed_out
         self._clean_in_a_row = 0

@@ -2,8 +2,8 @@
 
 Defects of dynamixel-sdk 4.1.0 that are avoided here:
 
-- The SDK never stuffs what it sends, and its unstuffing is not the inverse of stuffing. It takes a
-  status packet with an error and without data for success, and the CRC of a short packet for data.
+- The SDK never stuffs what it sends, and its unstuffing is not the inverse of stuffing. It treats a
+status packet with an error and without data as success, and the CRC of a short packet as data.
   So registers are read and written by our own strict codec; the SDK pings and reboots only.
 - An exception in the port leaves the SDK's port busy for ever: it is freed again.
 - A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones. The SDK's spins
@@ -45,8 +45,8 @@ _PROBES = 5
 _PING_BYTES = 3
 """Model number and firmware."""
 _GAP_BYTES = 64
-"""So many bytes between two registers are read along: at 1 Mbaud they take less time than a packet
-of their own (ours)."""
+"""Up to this number of bytes between two registers is read as well: at 1 Mbaud they need less time
+than a separate packet (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ class DynamixelBus:
         self._tables = {servo_id: load_control_table(each) for servo_id, each in models.items()}
         first = next(iter(models.values())) if isinstance(model, Mapping) else model
         self.table: ControlTable = load_control_table(first)
-        """Of the model, or of the first one."""
+        """Control table of the model, or of the first one."""
         self.latency_s = latency_s
         """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
@@ -100,7 +100,7 @@ class DynamixelBus:
 
     @property
     def parts(self) -> "tuple[DynamixelBus, ...]":
-        """Itself: what ``SegmentedBus`` has one of for each port."""
+        """The bus itself; a ``SegmentedBus`` has one for each port."""
         return (self,)
 
     def port_of(self, servo_id: int) -> BytePort:
@@ -144,7 +144,7 @@ class DynamixelBus:
         return found
 
     def scan(self) -> dict[int, PingReply]:
-        """All servos at the port's baud rate, by a broadcast ping; takes most of a second."""
+        """All servos at the port's baud rate, by a broadcast ping; lasts most of a second."""
         return {
             reply.servo_id: PingReply(
                 reply.servo_id,
@@ -185,7 +185,7 @@ class DynamixelBus:
     ) -> dict[str, int]:
         """Values of many registers by one request for the block in which they lie.
 
-        What lies between them comes along; only where that is much are there several requests. A
+        Bytes between them are read as well; several requests are sent only if these are many. A
         servo that refuses a block is asked register by register.
 
         Args:
@@ -232,7 +232,7 @@ class DynamixelBus:
         )
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
-        """Write a register by its name, in as many ``tries`` as other transactions, or so many.
+        """Write a register by its name, in ``tries`` attempts, or in as many as other transactions.
 
         Raises:
             ControlTableError: no such register, or the value does not fit it.
@@ -331,7 +331,7 @@ class DynamixelBus:
         )
 
     def device_block(self, device_id: int, address: int, length: int) -> ControlCycle:
-        """Group read of one device that is no servo, from ``address`` on."""
+        """Group read of one device that is not a servo, from an address."""
         return ControlCycle(
             self.port,
             (device_id,),

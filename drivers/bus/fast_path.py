@@ -19,7 +19,7 @@ class FastPath(Protocol):
 
     @property
     def remaining_s(self) -> float:
-        """How long the reply of an irregular cycle may still take."""
+        """Longest remaining time of the reply of an irregular cycle."""
         ...
 
     def write(self, goals: NDArray[np.int32]) -> int:

@@ -67,10 +67,10 @@ class GroupReadRequest:
         self.packet = encode_instruction(InstructionPacket(BROADCAST_ID, kind, params))
         self.fast = fast
         self.frame_bytes = length + (4 if fast else 11)
-        """Of one servo in the reply, without stuffing."""
+        """Bytes of one servo in the reply, without stuffing."""
         self.ids = tuple(ids)
         self.length = length
-        """Of the block."""
+        """Bytes of the block."""
         self._index = {servo_id: k for k, servo_id in enumerate(ids)}
         count = len(self.ids)
         share = (count * self.frame_bytes + 1).to_bytes(2, "little")
@@ -90,7 +90,7 @@ class GroupReadRequest:
         self._flawless = GroupReadReply(
             *(no_error, self._all, no_error, self._all), clean=True, whole=True, flawless=True
         )[1:]
-        """What a regular reply without errors says beside its data."""
+        """Result of a regular reply without errors, besides its data."""
         self.reply_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
         """Length of the whole reply without stuffing."""
 
@@ -141,11 +141,11 @@ class GroupReadRequest:
         return self._partial(by_id, clean=not unexpected)
 
     def _in_turn(self, packets: Sequence[object]) -> tuple[dict[int, StatusPacket], int]:
-        """Replies of this length by servo, and how many packets are none, or came out of turn.
+        """Replies of this length by servo, and the number of damaged or misplaced packets.
 
-        Servos reply in the order of the request. So what belongs to every longest run in that
-        order is new, and a packet of the same servo before it is an older one that came twice. Of
-        two in one place, or one behind it, it cannot be known which is new.
+        Servos reply in the order of the request. So what belongs to every longest run in that order
+        is new, and a packet of the same servo before it is an older one that came twice. If two
+        replies are in one place, or one is behind it, the new one is unknown.
         """
         told = [
             packet
@@ -153,7 +153,7 @@ class GroupReadRequest:
             if isinstance(packet, StatusPacket)
             and packet.servo_id in self._index
             and len(packet.params) in (self.length, 0)  # else to another, older request
-            and packet != before  # what came twice at once says the same
+            and packet != before  # an immediate copy has the same content
         ]
         turns = [self._index[packet.servo_id] for packet in told]
         before, after = _run_lengths(turns), _run_lengths([-t for t in reversed(turns)])[::-1]
@@ -205,7 +205,7 @@ class GroupReadRequest:
 
 
 def _run_lengths(values: Sequence[int]) -> list[int]:
-    """Of each value, the length of the longest rising run that ends with it."""
+    """Return for each value the length of the longest rising run that ends with it."""
     lengths: list[int] = []
     for k, value in enumerate(values):
         lower = [lengths[j] for j in range(k) if values[j] < value]

@@ -1,8 +1,8 @@
 """Until when a line carries what was sent on it: no reply begins before.
 
-A write returns long before its bytes have left. Whoever asks for a reply counts its time from when
-the line is free, also where another has sent what is still on it. A reply that is complete before
-it can have crossed the line is an older one that came twice.
+A write returns long before its bytes have left. The time of a reply counts from when the line is
+free, also if another request is still on it. A reply that is complete before it can have crossed
+the line is an older one that came twice.
 """
 
 import numpy as np
@@ -10,20 +10,20 @@ import numpy as np
 from snakewalk.drivers.clock import Clock, WallClock
 
 _LEAST_SHARE = 0.9
-"""Of the computed time of request and reply: neither clock is off by so much (ours)."""
+"""Share of the computed time of request and reply: neither clock is off by more (ours)."""
 _IN_VAIN = 2
-"""Replies in a row that were taken for copies, with nothing behind them, after which the line is
-known to be faster than its baud rate (ours): some adapters have another one on their other side."""
+"""Number of replies in a row that look like copies, with nothing behind them, after which the line
+counts as faster than its baud rate (ours): some adapters have another rate on their other side."""
 
 
 class LineReservation:
-    """Of one port, shared by all who send on it; ``paced`` as of ``BytePort``."""
+    """Reservation of one port, shared by all senders; ``paced`` as in ``BytePort``."""
 
     def __init__(self, clock: Clock, *, paced: bool = False) -> None:
         self._clock, self._paced, self._in_vain = clock, paced, 0
         self.free_s = np.array([clock.now_s()])
         """(1,) when all that was sent will have left, on the clock, s; compiled code writes it."""
-        # the same memory: numpy takes three times as long for a number
+        # the same memory: numpy needs three times as long for a number
         self._free_s = self.free_s.data.cast("B").cast("d")
 
     @property

@@ -1,4 +1,4 @@
-"""Requests that receive until the line is quiet: what one strict reply would not show.
+"""Requests that receive until the line is quiet, which shows more than one strict reply.
 
 Servos with the same ID reply at the same time. Their bytes collide, or both replies arrive where
 return delays or clocks differ. Another master's packets come unasked.
@@ -28,10 +28,10 @@ _REST_S = 0.05
 _OVERHEARD_BYTES = 1 << 16
 """Bytes that are enough to know who talks."""
 _TURN_S = 3e-3
-"""Servos reply to a broadcast ping one behind the other, by their IDs; the SDK waits so long for
+"""Servos reply to a broadcast ping one behind the other, by their IDs; the SDK waits this long for
 each."""
 _ADAPTER_S = 0.016
-"""What the SDK waits beside that: the latency timer of an adapter."""
+"""Additional wait of the SDK: the latency timer of an adapter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Probe:
     doubled: int
     """Good replies beyond one a request: two servos; a late reply makes up for a missing one."""
     damaged: int
-    """Requests after which bytes arrived that are no packet: two servos, or a bad line."""
+    """Requests after which damaged bytes arrived: two servos, or a bad line."""
     late_s: tuple[float, ...]
     """How much later than the wire and the return delay allow each reply was complete."""
 
@@ -112,12 +112,12 @@ def probe(
 
 @dataclass(frozen=True, slots=True)
 class Overheard:
-    """What came unasked."""
+    """Unrequested bytes."""
 
     instructions: int
     """Instruction packets: only another master sends them."""
     replies: int
-    """Status packets: replies to somebody else."""
+    """Status packets: replies to another master."""
     noise_bytes: int
 
 
@@ -138,7 +138,7 @@ def overhear(port: BytePort, seconds: float) -> Overheard:
 
 @dataclass(frozen=True, slots=True)
 class BroadcastReply:
-    """What came after a broadcast ping."""
+    """Replies to a broadcast ping."""
 
     replies: tuple[StatusPacket, ...]
     """Good replies to a ping, one of each ID, in the order of the IDs."""
@@ -147,7 +147,7 @@ class BroadcastReply:
 
 
 def broadcast_ping(port: BytePort) -> BroadcastReply:
-    """Ping all servos at the port's baud rate; takes most of a second, and 4.5 s at 9600 baud.
+    """Ping all servos at the port's baud rate; lasts most of a second, and 4.5 s at 9600 baud.
 
     Raises:
         PortError: the port is gone.

@@ -18,7 +18,7 @@ from snakewalk.drivers.protocol.packet import (
 from snakewalk.drivers.protocol.parser import PacketParser
 
 _REPLY_S = 0.034
-"""Time for servo and adapter beside the wire; the SDK's packet time-out has the same."""
+"""Time for servo and adapter besides the wire; the SDK's packet time-out has the same."""
 
 
 def read_register(

@@ -1,8 +1,8 @@
 """The bus of a chain whose segments are on ports of their own: one transaction a port and cycle.
 
-Requests begin on all ports before a reply is awaited on any, so that a cycle takes as long as that
-of the longest segment. A fault of one port is told with its name, and ends the cycle of all; what
-goes to all, such as torque off, goes to every port that is there, whatever the others do.
+Requests begin on all ports before a reply is awaited on any, so that a cycle lasts as long as that
+of the longest segment. A fault of one port is reported with its name, and ends the cycle of all.
+Commands to all servos, such as torque off, go to every port that is there, whatever the others do.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -133,7 +133,7 @@ class SegmentedBus:
         return self._cycles(servo_ids, lambda bus, ids: bus.block(ids, first, last, fast=fast))
 
     def device_block(self, device_id: int, address: int, length: int) -> "SegmentedCycle":
-        """Group read of one device that is no servo."""
+        """Group read of one device that is not a servo."""
         return self._cycles(
             [device_id], lambda bus, _: bus.device_block(device_id, address, length)
         )
@@ -155,8 +155,8 @@ class SegmentedBus:
         spans = {(cycle.read_address, cycle.read_bytes) for cycle in cycles.values()}
         if len(spans) > 1:
             raise ControlTableError(
-                "the models on the ports have the block of a control cycle at different places: "
-                "such servos are no one chain"
+                "ports: the servo models have their block of a control cycle at different "
+                "addresses; use models with the same control table"
             )
         return SegmentedCycle(cycles, places, self._each)
 
@@ -180,7 +180,7 @@ class SegmentedBus:
 
     @contextmanager
     def _with_port_name(self, servo_id: int) -> Iterator[DynamixelBus]:
-        """Bus of one servo, whose faults are told with the name of its port."""
+        """Bus of one servo, whose faults are reported with the name of its port."""
         bus = self._bus_of[servo_id]
         try:
             yield bus

@@ -25,8 +25,8 @@ _BYTE_NS_BAUD = 10_000_000_000
 LATENCY_ESTIMATE = 0
 """In a plan, 2 numbers: from ``new_latency_estimate``."""
 ZERO_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
-"""Zero of the port's clock; when the request was sent; how long the reply of an irregular cycle may
-still take."""
+"""Zero of the port's clock; time of the request; longest remaining time of the reply of an
+irregular cycle."""
 WRITE_BYTES, REQUEST_BYTES, HEADS_END, IDS_END, ERROR_END = 5, 6, 7, 8, 9
 """Length of the sync write and of the request behind it; where in ``work`` the expected heads of
 the replies end, the IDs, and the error bytes. The reply stands behind them."""
@@ -176,7 +176,7 @@ class SerialFastPath:
 
     @property
     def remaining_s(self) -> float:
-        """How long the reply of an irregular cycle may still take."""
+        """Longest remaining time of the reply of an irregular cycle."""
         return float(self._plan[REMAINING_NS] * 1e-9)
 
     def write(self, goals: NDArray[np.int32]) -> int:

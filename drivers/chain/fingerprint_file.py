@@ -44,7 +44,7 @@ class FingerprintFile:
         self.path = fingerprint_path(robot_file)
 
     def read(self) -> dict[int, dict[str, int]] | None:
-        """Fingerprints by servo ID; None if there is no file.
+        """Fingerprints by servo ID; None without a file.
 
         Raises:
             ConfigError: the file is broken.
@@ -60,8 +60,8 @@ class FingerprintFile:
             return _parse(text)
         except (tomllib.TOMLDecodeError, ValueError) as error:
             raise ConfigError(
-                f"{self.path}: is no fingerprint file: {error}; delete it, and the next start "
-                "creates it"
+                f"{self.path}: is not a fingerprint file: {error}; delete it, and the next "
+                "start creates it"
             ) from None
 
     def write(self, fingerprints: Mapping[int, Fingerprint]) -> None:

@@ -102,7 +102,7 @@ class GoalCheck:
             raise BusError(self._fault(sorted(over), sent, explain))
 
     def explain(self, joint: int) -> str | None:
-        """Read the goals once; what is wrong with that of a joint, or None.
+        """Read the goals once; returns the fault of a joint's goal, or None.
 
         Raises:
             PortError: the port is gone.
@@ -115,7 +115,7 @@ class GoalCheck:
         if not reply.valid[joint] or value == sent[joint]:
             return None
         is_foreign = not any(goals[joint] == value for goals in self._sent)
-        cause = _SECOND_MASTER if is_foreign else "its servo does not take the goals"
+        cause = _SECOND_MASTER if is_foreign else "its servo ignores the goals"
         return f"Goal Position is {value}, not {sent[joint]}: {cause}"
 
     def _note(self, joint: int, value: int) -> None:

@@ -82,7 +82,9 @@ def check_stillness(
     joint = int(np.argmax(np.where(np.isnan(moved_rad), np.inf, moved_rad)))
     name = robot.joint_label(joint)
     if np.isnan(moved_rad[joint]):
-        text = f"{name}: its servo does not tell that it is this joint's: two servos with one ID?"
+        text = (
+            f"{name}: its servo's reply does not identify it; check whether two servos have this ID"
+        )
     else:
         text = (
             f"{name}: read {position_rad[joint] - found_rad[joint]:+.2f} rad from where it was "

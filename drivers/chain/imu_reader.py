@@ -14,7 +14,7 @@ from snakewalk.drivers.protocol.imu_table import BLOCK_BYTES, IMU_TABLES, ImuSam
 from snakewalk.drivers.types import ImuState
 
 SILENT_S = 1.0
-"""After so long without a reading this is told (ours)."""
+"""A pause without a reading of this length is reported (ours)."""
 
 
 class ImuReader:
@@ -43,8 +43,8 @@ class ImuReader:
             reply = self._bus.ping(config.id)
         except NoAnswerError:
             raise ChainError(
-                f"imu (ID {config.id}): no answer at {self._port.getBaudRate()} baud: power, "
-                "cable, id or baud rate; without one, take [imu] out of the robot's file"
+                f"imu (ID {config.id}): no reply at {self._port.getBaudRate()} baud; check "
+                "power, cable, id and baud rate, or remove [imu] from the robot's file"
             ) from None
         if number is not None and reply.model_number != number:
             raise ChainError(

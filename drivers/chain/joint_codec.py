@@ -1,7 +1,7 @@
 """Joint goals (rad) to raw goal positions, and raw state blocks to a ``JointState`` (SI units).
 
 Here, and nowhere else, joints become servos: ``JointUnits`` has each servo's scales, the sign of
-its mounting and the place of its zero. What is above knows joints only.
+its mounting and the place of its zero. The layers above know joints only.
 """
 
 import math
@@ -232,9 +232,9 @@ class Readings:
     def update(
         self, reply: GroupReadReply, measured_at_s: float, *, again: bool = False
     ) -> Sequence[int]:
-        """Take new state blocks; returns the joints whose alarm (register 70) must be read.
+        """Decode new state blocks; returns the joints whose alarm (register 70) must be read.
 
-        Where it is read ``again`` in a cycle, what came the first time is of this cycle as well.
+        If it is read ``again`` in a cycle, the first values are of this cycle as well.
         """
         ok = reply.valid
         if reply.flawless and not self._alarmed:  # the regular case
@@ -258,20 +258,20 @@ class Readings:
         return np.flatnonzero(alert & (self._hardware_error == 0)).tolist()
 
     def update_alarm(self, joint: int, hardware_error: int) -> None:
-        """Take one joint's register 70."""
+        """Store one joint's register 70."""
         self._hardware_error[joint] = hardware_error
         self._alarmed = True
         self._flags = self._frozen_flags()
 
     def dismiss_alert(self, joint: int) -> None:
-        """Take the alert bit of one joint's newest reply back: its register 70 shows no alarm."""
+        """Clear the alert bit of one joint's newest reply: its register 70 shows no alarm."""
         self._error[joint] &= 0xFF ^ ALERT
         self.alert = bool((self._error & ALERT).any())
         self._flags = self._frozen_flags()
 
     def update_slow(self, reply: GroupReadReply, measured_at_s: float) -> None:
-        """Take the slow blocks: Present Input Voltage (2 bytes), Present Temperature (1)."""
-        ok = slice(None) if reply.flawless else reply.valid  # picking rows takes 30 us
+        """Decode the slow blocks: Present Input Voltage (2 bytes), Present Temperature (1)."""
+        ok = slice(None) if reply.flawless else reply.valid  # picking rows needs 30 us
         self._voltage[ok] = voltages_v(reply.data[ok])
         self._temperature[ok] = reply.data[ok, 2]
         self._slow_measured_at_s[ok] = measured_at_s
@@ -294,7 +294,7 @@ class Readings:
         numbers.setflags(write=False)
         current, velocity, position, temperature, voltage, age_s, slow_age_s = numbers
         hardware_error, error, valid = self._flags
-        return JointState(  # by place: by name it takes three times as long
+        return JointState(  # by place: by name it needs three times as long
             now_s,
             position,
             velocity,
@@ -309,7 +309,7 @@ class Readings:
         )
 
     def _frozen_flags(self) -> tuple[Bytes, Bytes, Bools]:
-        """Read-only copies of what rarely changes; the same objects until it does."""
+        """Read-only copies of rarely changing values; the same objects until they change."""
         return _frozen(self._hardware_error), _frozen(self._error), _frozen(self._valid)
 
 

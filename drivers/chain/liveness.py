@@ -159,7 +159,7 @@ class LivenessCheck:
         raise BusError(f"{names}: {self._difference(check, joint, value)}")
 
     def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
-        """What the value of a register means that is not as expected."""
+        """Meaning of an unexpected value of a register."""
         name, expected = check.register.name, check.expected[joint]
         if check is self._torque:
             return "torque is off: has it rebooted?"
@@ -215,7 +215,7 @@ class RegisterCheck:
     expected: Mapping[int, int]
     """By joint, in the order of ``ids``."""
     raw: bytes
-    """Of it, in that order, as they stand in the reply."""
+    """Bytes of the block, in that order, as in the reply."""
 
     @classmethod
     def of(

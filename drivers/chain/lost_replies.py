@@ -1,4 +1,4 @@
-"""Lost replies: whether so many are lost that the line, not a servo, is at fault."""
+"""Lost replies: whether their number shows a fault of the line, not of a servo."""
 
 from collections import deque
 

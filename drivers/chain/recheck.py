@@ -27,7 +27,7 @@ class Recheck:
     """Joints whose torque is off, or whose registers are not as they were set: their servos have
     rebooted, or another program has written to them."""
     names: tuple[str, ...]
-    """Of these joints."""
+    """Names of these joints."""
     moved_rad: Floats
     """(J,) from where each joint was believed to be to where it is; NaN where it was not read."""
     position_rad: Floats
@@ -64,7 +64,7 @@ def recheck(
     fingerprints: Mapping[int, Fingerprint],
     believed_rad: Floats,
 ) -> Recheck:
-    """Compare model, firmware, alarm, torque, settings and position with what they were.
+    """Compare model, firmware, alarm, torque, settings and position with their earlier values.
 
     Args:
         bus: where the servos are.

@@ -46,7 +46,7 @@ _SLOW_S = 1.0
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
 _HOLD_READS = 2
-"""Reads in which the servos may tell where they are before they hold (ours)."""
+"""Reads in which the servos may report their positions before they hold (ours)."""
 STILL_RAD = 0.1
 """A joint that is read farther from where it was just set to hold is not the one that holds
 (ours)."""
@@ -91,10 +91,6 @@ class ServoChain:
         given up, and when replies get lost again and again."""
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
-        self.checks_in_read = True
-        """Whether every ``read`` calls ``check_servos``; a ``SafeLink`` calls it after the goals.
-
-        A ``read`` behind another calls it in any case."""
         self._bus = bus
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock
@@ -114,8 +110,10 @@ class ServoChain:
         self._prepare_reads(fast=True)
         self._imu = None if robot.imu is None else ImuReader(bus, robot.imu)
         self._reads = 0
-        self._has_time: bool | None = None
-        self._has_written = False
+        self._due: bool | None = None
+        """Check of the newest read: whether its cycle has time to repeat one; None: it is made."""
+        self._is_called = False
+        """Whether ``check_servos`` was called since the last read; the next read leaves it out."""
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
@@ -138,7 +136,7 @@ class ServoChain:
 
     @property
     def counters(self) -> CycleCounters:
-        """What went wrong on the wire so far."""
+        """Faults on the wire so far."""
         return self._cycle.counters
 
     @property
@@ -182,7 +180,7 @@ class ServoChain:
         return self._begin()
 
     def recheck(self, believed_rad: Floats) -> Recheck:
-        """Compare the chain after an interruption with what it was; moves nothing.
+        """Compare the chain after an interruption with its earlier state; moves nothing.
 
         Args:
             believed_rad: (J,) where its joints were when their readings could last be believed.
@@ -200,10 +198,10 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        A joint that is elsewhere than ``found``, or whose servo does not tell that it is this
-        joint's, is not gone on with: two servos with one ID reply in turn. Servos that lost their
-        torque or their settings (rebooted) are set up again. The others get their watchdog cleared
-        and, right behind it, goal = present.
+        A joint that is elsewhere than ``found``, or whose servo does not identify itself, is not
+        resumed: two servos with one ID reply in turn. Servos that lost their torque or their
+        settings (rebooted) are set up again. The others get their watchdog cleared and, right
+        behind it, goal = present.
 
         Raises:
             ChainError: ``found`` forbids it.
@@ -223,7 +221,7 @@ class ServoChain:
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
-        self._reads, self._has_time = 0, None
+        self._reads, self._due = 0, None
         self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
@@ -257,9 +255,8 @@ class ServoChain:
     def hold(self) -> None:
         """Set the goals to where the joints are.
 
-        A joint whose servo does not tell both in one reply, where it is and that it is this
-        joint's, keeps its goal: it does not reply, or two servos have one ID, or IDs were
-        exchanged.
+        A joint keeps its goal if its servo does not report its position and its identity in one
+        reply: it does not reply, or two servos have one ID, or IDs were exchanged.
 
         Raises:
             PortError: the port is gone.
@@ -332,11 +329,12 @@ class ServoChain:
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
 
-        Where no joint could be read nothing else is asked: that is put off to the next call.
+        Where no joint could be read nothing else is asked: that is put off to the next call. If
+        nobody has called ``check_servos`` since the last read, this one does.
 
         Raises:
             BusError: a servo holds another goal than the one sent to it; raised by
-                ``check_servos``, if ``checks_in_read``.
+                ``check_servos``.
             PortError: the port is gone.
 
         """
@@ -345,24 +343,22 @@ class ServoChain:
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
         read = reply.valid_count
-        losses = self._losses.update(read, len(reply.valid))
-        if losses is not None:
+        if (losses := self._losses.update(read, len(reply.valid))) is not None:
             self.on_event(losses)
         measured_at_s = self._take(reply)
         imu = None
-        if read > 0:  # else what is asked beside it waits, too, and the state grows stale
+        if read > 0:  # else the additional reads wait, too, and the state grows stale
             self._reads += 1
-            is_alone = not self._read_slow(measured_at_s)
-            self._has_time = is_alone and reply.complete
-            if self._liveness is not None:
-                self._check(self._liveness.check_goals, self._has_time)
-            if self.checks_in_read or not self._has_written:
-                self.check_servos()
-            self._has_written = False
+            has_time = not self._read_slow(measured_at_s) and reply.complete
+            if self._liveness is not None and self._check(self._liveness.check_goals, has_time):
+                has_time = False
+            self._due = has_time
+            if not self._is_called:
+                self._make_due_check()
+            self._is_called = False
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
-        if imu is not None:
-            state = state._replace(imu=imu)
+        state = state if imu is None else state._replace(imu=imu)
         self.on_state(state)
         return state
 
@@ -380,7 +376,7 @@ class ServoChain:
         return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
-        """Take in a group read of the state, or one more in this cycle; when it was measured, s."""
+        """Decode a group read of the state, or one more in this cycle; returns its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
         for line in self._alarms.update(alerted):
@@ -390,7 +386,7 @@ class ServoChain:
     def check_servos(self) -> None:
         """Check torque, watchdogs and settings of the servos, one register in a cycle.
 
-        After a read without a reply there is no check.
+        Call it once the goals of a cycle are sent. After a read without a reply there is no check.
 
         Raises:
             BusError: a servo has lost its torque or a setting (it has rebooted, or another program
@@ -398,26 +394,32 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        has_time, self._has_time = self._has_time, None
+        self._is_called = True
+        self._make_due_check()
+
+    def _make_due_check(self) -> None:
+        has_time, self._due = self._due, None
         if has_time is not None and self._liveness is not None:
             self._check(self._liveness.check, has_time)
 
-    def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> None:
-        """Make a check; an alarm of a servo is the reason for what the check finds.
+    def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> bool:
+        """Make a check; return whether all servos were read.
 
-        An alarm that switches a servo off may come between the group read and the check.
+        An alarm that switches a servo off may come between the group read and the check; then the
+        alarm is the reason for what the check finds.
         """
         if not self._armed or self._readings.alert:
-            return
+            return False
         try:
             asked = check(self._reads - 1, has_time=has_time)
             if asked is not None:
-                self._has_time = None  # for another check in this cycle
                 self._sent_at_s = self._clock.now_s() - asked.since_sent_s
         except BusError:
             self._take(self._cycle.read(), again=True)
             if not self._readings.alert:
                 raise
+            return False
+        return asked is not None
 
     def write(self, command: JointCommand) -> None:
         """Send goal positions, kept inside the joint limits.
@@ -435,7 +437,6 @@ class ServoChain:
                 "stopped the servos"
             )
         self._send_goals(command.goal_rad)
-        self._has_written = True
         self._sent_at_s = self._clock.now_s()
 
     def explain(self, joint: int) -> str | None:
@@ -473,7 +474,7 @@ class ServoChain:
         return goals
 
     def _expect(self, name: str, values: Sequence[int]) -> None:
-        """Compare a register of all servos with what was written to it.
+        """Compare a register of all servos with the values written to it.
 
         Raises:
             BusError: a servo holds something else, or does not reply.

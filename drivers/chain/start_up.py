@@ -47,7 +47,7 @@ _REPORTED = (
     *("Torque Enable", "Present Temperature", "Present Input Voltage"),
 )
 _COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position", *FINGERPRINT)
-"""Read along, for whoever compares a servo with what it was."""
+"""Registers read as well, for comparisons of a servo with its earlier state."""
 _STARTUP = "Startup Configuration"
 """A firmware before 45 has none."""
 _SETTINGS = (
@@ -56,7 +56,7 @@ _SETTINGS = (
     *("Current Limit", "Min Position Limit", "Max Position Limit", "Goal Current"),
     *("Goal PWM", "Position P Gain", *SHAPING_SETTINGS, IDENTITY),
 )
-"""What ``configure`` looks at."""
+"""Registers that ``configure`` checks."""
 ALL_REPLY = 2
 """Status Return Level(68)."""
 
@@ -147,7 +147,7 @@ def inspect(
 
 
 def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
-    """Read what a servo tells of itself; changes nothing.
+    """Read a servo's description of itself; changes nothing.
 
     Raises:
         BusError: it does not answer, or refuses.
@@ -180,7 +180,7 @@ class ChainSetting:
     bits: int = -1
     """Mask of the bits that matter; the others stay as they are."""
     usual: bool = True
-    """Whether other values are what a factory or another robot leaves; else a change is told."""
+    """Whether other values come from a factory or another robot; else a change is reported."""
 
     def value_in(self, registers: Mapping[str, int]) -> int:
         """Whole value that the register should hold, where it holds what is in ``registers``."""
@@ -275,7 +275,7 @@ def configure(
         if found[joint]["Bus Watchdog"]:
             bus.write(servo_id, "Bus Watchdog", 0)
     none = ChainSetting("Secondary(Shadow) ID", NO_SECONDARY_ID, usual=False)
-    for joint in which:  # all, before anything that one of them could take for its own
+    for joint in which:  # all, before a packet that one of them might treat as its own
         found[joint] = _apply(bus, robot, joint, (none,), found[joint], on_event)
     return {
         joint: _configure_joint(bus, robot, units, joint, found[joint], on_event) for joint in which
@@ -325,7 +325,7 @@ def identity(joint: int) -> int:
 
 
 def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
-    """What the register says of a joint's servo that is another joint's; None if it is not."""
+    """Return the fault if the register of a joint's servo names another joint; else None."""
     if value == identity(joint) or not 1 <= value <= robot.joint_count:
         return None
     return (
@@ -348,10 +348,10 @@ def _apply(
     found: dict[str, int],
     on_event: Callable[[str], None],
 ) -> dict[str, int]:
-    """Write each setting that differs from what was found, then read all of them back.
+    """Write each setting that differs, then read all of them back.
 
     Returns:
-        What the registers hold now.
+        Present values of the registers.
 
     Raises:
         BusError: one does not hold what it should; or the servo does not answer, or refuses.
@@ -409,8 +409,8 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
 
     Returns the replies to pings of the robot's servos.
 
-    At level 0 a servo replies to pings only, at level 1 to pings and reads: what it must be told
-    is sent without waiting for a reply, and only to servos of the robot's model.
+    At level 0 a servo replies to pings only, at level 1 to pings and reads. Necessary writes are
+    sent without waiting for a reply, and only to servos of the robot's model.
     """
     found = bus.find(robot.servo_ids)
     right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]

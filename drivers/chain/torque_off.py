@@ -65,14 +65,12 @@ class TorqueOff:
         self._report(sorted(silent), faults, ports=len(joints_on))
 
     def _report(self, silent: Sequence[int], faults: Sequence[PortError], ports: int) -> None:
-        """Raise the error of what could not be switched off; nothing if all servos are off."""
+        """Raise the error of servos that are not off, if any."""
         names = ", ".join(map(self._robot.joint_label, silent))
         if faults:
-            which = "its servos: a servo" if ports > 1 else "a servo"
             text = (
-                f"{'; '.join(map(str, faults))}; torque is not off: {which} that has torque holds "
-                f"where its bus watchdog ({self._watchdog_s:.3g} s) stops it: switch the servo "
-                "power off"
+                f"{'; '.join(map(str, faults))}; torque is not off: its servos hold after the bus "
+                f"watchdog ({self._watchdog_s:.3g} s); switch the servo power off"
             )
             if ports > len(faults) and not silent:
                 text += "; on the other ports torque is off"

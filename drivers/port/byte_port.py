@@ -14,14 +14,14 @@ from snakewalk.drivers.errors import PortError
 
 DRAIN_LIMIT_S = 0.1
 """How long a line that does not fall quiet is drained, at most (ours): a stray byte now and then
-must not hold a read for ever. What is left of the noise is for the parser to skip."""
+must not hold a read for ever. The parser skips the remaining noise."""
 
 
 class SdkPort(Protocol):
-    """What ``dynamixel_sdk`` calls; names and units are its own."""
+    """Calls of ``dynamixel_sdk``, with its names and units."""
 
     is_using: bool
-    """True between an instruction and its reply; whoever catches an exception clears it."""
+    """True between an instruction and its reply; the handler of an exception clears it."""
 
     def openPort(self) -> bool:
         """Open (again) at the current baud rate; True on success."""
@@ -61,7 +61,7 @@ class SdkPort(Protocol):
         ...
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Start the time-out for a reply of so many bytes."""
+        """Start the time-out for a reply of ``packet_length`` bytes."""
         ...
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
@@ -92,7 +92,7 @@ class BytePort(SdkPort, Protocol):
 
     @property
     def paced(self) -> bool:
-        """Whether on the clock bytes take the time that the baud rate says.
+        """Whether on the clock bytes need the time of the baud rate.
 
         They do on a wire; not on a pseudo-terminal, and nobody knows behind a network.
         """
@@ -101,7 +101,7 @@ class BytePort(SdkPort, Protocol):
     def write(self, data: bytes) -> None:
         """Send all of ``data`` without waiting until it is on the wire.
 
-        What is written twice in a row goes out back to back, in order.
+        Consecutive writes go out back to back, in order.
         """
         ...
 
@@ -109,7 +109,7 @@ class BytePort(SdkPort, Protocol):
         """Wait for ``count`` bytes, at most until ``clock.now_s() >= deadline_s``.
 
         Returns what has arrived, at most ``count`` bytes: fewer mean that the deadline has passed.
-        With a deadline in the past it returns at once with what is there.
+        With a deadline in the past it returns at once with the bytes that have arrived.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""Base of the byte ports on a line that pyserial opens: what the SDK calls, and the drain."""
+"""Base of the byte ports on a line that pyserial opens: the SDK's calls, and the drain."""
 
 # ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port.byte_port` describes them
 
@@ -28,7 +28,7 @@ class LinePort(ABC):
     """
 
     line_errors: ClassVar[tuple[type[Exception], ...]] = (serial.SerialException, OSError)
-    """What a line that is gone raises."""
+    """Exceptions of a line that is gone."""
     grace_ms: ClassVar[float]
     """How late a reply may be besides its wire time, for the SDK's own time-outs."""
 
@@ -63,7 +63,7 @@ class LinePort(ABC):
 
     @property
     def paced(self) -> bool:
-        """Whether bytes take the time that the baud rate says."""
+        """Whether bytes need the time of the baud rate."""
         return False
 
     @property
@@ -96,7 +96,7 @@ class LinePort(ABC):
                 quiet_at_s = min(self._clock.now_s() + quiet_s, limit_s)
         return drained
 
-    # what the SDK calls
+    # calls of the SDK
 
     def openPort(self) -> bool:
         if self._serial is None:
@@ -156,7 +156,7 @@ class LinePort(ABC):
 
     @property
     def _refusals(self) -> tuple[type[Exception], ...]:
-        """What a line raises that cannot be as it is asked to be, or is gone."""
+        """Exceptions of a line that rejects its settings, or is gone."""
         return (ValueError, *self.line_errors)
 
     @property

@@ -22,7 +22,7 @@ NETWORK_LATENCY_S: Final = 0.1
 """How late a reply may be besides its wire time: a local network and its server (ours)."""
 _POLL_S: Final = 0.001
 """How long a read waits at a time. It stays the same while the port is open: a server of RFC 2217
-would be asked to set up its line anew whenever it changed."""
+would have to set up its line again at each change."""
 _FIXED: Final = ("socket://",)
 """URLs that carry no baud rate: that of the far end stays what it is."""
 _TO_A_HOST: Final = ("socket", "rfc2217")
@@ -110,5 +110,5 @@ def _names_host_and_port(url: str) -> bool:
     try:
         parts = urlsplit(url)
         return bool(parts.hostname and parts.port)
-    except ValueError:  # of a port that is no number up to 65535
+    except ValueError:  # the port is not a number up to 65535
         return False

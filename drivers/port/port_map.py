@@ -20,7 +20,7 @@ def parse_port_map(text: str) -> list[tuple[str, tuple[int, ...]]]:
     """Read ``IDS=PORT,IDS=PORT``, IDs as ``1-8`` or ``1,2,5-8``; ports and the IDs on each.
 
     Raises:
-        InputError: what cannot be read, an ID out of 0 to 252, or a range that runs backwards.
+        InputError: unreadable text, an ID out of 0 to 252, or a range that runs backwards.
 
     """
     found, at = [], 0

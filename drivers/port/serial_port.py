@@ -27,7 +27,9 @@ _LATENCY_MS = 16.0
 _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
 _STUCK_S = 1.0
-"""After so long a device that takes no more bytes is gone."""
+"""A device that accepts no bytes for this time is gone."""
+_OWN = "snakewalk"
+"""Name of the program."""
 
 
 class SerialPort(LinePort):
@@ -84,13 +86,13 @@ class SerialPort(LinePort):
         try:
             sent = 0
             while True:
-                # a device that polls as writable may still take nothing when it is full
+                # a device that polls as writable may still accept nothing when it is full
                 with suppress(BlockingIOError):
                     sent += os.write(fd, data[sent:])
                 if sent == len(data):
                     return
                 if not self._writable.poll(_STUCK_S * 1e3):
-                    raise PortError(f"{self._name}: takes no more bytes")
+                    raise PortError(f"{self._name}: accepts no more bytes; check adapter and cable")
         except OSError as error:
             raise self._lost(error) from error
 
@@ -114,7 +116,7 @@ class SerialPort(LinePort):
             raise self._lost(error) from error
         return got
 
-    # what the SDK calls
+    # calls of the SDK
 
     def closePort(self) -> None:
         self.descriptor = None
@@ -169,7 +171,8 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
         return f"{name}: no permission; join the group that owns it (often 'dialout')"
     if number in (errno.EBUSY, errno.EAGAIN):
         holders = ", ".join(_holders(name))
-        return f"{name}: another program has it open{holders and ': '}{holders}"
+        remedy = f"stop it by: snakewalk stop --port {name}" if _OWN in holders else "close it"
+        return f"{name}: another program has it open{holders and ': '}{holders}; {remedy}"
     if isinstance(error, ValueError):
         return f"{name}: {baud} bit/s is not possible here: {error}"
     if _is_no_terminal(name):
@@ -189,16 +192,29 @@ def _is_no_terminal(device: str) -> bool:
 
 
 def _holders(device: str) -> list[str]:
-    """Programs that have a device open, ``name (process 123)``; those of other users are hidden."""
+    """Programs that have a device open, ``name (process 123)``; those of other users are hidden.
+
+    A process of snakewalk is named with its command and run.
+    """
     path = os.path.realpath(device)
     found = []
     for process in sorted(filter(str.isdigit, os.listdir("/proc")), key=int):
         with suppress(OSError):  # another user's, or ended just now
             descriptors = os.listdir(f"/proc/{process}/fd")
             if any(_leads_to(f"/proc/{process}/fd/{each}", path) for each in descriptors):
-                with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
-                    found.append(f"{file.read().strip()} (process {process})")
+                found.append(f"{_program(process)} (process {process})")
     return found
+
+
+def _program(process: str) -> str:
+    """Name of a process, or the words of a command of snakewalk."""
+    with open(f"/proc/{process}/cmdline", encoding="utf-8", errors="replace") as file:
+        words = file.read().rstrip("\0").split("\0")
+    names = [os.path.basename(word) for word in words[:2]]
+    if _OWN in names:
+        return " ".join([_OWN, *words[names.index(_OWN) + 1 :]])
+    with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
+        return file.read().strip()
 
 
 def _leads_to(link: str, path: str) -> bool:

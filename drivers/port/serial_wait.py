@@ -5,9 +5,9 @@ Linux. They handle the regular case only. After a signal, an error or the deadli
 early, and the methods of ``SerialPort`` continue from there and find the cause.
 
 The time at which a reply is complete is known from its length, to within what the driver and the
-operating system add. So the host sleeps while the reply arrives, wakes shortly before its end, and
-then polls until it is complete. This takes less of the processor than one wake-up for each piece,
-and no extra time. How late (or early) replies really are is estimated from cycle to cycle.
+operating system add. So the host sleeps while the reply arrives and wakes shortly before its end:
+once, instead of once for each piece. Then it polls, or sleeps until the last bytes have arrived.
+How late (or early) replies really are is estimated from cycle to cycle if it polls.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ _PIECE = 64
 _TIMER_SLACK_NS = 50_000
 """Linux ends a sleep up to this much late, so that it can end several at once (prctl(2))."""
 _GAIN = 8
-"""A reply moves the latency estimate by one part in so many (ours)."""
+"""A reply moves the latency estimate by one part in this number (ours)."""
 _LONGEST_STREAK = 16
 _RAW = types.Array(uint8, 1, "C", readonly=True)
 LATE, STREAK = 0, 1
@@ -102,7 +102,7 @@ def receive(
         least_ns: from then until the last byte can have arrived at the earliest.
         wait_ns: from then until the deadline.
         spin_ns: for so long before and after the expected end, poll without sleeping; 0: sleep
-            until bytes arrive, again and again, until the reply is complete.
+            until the earliest possible end, then until bytes arrive, until the reply is complete.
         latency_estimate: (2,) from ``new_latency_estimate``; updated.
 
     """
@@ -132,6 +132,12 @@ def receive(
                 return got
             polled = more < _PIECE
             here_ns = _now_ns(time)
+    else:
+        sleep_ns = begun_ns + least_ns - _TIMER_SLACK_NS - _now_ns(time)
+        if sleep_ns > 0:
+            time[0], time[1] = divmod(sleep_ns, _SECOND_NS)
+            if _ppoll(0, 0, time.ctypes.data, 0) < 0:
+                return got  # a signal
     end_ns = begun_ns + wait_ns
     while True:
         remaining_ns = max(0, end_ns - _now_ns(time))

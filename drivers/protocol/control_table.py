@@ -134,7 +134,7 @@ def load_control_table(model: Model) -> ControlTable:
             record.
 
     Raises:
-        ControlTableError: there is no such model, or it has another protocol.
+        ControlTableError: the model does not exist, or it has another protocol.
 
     """
     return _named(model) if isinstance(model, str) else _table(model)

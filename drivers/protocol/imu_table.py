@@ -105,7 +105,7 @@ BLOCK_BYTES = 12
 
 
 def imu_model(model_number: int) -> ImuModel | None:
-    """Name of the IMU with a published model number; None where it is none of them."""
+    """Name of the IMU with a published model number; None for any other."""
     return next((m for m, table in IMU_TABLES.items() if table.model_number == model_number), None)
 
 
@@ -119,17 +119,17 @@ def decode(imu: ImuConfig, block: bytes) -> ImuSample:
 
 
 def _rotation(halves: bytes) -> Floats | None:
-    """Axes of a quaternion whose vector stands in three half floats; None where there is none."""
+    """Axes of a quaternion whose vector is in three half floats; None without one."""
     vector = np.frombuffer(halves, "<f2").astype(float)
     square = float(vector @ vector)
-    if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN is none, too
+    if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN does not count, either
         return None
     whole = [*vector, np.sqrt(max(0.0, 1.0 - square))]
     return np.asarray(rotations().from_quat(whole).as_matrix())
 
 
 def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Floats) -> bytes:
-    """The same block as the device shows it; what is beyond its range is cut off.
+    """The same block as the device shows it; values beyond its range are cut off.
 
     Args:
         imu: the device.
@@ -140,7 +140,9 @@ def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Flo
     """
     if imu.gyro_range_dps is None or imu.acceleration_range_g is None:
         vector = rotations().from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")
-        vector[vector == 0.0] = -0.0  # not all bytes 0: those mean that there is none yet
+        vector[
+            vector == 0.0
+        ] = -0.0  # not all bytes 0: those mean that the quaternion is still missing
         return _counts(rate_rad_s / GYRO_RAD_S) + bytes(vector.tobytes())
     force = force_m_s2 * (COUNTS / (imu.acceleration_range_g * GRAVITY_M_S2))
     return _counts(force) + _counts(rate_rad_s * (COUNTS / np.deg2rad(imu.gyro_range_dps)))

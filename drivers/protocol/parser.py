@@ -13,7 +13,7 @@ from snakewalk.drivers.protocol.packet import (
     unstuff,
 )
 
-_FIXED = 7  # header, id and length field, in front of what the length counts
+_FIXED = 7  # header, id and length field, in front of the bytes that the length counts
 
 
 class PacketParser:

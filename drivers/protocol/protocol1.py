@@ -14,7 +14,7 @@ MAX_ID = 0xFD
 
 
 class Instruction1(IntEnum):
-    """What a host may ask."""
+    """Instructions of a host."""
 
     PING = 0x01
     READ = 0x02

@@ -1,6 +1,6 @@
 """Meaning of register values in all series of Protocol 2.0: modes, alarm bits, common units.
 
-What differs between models is in their files (``config/servos``). A model without a current sensor
+Differences between models are in their files (``config/servos``). A model without a current sensor
 has Present Load in place of Present Current, the share of full output. The host rejects a model
 with an unknown unit of current: a current of unknown scale must not look like zero, or safe.
 """
@@ -33,7 +33,7 @@ CURRENT_MODES = (CURRENT_MODE, CURRENT_POSITION_MODE)
 """Those that a model without current sensing lacks."""
 
 NO_SECONDARY_ID = 255
-"""Secondary(Shadow) ID(12): values from 253 on are none."""
+"""Secondary(Shadow) ID(12): values from 253 mean that it is not used."""
 SECONDARY_ID_LIMIT = 252
 REVERSE, TIME_PROFILE, TORQUE_ON_BY_GOAL = 0x01, 0x04, 0x08
 """Drive Mode(10), bits 0, 2 and 3."""

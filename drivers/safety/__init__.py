@@ -1,1 +1,1 @@
-"""What may pass to the servos, and what happens when it may not."""
+"""Rules for commands to the servos, and the reaction to a violation."""

@@ -44,6 +44,8 @@ class ChainLoad:
         """Drawn by the chain now."""
         self.charge_ah = 0.0
         """Drawn since the start."""
+        self.hottest_c = -math.inf
+        """Temperature of the hottest winding; -inf before one is known."""
         self._time_s = math.inf
 
     def update(self, state: JointState) -> None:
@@ -51,9 +53,9 @@ class ChainLoad:
         step_s = min(max(state.time_s - self._time_s, 0.0), LONGEST_STEP_S)
         self._time_s = state.time_s
         share = -math.expm1(-step_s / WINDING_TIME_S)
-        self.current_a = _draw(
-            *(state.current_a, state.velocity_rad_s, state.voltage_v, self._motor),
-            *(WINDING_SHARE, share, self.winding_k),
+        self.current_a, self.hottest_c = _draw(
+            *(state.current_a, state.velocity_rad_s, state.voltage_v, state.temperature_c),
+            *(self._motor, WINDING_SHARE, share, self.winding_k),
         )
         self.charge_ah += self.current_a * step_s / 3600.0
 
@@ -84,23 +86,26 @@ def motor_columns(robot: RobotConfig) -> Floats:
 
 
 @compiled(
-    f"float64({', '.join([_FLOATS] * 3)}, float64[:, ::1], float64, float64, float64[::1])",
+    f"UniTuple(float64, 2)({', '.join([_FLOATS] * 4)}, float64[:, ::1], float64, float64,"
+    " float64[::1])",
     makes_arrays=False,
 )
 def _draw(
     current_a: Floats,
     velocity_rad_s: Floats,
     voltage_v: Floats,
+    temperature_c: Floats,
     motor: Floats,
     winding_share: float,
     time_share: float,
     winding_k: Floats,
-) -> float:
-    """Current that all bridges draw, A; ``winding_k`` (J,) moves towards its equilibrium.
+) -> tuple[float, float]:
+    """Current that all bridges draw, A, and temperature of the hottest winding.
 
-    A value that was not read (NaN) counts as zero, a voltage as the nominal one.
+    ``winding_k`` (J,) moves towards its equilibrium. A current or speed that was not read (NaN)
+    counts as zero, a voltage as the nominal one; a winding without a temperature does not count.
     """
-    total_a = 0.0
+    total_a, hottest_c = 0.0, -np.inf
     for k in range(len(current_a)):
         resistance_ohm, emf_v_s, standby_a = motor[0, k], motor[1, k], motor[2, k]
         amps = current_a[k] if np.isfinite(current_a[k]) else 0.0
@@ -110,4 +115,6 @@ def _draw(
         total_a += standby_a + duty * abs(amps)
         target_k = winding_share * motor[3, k] * resistance_ohm * amps * amps
         winding_k[k] += time_share * (target_k - winding_k[k])
-    return total_a
+        if temperature_c[k] + winding_k[k] > hottest_c:  # noqa: PLR1730  a NaN stays out
+            hottest_c = temperature_c[k] + winding_k[k]
+    return total_a, hottest_c

@@ -1,4 +1,4 @@
-"""Limits of what may pass to the servos, of one robot in one run."""
+"""Limits of commands to the servos, of one robot in one run."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ a link that falls off an edge was measured at 0.12."""
 _LEAST_LIMIT_A = 0.05
 """A tenth of a lower limit of the current is lost in the sensor's resolution (ours)."""
 EFFORT_SHARE = 0.5
-"""Of the pitch joints' current (ours); held off by the ground they were measured at over 0.8."""
+"""Share of the pitch joints' current (ours); held off by the ground they were measured at over
+0.8."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,10 +34,9 @@ class LoadLimits:
                 f"the chain draws about {load.current_a:.1f} A for {over_s:.2f} s, more than its "
                 f"fuse of {limits.fuse_a:g} A (power.fuse_a of the robot)"
             )
-        winding_c = load.winding_c(state)
-        too_hot = winding_c > limits.winding_limit_c
-        if too_hot.any():
-            joint = int(np.argmax(too_hot))
+        if load.hottest_c > limits.winding_limit_c:
+            winding_c = load.winding_c(state)
+            joint = int(np.argmax(winding_c > limits.winding_limit_c))
             return (
                 f"{limits.joint_names[joint]}: winding at about {winding_c[joint]:.0f} C, over "
                 f"{limits.winding_limit_c:g} C (safety.winding_limit_c): its housing is at "

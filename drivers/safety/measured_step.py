@@ -25,7 +25,7 @@ class MeasuredSteps:
         """(J,) what was read and not believed; NaN where the last reading was."""
 
     def reset(self) -> None:
-        """Forget what was doubted: the joints were looked at anew."""
+        """Forget the doubted values: the joints were read again."""
         self._doubted_rad = None
 
     def update(self, state: JointState, believed: JointState) -> tuple[JointState, str | None]:

@@ -1,8 +1,8 @@
-"""Recovery: what happens when the line or a servo goes away in the middle of a run.
+"""Recovery: the reaction to a line or a servo that goes away during a run.
 
 The servos hold by themselves: their watchdogs stop them where they are, torque on. The recovery
-opens the port again, compares the chain with what it was, and goes on from its present pose; but
-only if the run's policy, or an operator, allows it.
+opens the port again, compares the chain with its earlier state, and goes on from its present pose;
+but only if the run's policy, or an operator, allows it.
 
 A servo that an overload has shut down can be brought back in the same way, if the run allows it: it
 is rebooted first. No other alarm is recovered from.
@@ -59,7 +59,7 @@ class RecoverableLink(Protocol[C]):
         ...
 
     def recheck(self, believed_rad: Floats) -> C:
-        """Compare the chain with what it was, and with where its joints were believed to be."""
+        """Compare the chain with its earlier state and its joints with believed positions."""
         ...
 
     def resume(self, found: C) -> JointState:

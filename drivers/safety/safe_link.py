@@ -32,10 +32,10 @@ from snakewalk.drivers.safety.vet import (
 from snakewalk.drivers.types import JointCommand, JointState
 
 RESTART_S = 2.0
-"""After a servo's reboot the goals' rate grows for so long until it is the limit again (ours)."""
+"""After a servo's reboot the goals' rate grows for this time until it is the limit again (ours)."""
 _OFF_TRIES = 3
-"""Reads after a trip that ask again for a torque off that was not confirmed (ours): each may take
-as long as the trip's own did."""
+"""Reads after a trip that repeat a torque off that was not confirmed (ours): each may last as long
+as the trip's own did."""
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 """SIGQUIT is Ctrl-\\. SIGTSTP is Ctrl-Z: a program that is stopped cannot switch torque off, and
 the watchdogs would leave the servos holding with torque on."""
@@ -77,7 +77,7 @@ class SafeLink:
         self.tripped: str | None = None
         """Why it has latched; None while it lets commands pass."""
         self.last_verdict: Verdict | None = None
-        """Of the last command."""
+        """Verdict on the last command."""
         self.recoveries = 0
         """Interruptions and overloads that were recovered from."""
         self._tripped_by: str | None = None
@@ -85,7 +85,7 @@ class SafeLink:
         self._check_servos: Callable[[], None] = lambda: None
         if isinstance(link, CheckingLink):
             # after the goals, so that the time from a state to its goals is the same in all cycles
-            link.checks_in_read, self._check_servos = False, link.check_servos
+            self._check_servos = link.check_servos
         self._recovery = recovery
         self._limits = limits
         self._limits_at_start = replace(limits, voltage_time_s=0.0)
@@ -111,7 +111,8 @@ class SafeLink:
     def __enter__(self) -> "SafeLink":
         if threading.current_thread() is threading.main_thread():
             for number in _SIGNALS:
-                # what a shell starts beside itself ignores SIGINT: it has to stop all the same
+                # programs that a shell starts in the background ignore SIGINT: they have to stop
+                # all the same
                 ignored = number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
                 if not ignored:
                     softly = number == signal.SIGINT and self._hold is not None
@@ -165,8 +166,8 @@ class SafeLink:
         """Check and set up the servos, torque on.
 
         Raises:
-            SafetyTrippedError: latched, or the state found is a reason to latch.
-            DriverError: what the link below raises.
+            SafetyTrippedError: latched, or the state found is a reason to latch. DriverError:
+            errors of the link below.
 
         """
         self._refuse_to_start()
@@ -457,12 +458,12 @@ class SafeLink:
     def _switch_off_again(self) -> None:
         """Ask for the torque off that the trip could not confirm."""
         self._off_tries -= 1
-        with suppress(DriverError):  # the trip has told it
+        with suppress(DriverError):  # the trip has reported it
             self.disable()
             self._on_event("torque off is confirmed now")
 
     def _stop(self) -> str | None:
-        """Why somebody has asked for a stop; None where nobody has."""
+        """Reason of a requested stop; None without a request."""
         return self._stop_requested or self._asked_to_stop()
 
     def _refuse_to_start(self) -> None:

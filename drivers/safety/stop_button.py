@@ -1,11 +1,12 @@
 """The stop button: a small private file through which another program latches a run's safe link.
 
-A program that moves servos makes one and keeps it locked; the lock is gone when the program is,
-and a file that nobody locks is no button. It is mapped into memory, so that looking at it in every
-cycle costs no call of the system, and who presses it can never delay the run.
+A program that moves servos makes one and keeps it locked. The lock is gone when the program is, and
+an unlocked file is not a button. It is mapped into memory, so that looking at it in every cycle
+costs no call of the system, and who presses it can never delay the run.
 
-Layout: a byte that is 1 once pressed, a byte that is 1 once the run has ended, who pressed it and
-how it ended (length and text each), and as JSON what runs. A text is written before its byte.
+Layout: a byte that is 1 once pressed, a byte that is 1 once the run has ended, the name of the
+person who pressed it and the end of the run (length and text each), and a description of the run as
+JSON. A text is written before its byte.
 """
 
 import getpass
@@ -27,7 +28,7 @@ from snakewalk.drivers.port.byte_port import is_url
 
 try:
     import fcntl
-except ImportError:  # Windows: what was killed leaves a button, until somebody deletes its file
+except ImportError:  # Windows: a killed program leaves a button until its file is deleted
     fcntl = None  # type: ignore[assignment]
 
 _HAS_LOCKS: bool = fcntl is not None
@@ -42,11 +43,11 @@ _OPEN_FLAGS: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 @dataclass(frozen=True, slots=True)
 class StoppableRun:
-    """What a button belongs to."""
+    """Program and run of a button."""
 
     process: int
     name: str
-    """Of the run, for people."""
+    """Name of the run, for people."""
     ports: tuple[str, ...]
     """As ``resolved`` says them; none in simulation."""
     folder: str | None
@@ -81,7 +82,7 @@ class StopButton:
         self._map = mmap.mmap(self._file, _BYTES)
         _write_text(self._map, _RUN, json.dumps(asdict(self.run)))
         self.path = Path(made).with_suffix(_SUFFIX)
-        """Whoever is to be able to press it gets this."""
+        """Path of the file, for programs that may press it."""
         if not kind:
             os.replace(made, self.path)
 
@@ -105,7 +106,7 @@ class StopButton:
         return f"stop requested by {_read_text(self._map, _WHO) or 'an operator'}"
 
     def end(self, how: str) -> None:
-        """Take the button away, and tell who waits for it how the run ended; safe to call twice."""
+        """Remove the button, and report the end to waiting programs; safe to call twice."""
         if self._map.closed:
             return
         if _HAS_LOCKS:
@@ -114,7 +115,7 @@ class StopButton:
         self._map[_ENDED] = 1
         self._map.close()
         os.close(self._file)
-        if not _HAS_LOCKS:  # Windows deletes no open file, nor one that somebody else has open
+        if not _HAS_LOCKS:  # Windows deletes no open file, also if another program has it open
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
 
@@ -123,7 +124,7 @@ class PressedButton:
     """Another program's button, seen from outside; a context manager.
 
     Raises:
-        OSError: there is no such file, or it is another user's.
+        OSError: the file does not exist, or it is another user's.
 
     """
 
@@ -132,7 +133,9 @@ class PressedButton:
         try:
             info = os.fstat(self._file)
             if not _is_mine(info) or info.st_size != _BYTES:
-                raise PermissionError(f"{path}: is no stop button of this user")
+                raise PermissionError(
+                    f"{path}: is not a stop button of this user; name a run of this user"
+                )
             self._map = mmap.mmap(self._file, _BYTES)
             known = parse_json(_read_text(self._map, _RUN))
             self.run = StoppableRun(**known | {"ports": tuple(known["ports"])})
@@ -154,7 +157,7 @@ class PressedButton:
         self.close()
 
     def close(self) -> None:
-        """Let go of it; what was pressed stays pressed."""
+        """Release it; a pressed button stays pressed."""
         self._map.close()
         os.close(self._file)
 
@@ -164,7 +167,7 @@ class PressedButton:
         if not _HAS_LOCKS:
             return not self._map[_ENDED]
         try:
-            # shared: two who look at once do not take each other for the holder
+            # shared: two readers at once do not look like the holder
             fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
@@ -191,7 +194,7 @@ def button_folder() -> Path:
     """Return the folder of this user's buttons, made if need be.
 
     Raises:
-        InputError: it is somebody else's, or others may write to it.
+        InputError: it is another user's, or others may write to it.
 
     """
     runtime = os.environ.get("XDG_RUNTIME_DIR")

@@ -177,6 +177,6 @@ def parse_stop_output(text: str) -> StopOutput:
             return StopCommand(words)
         raise ValueError(f"{text!r}: the program needs its absolute path")
     raise ValueError(
-        f"{text!r} is no stop output; give rts:PORT, -rts:PORT, dtr:PORT, -dtr:PORT "
-        "or command:/PROGRAM ARGUMENT ..."
+        f"{text!r} is not a stop output; use rts:PORT, -rts:PORT, dtr:PORT, -dtr:PORT or "
+        "command:/PROGRAM ARGUMENT ..."
     )

@@ -1,9 +1,9 @@
 """Vetting: a pure function that decides which command passes, below every source of motion.
 
 Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which makes the
-torque). What no healthy run shows is vetoed: values that are not numbers, a joint forced beyond its
-limit, an alarm, lasting over-current, heat, a supply that is too high or too low for a while, a
-state that is too old.
+torque). States that no healthy run shows are vetoed: values that are not numbers, a joint forced
+beyond its limit, an alarm, lasting over-current, heat, a supply that is too high or too low for a
+while, a state that is too old.
 """
 
 import math
@@ -33,7 +33,7 @@ class CheckedState(NamedTuple):
 
 
 class SafetyMemory(NamedTuple):
-    """What the next check needs of the last one."""
+    """Results of the last check that the next one needs."""
 
     time_s: float
     """When ``goal_rad`` was sent."""
@@ -150,10 +150,10 @@ def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyL
 
 
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
-    """The first joint that was not read for too long, as one line; None if there is none."""
+    """The first joint that was not read for too long, as one line; None if all were read."""
     since_s = now_s - state.time_s
     # the greatest age stands for all, as rounding keeps the order; not so for a NaN
-    if np.maximum.reduce(state.age_s) + since_s <= limits.stale_limit_s:
+    if _oldest_s(state.age_s) + since_s <= limits.stale_limit_s:
         return None
     age_s = state.age_s + since_s
     joint = int(np.argmin(age_s <= limits.stale_limit_s))
@@ -169,7 +169,7 @@ def state_fault(
 ) -> str | None:
     """First reason to stop that the state gives; None if all is well.
 
-    Temperature and voltage that were never read (NaN) are no reason: a link may have none.
+    Temperature and voltage that were never read (NaN) are accepted: a link may lack them.
     """
     stale = stale_fault(state, limits, now_s)
     if stale is not None:
@@ -232,7 +232,7 @@ def overloaded_joint(state: JointState) -> int | None:
 
 
 def without_alarm(state: JointState, joint: int) -> JointState:
-    """The state as if this joint had none: what else is wrong shows."""
+    """The state as if this joint had no alarm, so that other faults show."""
     hardware_error, error = state.hardware_error.copy(), state.error.copy()
     hardware_error[joint] = 0
     error[joint] &= 0xFF ^ ALERT
@@ -242,7 +242,8 @@ def without_alarm(state: JointState, joint: int) -> JointState:
 def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> float:
     """Greatest age of a state that passes the quick check; NaN if it does not.
 
-    The quick check costs a tenth of ``state_fault`` and is stricter: what fails it is left to that.
+    The quick check costs a tenth of ``state_fault`` and is stricter: a state that fails it goes to
+    that.
     """
     never = _never(len(last.over_current_since_s))
     if last.over_current_since_s is not never or last.under_voltage_since_s is not never:
@@ -256,7 +257,7 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
             *(limits.limit_slack_rad, limits.current_limit_a, limits.temperature_limit_c),
             *(limits.voltage_min_v, limits.voltage_max_v, limits.slow_stale_limit_s),
         )
-    except TypeError:  # a link with other number types: state_fault takes any
+    except TypeError:  # a link with other number types: state_fault accepts any
         return math.nan
 
 
@@ -283,7 +284,7 @@ def _quick_check(
     voltage_max_v: float,
     slow_age_max_s: float,
 ) -> float:
-    """Greatest age if every value is a number inside its limits and there is no error; else NaN."""
+    """Greatest age if every value is a number inside its limits and without an error; else NaN."""
     age_max_s = -np.inf
     for k in range(len(position_rad)):
         # a comparison with a NaN is false, so a value that was not read is not inside
@@ -300,6 +301,18 @@ def _quick_check(
             return np.nan
         age_max_s = max(age_max_s, age_s[k])
     return age_max_s
+
+
+@compiled(f"float64({_FLOATS})", makes_arrays=False)
+def _oldest_s(age_s: Floats) -> float:
+    """Greatest of the ages; NaN if one is not a number."""
+    oldest_s = -np.inf
+    for k in range(len(age_s)):
+        if not age_s[k] <= oldest_s:
+            oldest_s = age_s[k]
+            if np.isnan(oldest_s):
+                break
+    return oldest_s
 
 
 @compiled(

@@ -1,8 +1,8 @@
 """Alarms of a servo of Protocol 1.0: a blocked shaft, heat, a supply out of range.
 
-An alarm is a bit of the error byte of every answer while its cause lasts. Those in the mask of
-Shutdown(18) also set Torque Limit(34) to 0 and switch the torque off, and stay until the cause is
-gone and Torque Limit is set to something else, or until the power comes back. (e-manual, AX-12A,
+An alarm is a bit of the error byte of every answer while its cause lasts. Alarms in the mask of
+Shutdown(18) also set Torque Limit(34) to 0 and switch the torque off. They stay until the cause is
+gone and Torque Limit is set to another value, or until the power comes back. (e-manual, AX-12A,
 Alarm Shutdown, Torque Limit; Protocol 1.0, Error.)
 """
 
@@ -88,7 +88,7 @@ class Ax12Alarms:
         target_c = AMBIENT_C + motor.winding_k_per_w * motor.resistance_ohm * amps**2
         share = 1.0 - np.exp(-seconds / motor.thermal_time_s)
         self.temperature_c += (target_c - self.temperature_c) * share
-        full = np.where(drive.pwm_limit > 0.0, drive.pwm_limit, 1.0)  # 0 of 0 is no effort
+        full = np.where(drive.pwm_limit > 0.0, drive.pwm_limit, 1.0)  # 0 of 0 means no effort
         on, slow_rad_s = drive.torque_on, self._slow_rad_s
         count_blocked(self._blocked_s, seconds, pwm, full, on, velocity_rad_s, slow_rad_s)
         tenths = np.rint(drive.supply_v * 10.0)

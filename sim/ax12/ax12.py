@@ -156,7 +156,7 @@ class Ax12Servos:
         self["Goal Position"][row] = self["Present Position"][row]
 
     def cut_power(self, rows: Indices) -> None:
-        """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
+        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
         self.powered[rows] = False
 
     def restore_power(self, rows: Indices) -> None:
@@ -226,7 +226,7 @@ class Ax12Servos:
         return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
 
     def _update_turns(self) -> None:
-        """Take the turn of each free shaft anew: the sensor counts none, so it may have changed."""
+        """Update the turn of each free shaft: the sensor counts none, so it may have changed."""
         free = ~self._on() | self._wheel()
         turn_rad = TURN_RAD * np.rint(self.plant.position_rad / TURN_RAD)
         self._turn_rad = np.where(free, turn_rad, self._turn_rad)

@@ -1,8 +1,8 @@
 """Decoder of Protocol 1.0 into words, packet by packet, with the registers of one model.
 
-A status packet looks like an instruction packet. A packet with the ID of the last instruction, and
-of the length that its reply must have, is taken for the reply; so an instruction that gets no reply
-and is repeated at once looks like one with a reply.
+A status packet looks like an instruction packet. A packet with the ID of the last instruction and
+the length of its reply is decoded as the reply. So an instruction without a reply that is repeated
+at once looks like one with a reply.
 """
 
 from collections.abc import Iterator

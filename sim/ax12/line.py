@@ -89,7 +89,7 @@ class Ax12Line(Wire):
         """Do nothing: replies of Protocol 1.0 name the error, and have no alert bit."""
 
     def refresh_ids(self) -> None:
-        """Nothing to do: the IDs are looked up anew for every packet."""
+        """Do nothing: the IDs are looked up again for every packet."""
 
     def shown(self, register: str) -> NDArray[np.unsignedinteger]:
         """(S,) values of a register as a read now would show them; a copy."""
@@ -105,7 +105,7 @@ class Ax12Line(Wire):
         self._reader.reset()
 
     def _on_baud_change(self, baud: int) -> None:
-        del baud  # looked up anew for every packet
+        del baud  # looked up again for every packet
 
     def _split(self, data: bytes) -> Sequence[bytes]:
         frames, at = [], 0

@@ -75,7 +75,7 @@ class FaultyServos(Protocol):
         ...
 
     def cut_power(self, rows: Indices) -> None:
-        """Take the supply away."""
+        """Switch the supply off."""
         ...
 
     def restore_power(self, rows: Indices) -> None:
@@ -136,7 +136,7 @@ class FaultTarget(Protocol):
         ...
 
     def disconnect(self) -> None:
-        """Take the port away from the host."""
+        """Disconnect the port from the host."""
         ...
 
     def reconnect(self) -> None:

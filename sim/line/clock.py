@@ -1,4 +1,4 @@
-"""Simulated time: it passes only when somebody waits for it, or as real time does."""
+"""Simulated time: it passes only while a caller waits for it, or as real time does."""
 
 from snakewalk.drivers.clock import WallClock
 
@@ -32,7 +32,7 @@ class SimClock:
 class RealTimeClock(SimClock):
     """Simulated time that is real time, from 0 on: for servos that share a bus with real ones.
 
-    What the host waits for, it waits for indeed; physics catches up whenever the line is used.
+    A wait of the host is a real wait; physics catches up whenever the line is used.
     """
 
     def __init__(self) -> None:

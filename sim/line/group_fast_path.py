@@ -2,8 +2,8 @@
 
 A slice of the control tables and one CRC pass give the same bytes as
 ``sim.line.instruction_handler`` does servo by servo (a test compares them), at a cost that hardly
-grows with the number of servos. What is not plain, such as stuffing, a missing ID or a silent
-servo, is left to the handler.
+grows with the number of servos. Stuffing, a missing ID, a silent servo and other special cases are
+left to the handler.
 """
 
 from abc import ABC, abstractmethod
@@ -59,7 +59,7 @@ class GroupRead(ABC):
         return self._cut(self._packet.tobytes(), whole)
 
     def decoded(self, table: Bytes, request: GroupReadRequest, data: Bytes, error: Bytes) -> int:
-        """What ``drivers.protocol.frames`` finds in these replies, which come in one piece.
+        """Return the result of ``drivers.protocol.frames`` for these replies in one piece.
 
         Args:
             table: of the servos.

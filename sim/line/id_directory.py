@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from snakewalk.sim.servo.bank import ServoBank
 
 NOBODY, SPECIAL = -1, -2
-"""Entries of ``IdDirectory.rows`` that are no row."""
+"""Entries of ``IdDirectory.rows`` that are not rows."""
 _SECONDARY_OFF = 253
 """Secondary(Shadow) ID(12) from here on means none (e-manual)."""
 

@@ -51,7 +51,7 @@ class InstructionHandler:
         self.baud = baud
         self.directory = IdDirectory(self.bank)
         self.version = 0
-        """Grows whenever registers were written: what others have looked up may have changed."""
+        """Increases whenever registers are written, so that cached values expire."""
         self.collisions = 0
         """Replies that were garbled because several servos replied at once."""
         self.refresh_ids()
@@ -103,7 +103,7 @@ class InstructionHandler:
         return imu if heard else None
 
     def _group(self, code: int, params: bytes) -> list[Reply]:
-        """Execute an instruction to a group; it is none for a single servo."""
+        """Execute an instruction to a group; it returns nothing for a single servo."""
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
             return self._sync_read(params, fast=code == Instruction.FAST_SYNC_READ)
         if code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
@@ -145,7 +145,7 @@ class InstructionHandler:
         return 0, self.bank.table[row, address : address + length].tobytes()
 
     def _blocks(self, servo_id: int, address: int, length: int) -> list[_Block]:
-        """What each device with this ID replies to a read."""
+        """Reply of each device with this ID to a read."""
         rows = [
             row
             for row in self.directory.replying(servo_id)

@@ -13,7 +13,7 @@ class RxQueue:
         self.byte_s = 1e-5
         """Time of one byte on the wire."""
         self.packets: deque[tuple[float, bytes]] = deque()
-        """What is under way or waits to be taken, each with the time at which it begins."""
+        """Packets under way or not yet read, each with the time at which it begins."""
 
     def add(self, start_s: float, data: bytes) -> float:
         """Put a packet on the wire at ``start_s``; returns when its last byte will have arrived."""
@@ -30,10 +30,10 @@ class RxQueue:
         return sum(self._arrived(packet, now_s) for packet in self.packets)
 
     def due_s(self, count: int) -> float | None:
-        """When ``count`` bytes will have arrived; None if so many are not under way."""
+        """Time at which ``count`` bytes will have arrived; None if fewer are under way."""
         due_s = 0.0
         for start_s, data in self.packets:
-            # what stands behind a slow packet cannot be taken before it
+            # bytes behind a slow packet cannot be read before it
             due_s = max(due_s, start_s + min(count, len(data)) * self.byte_s)
             if len(data) >= count:
                 return due_s

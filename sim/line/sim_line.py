@@ -30,7 +30,7 @@ Tamper = Callable[[bytes], Sequence[bytes]]
 """Changes one reply on the wire: returns the packets that arrive instead, in order."""
 _ID_AT, _CODE_AT = 4, 7
 _CALLS = [Wire.write, Wire.read_until, Wire.clearPort]
-"""What a fast path stands for."""
+"""Calls that a fast path replaces."""
 
 
 class SimLine(Wire):

@@ -1,9 +1,9 @@
 """The wire: a half-duplex bus as a byte port that owns simulated time.
 
-A byte takes ten bit times. An instruction takes effect when its last byte has arrived, and replies
-come after the servos' return delays. Nothing happens by itself: what was written is executed when
-the host reads, waits, or writes again, and only reads and time-outs move the clock, as far as
-needed. So a run needs no thread and no sleep, and repeats bit for bit.
+A byte lasts ten bit times. An instruction is executed when its last byte has arrived, and replies
+come after the servos' return delays. Nothing happens by itself: written bytes are executed when the
+host reads, waits, or writes again. Only reads and time-outs move the clock, as far as needed. So a
+run needs no thread and no sleep, and repeats bit for bit.
 
 The names of the public methods are those of the SDK's ``PortHandler``, on which the SDK is
 duck-typed, widened to ``drivers.port.byte_port.BytePort``.
@@ -24,9 +24,9 @@ from snakewalk.sim.line.noise import FaultScript
 from snakewalk.sim.line.rx_queue import RxQueue
 
 LATENCY_S = 0.016
-"""The SDK's allowance for the adapter's latency timer; a packet may take two of them and 2 ms."""
+"""The SDK's allowance for the adapter's latency timer; a packet may need two of them and 2 ms."""
 GAP_S = 5e-3
-"""After such a silence the servos take the next byte for the start of a packet (ours)."""
+"""After such a silence the servos treat the next byte as the start of a packet (ours)."""
 INSTANT_S = 1e-9
 """Times closer than this are the same."""
 HOLD_UP_MAX_S = 0.01
@@ -80,7 +80,7 @@ class Wire(ABC):
 
     @abstractmethod
     def _split(self, data: bytes) -> Sequence[bytes]:
-        """Cut one write into packets, each of which takes effect when its own end arrives."""
+        """Divide one write into packets; each is executed when its own end arrives."""
 
     # faults
 
@@ -164,7 +164,7 @@ class Wire(ABC):
 
     @property
     def paced(self) -> bool:
-        """Whether bytes take the time that the baud rate says: they do."""
+        """Whether bytes need the time of the baud rate; always true."""
         return True
 
     @property
@@ -238,7 +238,7 @@ class Wire(ABC):
     # the wire
 
     def disconnect(self) -> None:
-        """Take the port away: reading and writing fail until it is back and opened again."""
+        """Disconnect the port: reading and writing fail until it is back and opened again."""
         self._disconnected, self.is_open = True, False
         self._rx_queue.clear()
 
@@ -304,7 +304,7 @@ class Wire(ABC):
             self._send_replies(end_s, replies)
 
     def _arrive(self, end_s: float, count: int) -> None:
-        """Bring the servos to the end of a packet of so many bytes."""
+        """Bring the servos to the end of a packet of ``count`` bytes."""
         self._advance(end_s)
         if end_s - count * self._byte_s > self._delivered_s + GAP_S:
             self._reset_parser()

@@ -1,10 +1,9 @@
 """Belly contacts: where bellies meet the ground, found and written into MuJoCo's list of contacts.
 
-MuJoCo looks for contacts among all geoms, bodies that may touch each other first. Of a chain on its
-ground nearly all of that is known: which belly meets which plane, under what parameters. What is
-left, depth, place and normal, is reckoned here as MuJoCo does, to the bit. Where links come near
-each other, MuJoCo looks for the contacts itself; so it does for whatever meets more than its
-ground, such as feet and obstacles.
+MuJoCo looks for contacts among all geoms, bodies that may touch each other first. On a chain nearly
+all of that is known: which belly meets which plane, with which parameters. Depth, place and normal
+are computed here as MuJoCo does, to the bit. Where links come near each other, MuJoCo looks for the
+contacts itself; so it does for whatever meets more than its ground, such as feet and obstacles.
 """
 
 import copy
@@ -24,7 +23,7 @@ from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES, TangentPlanes
 _ROWS = readonly_array(dimensions=2, layout="C")
 _WORD = 8
 _DEEP_M = 1e-3
-"""Of the contacts from which the constants are taken."""
+"""Depth of the contacts that give the constants."""
 _SAFE = 1.0 + 1e-9
 """Over the distance at which links can touch, against rounding."""
 
@@ -45,7 +44,7 @@ class BellyContacts:
 
     @classmethod
     def of(cls, mechanics: Mechanics, layout: StepLayout) -> "BellyContacts | None":
-        """Take the constants from MuJoCo; None where more than bellies meets more than ground."""
+        """Read the constants from MuJoCo; None if more than bellies meets more than ground."""
         model, planes = mechanics.model, mechanics.planes
         bellies = np.array([model.geom(k).name.startswith("belly") for k in range(model.ngeom)])
         known = bellies | (mechanics.contact_role == GROUND)
@@ -75,7 +74,7 @@ NO_CONTACTS = BellyContacts(
     np.zeros((0, 3)),
     np.zeros((0, 0)),
 )
-"""Of a model whose contacts MuJoCo looks for."""
+"""Value of a model whose contacts MuJoCo finds."""
 
 
 def _sunk(
@@ -152,7 +151,7 @@ def write_contacts(
     plane_axes: Floats,
     held: NDArray[np.int64],
 ) -> int:
-    """Write all contacts of now one behind the other; their number, -1 for MuJoCo's own way.
+    """Write all present contacts in sequence; returns their number, -1 for MuJoCo's own method.
 
     Their frames get the normal alone: without friction nobody reads the rest.
 
@@ -212,5 +211,5 @@ def write_contacts(
         reals[base + at_normal + 1] = n1 * length
         reals[base + at_normal + 2] = n2 * length
         found += 1
-    held[found:] = -1  # what stands behind the contacts is written over
+    held[found:] = -1  # entries behind the contacts are overwritten
     return found

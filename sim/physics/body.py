@@ -32,12 +32,13 @@ NOTCH = 0.6
 """Most of a radius that two capsules at a straight joint may end short of it, each: then the notch
 between them is a fifth of the radius deep."""
 CONTACT_TIME_S = 0.015
-"""Of the contact spring; MuJoCo wants at least two steps. Sinks 0.03 mm under the body's weight."""
+"""Time constant of the contact spring; MuJoCo needs at least two steps. Sinks 0.03 mm under the
+body's weight."""
 
 _NO_SAME_FRAME = 0
 """``mjSAMEFRAME_NONE``; MuJoCo 3.2.0 has no name for it in Python."""
 GEAR_IMPEDANCE = "0.999 0.999"
-"""Of what friction in the gears holds: a joint that it holds creeps at a thousandth of its free
+"""Impedance of friction in the gears: a joint that it holds creeps at a thousandth of its free
 acceleration times the step."""
 
 
@@ -105,7 +106,8 @@ def belly_points_m(robot: RobotConfig, link: int) -> Floats:
 def overlapping_links(robot: RobotConfig) -> list[tuple[int, int]]:
     """Pairs of links, not neighbours, that overlap as the body lies straight.
 
-    So do those with only links of no length between them: they are neighbours at two axes.
+    Links with only links of length zero between them also count as neighbours: they are neighbours
+    at two axes.
     """
     ends, mean_m = robot.link_ends, robot.mean_link_length_m
     lengths_m, radii_m, shapes = robot.link_lengths_m, robot.link_radii_m, robot.link_shapes

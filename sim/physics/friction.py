@@ -1,11 +1,11 @@
 """Coulomb's ellipse: little friction along a link, much across it.
 
-Maximum dissipation on the ellipse with half axes ``mu_along N`` and ``mu_across N``: for a sliding
-velocity (v_a, v_c) the force is ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge*
-``s = hypot(mu_a v_a, mu_c v_c)``. Friction backward may differ: then the forces fill two half
-ellipses with one axis across. They meet with one tangent, so the set is convex, and the dissipation
-is greatest on the half that opposes the sliding. Near rest each component is held to a share of
-what would stop the link within the step, so a link comes to rest without chatter at any step.
+The ellipse has the half axes ``mu_along N`` and ``mu_across N``. For a sliding velocity (v_a, v_c),
+maximum dissipation gives the force ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge* ``s =
+hypot(mu_a v_a, mu_c v_c)``. Friction backward may differ: then the forces fill two half ellipses
+with one axis across. They meet with one tangent, so the set is convex, and the dissipation is
+greatest on the half that opposes the sliding. Near rest each component is held to a share of the
+force that would stop the link within the step, so a link comes to rest without chatter at any step.
 """
 
 import math
@@ -16,32 +16,33 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 
 LANES = 8
-"""Contacts that stand side by side in a table, so that the processor takes them at once."""
+"""Number of contacts side by side in a table, which the processor handles at once."""
 DEPTH, LOAD, STILL, PLACE, SLIDE, NORMAL, AXIS, FORCE, LOSS, SIDEWAYS = (
     LANES * row for row in (0, 2, 3, 4, 7, 10, 13, 16, 19, 20)
 )
-"""Where rows of a table of contacts begin: depth, and that of all contacts of the link; the link's
-load, and the drag that stops it; three rows each for the contact's place, its velocity, the
-ground's normal and the link's axis; and what ``rub`` writes: the force, three rows, its power, and
-the speed across times the contact's share of the load. SI units, in the world."""
+"""First rows of each quantity in a table of contacts: depth, and the depth of all contacts of the
+link; the link's load, and the drag that stops it. Three rows each follow for the contact's place,
+its velocity, the ground's normal and the link's axis. ``rub`` writes the force (three rows), its
+power, and the speed across times the contact's share of the load. SI units, in the world."""
 ROWS = 21 * LANES
 """Numbers of a group of contacts."""
 
 STOP_SHARE = 1.8
-"""Share of a contact's momentum that friction may take in one step; the explicit step is stable
+"""Share of a contact's momentum that friction may remove in one step; the explicit step is stable
 below 2."""
 BENT_STOP_SHARE = 1.4
-"""The same of a link's, where it cannot roll: less is safer, more tells no difference any more."""
+"""The same share for a link that cannot roll: a smaller value is safer, a larger one has no
+effect."""
 
 
 def stop_share(centre_m: Floats, radius_m: float) -> float:
-    """Share of a link's momentum that friction may take in a step, by their centres (L, 3).
+    """Share of a link's momentum that friction may remove in a step, by their centres (L, 3).
 
     Times its mass over the step this is the drag that stops the link, N s/m.
 
-    A body that lies straight can also roll, which makes each contact three times lighter than its
-    link (``1 + r^2 / (r^2 / 2)``, solid cylinder); a bent one cannot, as the links beside its axis
-    resist: their mean square distance from it, seen from above, adds to the ``r^2 / 2``.
+    A straight body can also roll, which makes each contact three times lighter than its link (``1 +
+    r^2 / (r^2 / 2)``, solid cylinder). A bent one cannot, because the links off its axis resist:
+    their mean square distance from it, seen from above, adds to the ``r^2 / 2``.
     """
     links = len(centre_m)
     x = y = xx = xy = yy = 0.0
@@ -90,7 +91,7 @@ def ellipse_force(
 
 
 def make_lanes(contacts: int) -> tuple[Floats, NDArray[np.int64]]:
-    """Room for so many contacts side by side: a table of them, and the link of each."""
+    """Make a table for a number of contacts side by side, and the link of each."""
     groups = (contacts + LANES - 1) // LANES
     return np.zeros(groups * ROWS), np.zeros(groups * LANES, np.int64)
 

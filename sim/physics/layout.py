@@ -43,7 +43,7 @@ class StepLayout:
     """Byte offsets in ``mjData`` and ``mjContact``, and addresses of C functions."""
 
     data: Mapping[str, int]
-    """Of ``step_memory.POINTERS`` in ``mjData``."""
+    """Addresses of ``step_memory.POINTERS`` in ``mjData``."""
     contact: Mapping[str, int]
     """``step_memory.CONTACT``."""
     functions: Mapping[str, int]

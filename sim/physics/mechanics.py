@@ -1,4 +1,4 @@
-"""A robot's MuJoCo model and data, and what friction and water need beside them."""
+"""A robot's MuJoCo model and data, and additional data for friction and water."""
 
 from dataclasses import dataclass, field
 
@@ -42,12 +42,12 @@ class Mechanics:
     link_mass_kg: Floats
     """(L,) of each link; a leg's counts as a plain one of the spine."""
     radius_m: float
-    """Of the body."""
+    """Radius of the body."""
     gears: Floats
     """(12, J) friction of each gearbox, powered or not, as ``sim.servo.motor.friction_n_m`` has it.
     The inertia of the rotors is MuJoCo's."""
     planes: TangentPlanes
-    """What bears the body on a height field."""
+    """Planes that support the body on a height field."""
     contact_role: NDArray[np.int32]
     """(geoms,) ``GROUND``, ``FOOT``, or 0."""
     load_n: Floats
@@ -97,7 +97,7 @@ class Mechanics:
 
     def start_at_rest(self) -> None:
         """Set up the memory for a state that was set, not stepped to, after ``mj_forward``."""
-        self.model.dof_frictionloss[:] = 0.0  # it grows with torques, and there are none yet
+        self.model.dof_frictionloss[:] = 0.0  # it grows with torques, which are still zero
         self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.model, self.data)[0]
         self.measure_loads()
 

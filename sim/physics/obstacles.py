@@ -25,9 +25,9 @@ from snakewalk.sim.physics.mechanics import Mechanics
 from snakewalk.sim.physics.solids import middle_m, solids
 
 TAIL_UP_M = 0.01
-"""Of the lowest link above the floor at the start."""
+"""Height of the lowest link above the floor at the start."""
 COIL_MIN_RAD = 2.0
-"""A body that goes less far round its own axis is no coil."""
+"""A body that turns less about its axis is not a coil."""
 START_DEPTH_M = 0.005
 """How deep in an obstacle a body may start: contacts are soft, and it is pushed out at once."""
 OBSTACLE = "obstacle"
@@ -35,7 +35,7 @@ OBSTACLE = "obstacle"
 
 
 def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
-    """Options and geoms of the world's obstacle, as MJCF; empty where there is none."""
+    """Options and geoms of the world's obstacle, as MJCF; empty without an obstacle."""
     thing = world.obstacle
     if thing is None:
         return "", ""
@@ -166,7 +166,7 @@ class Coil:
     axis: Floats
     """(3,) unit, from tail to head."""
     centre_m: Floats
-    """(3,) on the axis, beside the middle of the body."""
+    """(3,) on the axis, next to the middle of the body."""
     radius_m: Floats
     """(L,) distance of each link's centre from the axis."""
     wound_rad: float

@@ -169,7 +169,7 @@ def _settle(m: Mechanics) -> None:
 def _clearance_m(m: Mechanics, robot: RobotConfig, ground: HeightField | None) -> Floats:
     """(L,) height by which each link's belly or foot clears the ground, negative below it.
 
-    Infinite for what bears nothing: the segments of a leg that end in no foot, links of no length.
+    Infinite for links that support nothing: segments of a leg without a foot, links of length zero.
     """
     mujoco.mj_kinematics(m.model, m.data)
     spine = robot.link_count

@@ -24,8 +24,8 @@ from snakewalk.sim.plant import LinkMotion, ServoDrive
 
 FLOOR_STEP_S = 0.002
 FIELD_STEP_S = 0.001
-"""On hills a body creeps and falls from link to link: in 4 s of a wave 2 ms are 1 to 3 % of the way
-off, 1 ms 0.1 to 2 % (``python -m benchmarks step_length``)."""
+"""On hills a body creeps and falls from link to link: in 4 s of a wave the error is 1 to 3 % of the
+distance at 2 ms, and 0.1 to 2 % at 1 ms (``python -m benchmarks step_length``)."""
 
 
 @compiled("void(float64[::1], float64[:, ::1])", makes_arrays=False)
@@ -115,8 +115,8 @@ class MujocoPlant:
     def reset(self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike) -> None:
         """Put the body on the ground, at rest, at time 0.
 
-        Yaw joints take ``joint_rad`` (J,); pitch joints start from it and drape over the ground, as
-        those of a robot laid down without power do (on a plane they keep it). A coil goes round a
+        Yaw joints start at ``joint_rad`` (J,). Pitch joints start from it and drape over the
+        ground, as those of a robot without power do (on a plane they keep it). A coil goes round a
         pole, everything into a pipe, and what water carries floats: ``start_m`` is of the floor.
 
         Raises:
@@ -148,7 +148,7 @@ class MujocoPlant:
     def set_state(self, before: Floats, now: Floats, dt_s: float) -> None:
         """Put it at MuJoCo's coordinates ``now`` (7 + J,), where it came from ``before`` in dt_s.
 
-        What loads the links is that of this state at once; it is time 0.
+        The loads on the links are those of this state at once; it is time 0.
         """
         m, d = self.mechanics, self._data
         mujoco.mj_resetData(m.model, d)
@@ -245,7 +245,7 @@ class MujocoPlant:
 
     @property
     def qpos(self) -> Floats:
-        """(7 + J,) MuJoCo's coordinates now, a copy: what a film is made of."""
+        """(7 + J,) MuJoCo's present coordinates, a copy: the input of a film."""
         copy: Floats = self._data.qpos.copy()
         return copy
 

@@ -75,7 +75,7 @@ class PublicSteps:
         return Body(self._state, self._chain, self._links, self._geoms, law, m.totals)
 
     def _contacts(self) -> Contacts:
-        """Copy the present contacts; make room for their friction."""
+        """Copy the present contacts, and allocate their friction."""
         found = self._mechanics.data.contact
         count = len(found.dist)
         reals = np.zeros((count, _AT.size))
@@ -88,5 +88,5 @@ class PublicSteps:
         return Contacts(reals.ravel(), integers.ravel(), count, _AT)
 
     def _forces_n(self) -> Floats:
-        """MuJoCo's constraint forces, of which there is none in the air."""
+        """MuJoCo's constraint forces; empty in the air."""
         return np.ascontiguousarray(self._mechanics.data.efc_force)

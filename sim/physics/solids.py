@@ -1,6 +1,6 @@
 """Pole, pipe, pegs and walls as the cylinders and boxes of which they are made.
 
-What touches them, and what draws them, takes the same; MuJoCo is not needed for it.
+Physics and drawings use the same solids; MuJoCo is not needed for it.
 """
 
 import math
@@ -19,7 +19,7 @@ from snakewalk.config.world import (
 )
 
 STAVE_COUNT = 24
-"""Of which a pipe is made: its wall is flat by less than 1 % of its radius."""
+"""Number of boxes of a pipe: its wall is flat by less than 1 % of its radius."""
 STAVE_M = 0.02
 CLEAR_M = 0.2
 """Between the floor and what lies level, on the outside."""

@@ -9,10 +9,10 @@ from snakewalk.sim.plant import Plant, ServoDrive
 from snakewalk.sim.servo.motor import MotorModel, make_drive
 
 FOLLOW_GAIN_PER_RAD = 20.0
-"""Of the motors that make shafts follow: full output at 0.05 rad (ours)."""
+"""Gain of the motors that make shafts follow: full output at 0.05 rad (ours)."""
 FOLLOW_STRENGTH = 4.0
-"""Their supply, as a multiple of the motor's nominal one (ours): what the real servo carries, they
-carry as well."""
+"""Supply of these motors, as a multiple of the nominal one (ours): they carry every load that a
+real servo carries."""
 AHEAD_S = 0.1
 """How far a measured velocity is extrapolated, at most (ours)."""
 _INPUTS = 9
@@ -60,7 +60,7 @@ class SplitPlant:
         return self._plant.velocity_rad_s[self._simulated]
 
     def follow(self, measured_at_s: Floats, position_rad: Floats, velocity_rad_s: Floats) -> None:
-        """Take over where the real joints were measured, (J,) each; what is not finite stays."""
+        """Copy the measured positions of the real joints, (J,) each, if they are finite."""
         known = np.isfinite(position_rad[self._real])
         rows = self._real[known]
         self._measured_at_s[known] = measured_at_s[rows]

@@ -3,8 +3,8 @@
 ``apply_forces`` runs between ``mj_step1`` and ``mj_step2``, ``settle`` after them. Friction acts at
 the present contacts under the load of the last step, which the contacts of a link share by depth. A
 link slides at the rate at which it *moved* in the last step. Its generalised velocity is not that
-rate: Euler's step moves the head along its velocity and leaves out the turning of the links within
-the step, which reads as 1 mm/s of phantom motion per millisecond of step, and as a loss of 6 % of
+rate. Euler's step moves the head along its velocity and leaves out the turning of the links within
+the step. This reads as 1 mm/s of phantom motion per millisecond of step, and as a loss of 6 % of
 speed under isotropic friction at 2 ms.
 
 If a robot's file has friction of the gears, MuJoCo holds each joint by the friction that torque and
@@ -38,7 +38,7 @@ from snakewalk.sim.plant import shaft_torque
 from snakewalk.sim.servo.motor import friction_n_m
 
 LEAST_FRICTION_N_M = 1e-9
-"""MuJoCo leaves out the constraint of a joint without friction, and counts the others anew."""
+"""MuJoCo leaves out the constraint of a joint without friction, and counts the others again."""
 
 
 def _move(body: Body) -> None:

@@ -1,6 +1,6 @@
 """Addresses and sizes of everything that the compiled steps use: one record with a name per field.
 
-Forty arrays handed over one by one would take 7 us a call.
+Passing forty arrays one by one would need 7 us per call.
 """
 
 from collections.abc import Mapping
@@ -32,9 +32,10 @@ FUNCTIONS = (
     *("mj_checkPos", "mj_checkVel", "mj_comPos", "mj_makeM", "mj_factorM", "mj_collision"),
     *("mj_makeConstraint", "mj_projectConstraint", "mj_fwdVelocity", "mj_addContact"),
 )
-"""C functions that the steps call. Without the search for islands, which a chain is one of, those
-after ``WHOLE`` are the parts of ``mj_step1`` for a chain without actuators, sensors and cameras, in
-their order, with ``mj_kinematics`` before ``mj_comPos``; the last one adds a contact."""
+"""C functions that the steps call. A chain is one island, so the search for islands is left out.
+Then the functions after ``WHOLE`` are the parts of ``mj_step1`` for a chain without actuators,
+sensors and cameras, in their order, with ``mj_kinematics`` before ``mj_comPos``. The last one adds
+a contact."""
 WHOLE = 4
 POINTERS = ("model", "data", "time", "ncon", "contact", "efc_force", "parena")
 """Addresses of MuJoCo's structures and of fields of ``mjData``."""

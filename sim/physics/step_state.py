@@ -115,7 +115,7 @@ class Body(NamedTuple):
 
 
 class Shafts(NamedTuple):
-    """What turns the joints."""
+    """Motors and gears that turn the joints."""
 
     motors: Motors
     gears: Gears

@@ -4,8 +4,8 @@
 but bellies can touch nothing but ground, ``mj_step1`` is called by parts, around contacts that
 ``sim.physics.belly_contacts`` writes: the same bits in less time.
 
-The memory of MuJoCo is no public interface. ``sim.physics.layout`` checks it; if the check fails,
-``make_steps`` returns the slower ``PublicSteps``, with the same bits.
+MuJoCo's memory layout is not a public interface. ``sim.physics.layout`` checks it; if the check
+fails, ``make_steps`` returns the slower ``PublicSteps``, with the same bits.
 """
 
 from typing import Any, Protocol

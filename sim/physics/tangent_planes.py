@@ -1,10 +1,10 @@
-"""Tangent planes: what a height field is to the balls of a belly, found anew in every step.
+"""Tangent planes of a height field for the balls of a belly, found again in every step.
 
 MuJoCo lets a ball meet each prism of a height field by itself. It then meets inner edges of a level
-floor as well, with normals up to 10 degrees off, which throws a body about. Here every ball
-has two planes of its own, which lie through the points of the surface where its distance from the
-ball's centre is least: one on a slope or an edge, two in a crease. The surface is that of
-``HeightField``, two triangles a cell.
+floor as well, with normals up to 10 degrees off, which throws a body about. Here every ball has two
+planes. They go through the points of the surface with the least distance from the ball's centre:
+one on a slope or an edge, two in a crease. The surface is that of ``HeightField``, two triangles a
+cell.
 """
 
 import math
@@ -19,15 +19,15 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 PLANES = 2
-"""Of a ball, since it may stand in a crease; of a corner's three faces the deepest two count."""
+"""Planes of a ball, which may lie in a crease; of a corner's three faces the deepest two count."""
 AWAY_M = -1e3
 """Height of a plane that its ball does not touch."""
 _SAME = 0.05
 """Points nearer to each other than this share of the radius are one contact."""
 _PROBE = 1e-3
-"""Of a cell's width: how far from a point the surface is probed for nearer ones."""
+"""Share of a cell's width: distance from a point at which the surface is probed for nearer ones."""
 _NEARER = 0.01
-"""Least tangent of an angle that tells that a point nearby is nearer."""
+"""Least tangent of an angle at which a nearby point counts as nearer."""
 _RING = 8
 
 
@@ -169,7 +169,7 @@ def touch(
 ) -> None:
     """Find where a ball meets the field: points (PLANES, 3) and distances in ``found``.
 
-    A distance of ``radius_m`` or more is no contact; 0 stands for a centre below the surface.
+    A distance of ``radius_m`` or more means no contact; 0 means a centre below the surface.
     """
     x0, y0, spacing = corner_m
     rows, columns = z_m.shape

@@ -17,7 +17,7 @@ from snakewalk.sim.servo.motor import MotorColumns, make_drive, motors_of, p_gai
 
 
 class PlantTwin:
-    """A ``MujocoPlant`` beside the robot, without servos of its own."""
+    """A ``MujocoPlant`` that runs with the robot, without servos of its own."""
 
     def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
         """Lay a body of ``robot`` on the ground; its servos have torque and the robot's gains."""

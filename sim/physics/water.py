@@ -21,14 +21,14 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import Water, WorldConfig
 
 GAUSS = 0.5 / math.sqrt(3.0)
-"""Of a link's length, from its middle."""
+"""Share of a link's length, from its middle."""
 
 
 def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
     """(J + 1, 7) of each link, all zero where the world is dry.
 
     Columns: drag across and along of half the link, kg/m; a Gauss point's arm, radius and surface,
-    m; lift of the link under water, N; axis of the link's frame that lies along it: 0, or 1 of a
+    m; lift of the link under water, N; axis of the link's frame along it. The axis is 0, or 1 for a
     leg's segment, a rod as thick as its foot.
     """
     water, links = world.ground, robot.joint_count + 1

@@ -121,7 +121,7 @@ def render_crowd(
 
 
 def _add_chain(scene: mujoco.MjvScene, body: BodyChain) -> None:
-    """Append a body's geoms to a scene that has room for them."""
+    """Append a body's geoms to a scene with enough free geoms."""
     back, band = COLOURS[body.kind % len(COLOURS)]
     points, none = body.points_m, np.zeros(3)
     for k, radius in enumerate(0.5 * (body.radius_m[:-1] + body.radius_m[1:])):

@@ -28,7 +28,7 @@ SMOOTHING_S = 1.2
 """The camera's smoothing, in seconds of film."""
 TURN_SMOOTHING_S = 4.0
 DISTANCE_LENGTHS = 1.2
-"""Of the camera from a body that keeps its place, in lengths of the body."""
+"""Distance of the camera from a body that keeps its place, in lengths of the body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Style:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """What is drawn on the ground."""
+    """Marks drawn on the ground."""
 
     waypoints_m: Sequence[tuple[float, float]] = ()
     """Drawn as rings."""
@@ -60,6 +60,8 @@ class Marks:
     """When the first, second, ... of them turn green."""
     paths: Sequence[tuple[float, Floats]] = ()
     """Each the time from when it is in force and (P, 2) points; drawn as dots."""
+    hollow: bool = False
+    """Whether the arrivals are not measured: rings are dashed then, without poles."""
 
 
 def render_film(
@@ -151,18 +153,19 @@ class _Stage:
         self.spine = slice(1, 1 + (self.bodies if self.bodies > 1 else robot.link_count))
         legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
         self.length_m = robot.length_m + legs_m
-        """To show: the spine and, beside it, a leg."""
+        """Length to show: the spine, and a leg to its side."""
         self.model = dressed_model(
             *(robot, world, ground, marks.waypoints_m, marks.waypoint_radius_m),
             look=look,
             fine=style.fine,
+            hollow=marks.hollow,
         )
         self.data = mujoco.MjData(self.model)
         self._view, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._reached = 0
 
     def scene(self, trail: int) -> mujoco.MjvScene:
-        """Return a scene with room for the model and ``trail`` geoms more."""
+        """Return a scene with space for the model and ``trail`` more geoms."""
         room = self.model.ngeom + self.model.nbody + 11 + AXES_GEOMS + trail
         scene = mujoco.MjvScene(self.model, maxgeom=room)
         scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
@@ -216,8 +219,8 @@ def _camera(
 ) -> tuple[Floats, Floats]:
     """Camera of each frame (F, 5), smoothed both ways, and the body's centre (F, 3).
 
-    A camera is its look-at point, azimuth in degrees and distance. ``size_m`` is what it has to
-    show: the spine and, beside it, a leg.
+    A camera is its look-at point, azimuth in degrees and distance. ``size_m`` is the length to
+    show: the spine, and a leg to its side.
     """
     middle, centre, body = (
         np.empty((len(shots), 3)),
@@ -244,7 +247,7 @@ def _corner(camera: Floats) -> Floats:
     turn = np.radians(camera[3])
     ahead = np.array([np.cos(turn), np.sin(turn)])
     left = np.array([-ahead[1], ahead[0]])
-    at_m: Floats = camera[:2] + camera[4] * (0.42 * left - 0.30 * ahead)
+    at_m: Floats = camera[:2] + camera[4] * (0.38 * left - 0.28 * ahead)
     return at_m
 
 
@@ -255,7 +258,7 @@ def _scale_m(length_m: float) -> float:
 
 
 class MovieFile:
-    """An MP4 file that takes frames."""
+    """An MP4 file that stores frames."""
 
     def __init__(self, path: Path, fps: int, size: tuple[int, int]) -> None:
         try:

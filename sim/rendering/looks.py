@@ -1,4 +1,4 @@
-"""The looks of the body and its ground in pictures; nothing here takes part in the physics."""
+"""The looks of the body and its ground in pictures; they have no effect on the physics."""
 
 import itertools
 from collections.abc import Sequence
@@ -24,6 +24,8 @@ PUPIL: Rgba = (0.02, 0.02, 0.02, 1)
 TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
 AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
 REACHED: Rgba = (0.10, 0.62, 0.38, 1)
+HIDDEN: Rgba = (0.0, 0.0, 0.0, 0.0)
+"""Colour of what is not drawn."""
 RING_PARTS = 32
 LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
@@ -64,7 +66,7 @@ class FloorPrint:
     """A printed sheet on level ground, its upper edge to the north."""
 
     place_m: tuple[float, float]
-    """Of its middle."""
+    """Position of its middle."""
     side_m: float
     picture: Image
     """(N, N) grey."""
@@ -80,11 +82,13 @@ def dressed_model(
     look: SkinLook | None = None,
     fine: bool = False,
     prints: Sequence[FloorPrint] = (),
+    hollow: bool = False,
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
     ``look`` is the skin; None is a capsule a link. ``fine`` smooths edges: three times the work of
-    a software renderer.
+    a software renderer. ``hollow`` waypoints, of a run whose arrivals are not measured, have a
+    dashed ring and no pole.
 
     Raises:
         InputError: the installed MuJoCo cannot edit models.
@@ -114,11 +118,15 @@ def dressed_model(
         _add(
             spec.worldbody, _CYLINDER, (0.008, 0.15, 0), (x, y, z + 0.15), AHEAD
         ).name = f"waypoint{k}"
+        if hollow:
+            spec.geom(f"waypoint{k}").rgba = HIDDEN
         ring = _ring(ground, x, y, waypoint_radius_m)
         for part, (one, other) in enumerate(itertools.pairwise(ring)):
             _add(
                 spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)
             ).name = f"waypoint{k}ring{part}"
+            if hollow and part % 2:
+                spec.geom(f"waypoint{k}ring{part}").rgba = HIDDEN
     model = finish(spec.compile(), ground)
     if ground is not None:
         _paint(model, ground)
@@ -135,9 +143,10 @@ def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:
 
 
 def mark_reached(model: mujoco.MjModel, waypoint: int) -> None:
-    """Turn a waypoint green."""
+    """Turn the visible parts of a waypoint green."""
     for name in (f"waypoint{waypoint}", *(f"waypoint{waypoint}ring{n}" for n in range(RING_PARTS))):
-        model.geom(name).rgba = REACHED
+        if model.geom(name).rgba[3] > 0.0:
+            model.geom(name).rgba = REACHED
 
 
 def _ring(ground: HeightField | None, x: float, y: float, radius_m: float) -> Floats:

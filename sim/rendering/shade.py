@@ -1,7 +1,7 @@
 """The body's shade on the ground, as flat dark patches under the sun.
 
-MuJoCo's shadow maps take half of a software renderer's time and, drawn by OSMesa, leave out what is
-less than half a metre above the ground: all of a snake.
+MuJoCo's shadow maps need half of a software renderer's time. Drawn by OSMesa, they also leave out
+everything less than half a metre above the ground: all of a snake.
 """
 
 import mujoco
@@ -25,7 +25,7 @@ def add_shade(
     robot: RobotConfig,
     ground: HeightField | None,
 ) -> None:
-    """Append a patch a link to a scene that was just updated and has room for them.
+    """Append one patch per link to a scene that was just updated and has enough free geoms.
 
     Args:
         scene: what is about to be drawn.

@@ -1,4 +1,4 @@
-"""The view of a pair of cameras over a world: what a stereo head takes of its ground."""
+"""The view of a pair of cameras over a world: the pictures of a stereo head."""
 
 import math
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ class CameraFrame:
 def tilted(tilt_rad: float, carrier: Floats) -> Floats:
     """(3, 3) axes of a camera, right, down and forward, that looks ahead and down by an angle.
 
-    ``carrier`` are the axes (3, 3) of what carries it: columns forward, left and up.
+    ``carrier`` are the axes (3, 3) of the carrying link: columns forward, left and up.
     """
     c, s = math.cos(tilt_rad), math.sin(tilt_rad)
     return np.asarray(carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]])

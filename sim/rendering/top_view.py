@@ -1,4 +1,4 @@
-"""The view from above: the picture that a camera over the simulated robot takes."""
+"""The view from above: the picture of a camera over the simulated robot."""
 
 import math
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import FloorPrint, dressed_model
@@ -22,7 +23,7 @@ _FIELDS, _SLACK = 8, 128  # of noise, and by how many pixels a field is larger t
 class TopView:
     """Draws ``MujocoPlant.qpos`` from above; ``close`` it.
 
-    Level floors only. The floor is drawn once, and of each picture only the part round the robot.
+    The ground is drawn once, and of each picture only the part round the robot.
     The same seed gives the same noise.
 
     Raises:
@@ -38,9 +39,10 @@ class TopView:
         centre_m: tuple[float, float],
         seed: int = 0,
         prints: Sequence[FloorPrint] = (),
+        ground: HeightField | None = None,
     ) -> None:
-        self._robot = robot
-        self._model = model = dressed_model(robot, world, None, prints=prints)
+        self._robot, self._ground = robot, ground
+        self._model = model = dressed_model(robot, world, ground, prints=prints)
         self._data = mujoco.MjData(model)
         size = camera.width_px, camera.height_px
         field_m = camera.field_width_m * size[1] / size[0]
@@ -74,7 +76,7 @@ class TopView:
             np.array(data.xipos[spine]),
             np.array(data.xmat[spine, ::3]),
             self._robot,
-            None,
+            self._ground,
         )
         left, right, top, low = self._window(np.array(data.xipos[spine]))
         self._look_at(left, right, top, low)

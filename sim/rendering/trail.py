@@ -12,16 +12,18 @@ from snakewalk.config.heightfield import HeightField
 
 Rgba = tuple[float, float, float, float]
 PATH: Final[Rgba] = (0.98, 0.98, 0.95, 1)
-"""Of the path in force."""
+"""Colour of the path in force."""
 FORMER: Final[Rgba] = (0.98, 0.98, 0.95, 0.35)
-"""Of a path that another one replaced."""
+"""Colour of a path that another one replaced."""
 TRAIL: Final[Rgba] = (0.20, 0.33, 0.62, 1)
-"""Of the head."""
+"""Colour of the trail of the head."""
 CENTRE: Final[Rgba] = (0.85, 0.30, 0.10, 1)
-"""Of the body's centre."""
+"""Colour of the trail of the body's centre."""
 AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
 """The world's x and y."""
 AXES_GEOMS: Final = 5
+_AXES_SAMPLES: Final = 9
+"""Points of each rod at which the ground is looked up (ours)."""
 LIFT_M = 0.004
 SPACING_M = 0.12
 """Between dots of a path."""
@@ -52,22 +54,22 @@ class TrailLine:
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """What the lines of each frame are made of."""
+    """Dots and lines of the frames."""
 
     starts_s: Floats
     """(K,) from when on each path is in force, increasing."""
     dots_m: tuple[Floats, ...]
     """K times (D, 3), on the ground."""
     lines: tuple[TrailLine, ...]
-    """Of the head, and of the body's centre."""
+    """Lines of the head and of the body's centre."""
 
     @property
     def most(self) -> int:
-        """Most geoms that a frame takes."""
+        """Largest number of geoms of a frame."""
         return max((len(dots) for dots in self.dots_m), default=0) * 2 + MOST * len(self.lines)
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
-        """Append dots and lines to a scene that was just updated and has room for them.
+        """Append dots and lines to a scene that was just updated and has enough free geoms.
 
         Drawn are the path in force, pale the one before it, and the trails.
         """
@@ -112,8 +114,12 @@ def make_trail(
 def add_axes(
     scene: mujoco.MjvScene, at_m: Floats, length_m: float, ground: HeightField | None
 ) -> None:
-    """Append a rod along the world's x and one along its y, from (2,) on the ground."""
-    foot = _on_ground(at_m[None], ground)[0] + [0.0, 0.0, 0.02 * length_m]
+    """Append a rod along the world's x and one along its y, around (2,), above the ground."""
+    at_m = at_m - 0.5 * length_m  # so that both keep close to the place, whichever way they point
+    along_m = np.linspace(0.0, length_m, _AXES_SAMPLES)[:, None]
+    below = np.concatenate([at_m + along_m * np.eye(2)[axis] for axis in range(2)])
+    highest_m = _on_ground(below, ground)[:, 2].max()
+    foot = np.array([*at_m, highest_m + 0.03 * length_m])  # no hill covers a rod
     rod, still = mujoco.mjtGeom.mjGEOM_CAPSULE, (np.zeros(3), np.zeros(3), np.eye(3).ravel())
     _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
     for axis, (name, rgba) in enumerate(zip("xy", AXES, strict=True)):

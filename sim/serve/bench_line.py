@@ -27,7 +27,7 @@ def bench_line(
 ) -> SimLine | Ax12Line:
     """Line of ``baud`` with the servos of ``chain``; shafts start at ``start_rad``, of all or each.
 
-    An ``imu`` lies level and still on the bench beside them.
+    An ``imu`` lies level and still on the bench with them.
 
     Raises:
         InputError: a model is not known or lacks the baud rate, two devices share an ID, or devices

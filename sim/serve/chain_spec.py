@@ -17,7 +17,7 @@ from snakewalk.drivers.protocol.imu_table import IMU_TABLES
 DEFAULT_MODEL = "XM430-W350"
 IMU_EXAMPLE = "write 200, 200:imu_to_dxl or 200:FFW-G40-IMU"
 BENCH_RANGES = {"gyro_range_dps": 2000.0, "acceleration_range_g": 4.0}
-"""Of a bench IMU whose table leaves them open (ours): write them into the robot's file."""
+"""Ranges of a bench IMU whose table leaves them open (ours): write them into the robot's file."""
 _EXAMPLE = "write 1-16, 1,2,5-8:XL330-M288 or 1-2:XL430-W250,3-6:XL330-M288"
 
 
@@ -34,7 +34,7 @@ class ChainSpec:
         """Record of each servo's model.
 
         Raises:
-            InputError: there is no such model; or the faults of its file.
+            InputError: the model does not exist; or the faults of its file.
 
         """
         known = {model: servo_model(model, Path()) for model in self.kinds}
@@ -74,7 +74,7 @@ def parse_chain(text: str) -> ChainSpec:
 
 
 def parse_imu(text: str) -> ImuConfig:
-    """Read ``ID[:MODEL]`` of an IMU beside the servos.
+    """Read ``ID[:MODEL]`` of an IMU on the bus of the servos.
 
     Raises:
         InputError: no ID, or a model that is not known.

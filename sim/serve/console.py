@@ -28,7 +28,7 @@ class Console:
     def __init__(self, line: SimLine, faults: FaultPlayer) -> None:
         self._line, self._faults = line, faults
         self.set_pace: Callable[[float], None] | None = None
-        """Takes a new factor of time; None while nobody serves the line in real time."""
+        """Sets a new factor of time; None while no server runs the line in real time."""
         self._commands: dict[str, Callable[[list[str]], str]] = {
             "set": self._set,
             "get": self._get,

@@ -1,6 +1,6 @@
 """Live table of a simulated bus: registers of all servos, and the latest packets.
 
-Nothing here takes long: the servos reply in between.
+All functions here are quick: the servos reply in between.
 """
 
 from collections import deque

@@ -1,11 +1,11 @@
 """A pseudo-terminal with simulated servos behind it, in real time: a serial port for any client.
 
 The clock handed in is real time; ``pace`` times that is mirrored on the line's simulated clock
-whenever the server runs. What a client writes to ``path`` goes onto the line, and answers are
-handed out when their bytes have arrived. Time that the server itself missed (a busy machine, or
-physics slower than real time) is left out rather than caught up, so that a client never finds
-servos that have aged by a second between two bytes. A client that sets a baud rate retunes the line
-to it, so servos at another are silent; one that sets none is taken to have the line's.
+whenever the server runs. Bytes that a client writes to ``path`` go onto the line, and replies are
+returned when their bytes have arrived. If the server stalls (a busy machine, or physics slower than
+real time), simulated time pauses, so that servos never age by a second between two bytes. A client
+that sets a baud rate retunes the line to it, so servos at another are silent; one that sets none is
+taken to have the line's.
 """
 
 import fcntl
@@ -28,9 +28,9 @@ from snakewalk.sim.line.wire import Wire
 IDLE_S = 0.02
 """How often physics catches up while no client talks."""
 SPIN_S = 1e-3
-"""What is due sooner is awaited without sleep: on a busy machine a sleeper is woken 10 ms late."""
+"""Shorter waits are done without sleep: on a busy machine a sleeper is woken 10 ms late."""
 LATE_S = 0.1
-"""Real time that one step may make up for; what is beyond it is left out."""
+"""Real time that one step may make up for; the rest is left out."""
 PACE_MAX = 1000.0
 """A step then makes up for 100 simulated seconds; one that nobody waits for to its end looks at no
 client and at no end of serving (ours)."""
@@ -82,8 +82,8 @@ class PtyServer:
         self.overrun_bytes = 0
         """Bytes lost because the client did not read them."""
         self.output_flushes = 0
-        """How often, at least, the client threw away what the kernel had not handed over yet: it
-        tells of all flushes between two looks as of one."""
+        """Least number of times that the client discarded bytes that the kernel had not handed
+        over; all flushes between two looks count as one."""
         self._link_checked_s = clock.now_s()
         self.path = ""
         """The device to open as a serial port; empty while the port has vanished."""
@@ -101,7 +101,7 @@ class PtyServer:
         self.close()
 
     def close(self) -> None:
-        """Take the device away; safe to call twice."""
+        """Remove the device; safe to call twice."""
         if self.path and select.select([self._master], [], [], 0.0)[0]:
             self._receive()  # a flush since the last look is counted, too
         for end in (self._master, self._slave):
@@ -161,7 +161,7 @@ class PtyServer:
                 self.overrun_bytes += len(arrived)
 
     def _receive(self) -> bytes:
-        """Bytes of the client; none where the kernel tells of something else."""
+        """Bytes of the client; empty if the kernel reports something else."""
         received = os.read(self._master, CHUNK_BYTES)
         if received[0] == termios.TIOCPKT_DATA:
             return received[1:]
@@ -179,14 +179,14 @@ class PtyServer:
             before_s, left_s = left_s, until_s - self._clock.now_s()
             if nap_s > 0.0 or left_s <= 0.0:
                 return False
-            nap_s = left_s if left_s == before_s else 0.0  # a clock that somebody moves by hand
+            nap_s = left_s if left_s == before_s else 0.0  # a clock that a test moves by hand
         return True
 
     def _open(self) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)  # no echo; held open so that clients may come and go
         os.set_blocking(self._master, False)
-        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))  # tells flushes, too
+        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))  # reports flushes, too
         self.path = os.ttyname(self._slave)
         self._speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         if self._link is not None:

@@ -37,7 +37,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
 @pytest.fixture
 def servo_bus(request: pytest.FixtureRequest) -> "Iterator[Callable[..., ServoBus]]":
     """Make simulated buses: ``servo_bus("1-6:XL330-M288", baud=..., faults=..., imu="200")``."""
-    # pytest loads this in every suite of the environment: what is heavy waits for its first use
+    # pytest loads this in every suite of the environment: slow imports wait for the first use
     from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415  every suite loads this
 
     made: list[ServoBus] = []

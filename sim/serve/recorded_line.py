@@ -28,9 +28,9 @@ class RecordedLine(Wire):
     """A line on which nobody is: it answers a packet as the recording does.
 
     Packets are looked for from the last one that was found on, and then from the beginning, so that
-    a client that goes through the recording gets its replies in order. Of a write only servo and
-    address are compared: a client that writes other values gets the reply of the recorded ones. To
-    what the recording does not have there is no reply.
+    a client that goes through the recording gets its replies in order. A write is compared by servo
+    and address only, so a client that writes other values gets the reply of the recorded ones.
+    Packets that the recording lacks get no reply.
     """
 
     def __init__(self, exchanges: Sequence[Exchange], baud: int = 1_000_000) -> None:
@@ -46,7 +46,7 @@ class RecordedLine(Wire):
         """Line of a recording of ``bus serve --record``, whose servos were at ``baud``.
 
         Raises:
-            InputError: it is no such recording, or no host sends anything in it.
+            InputError: it is not such a recording, or no host sends anything in it.
 
         """
         byte_s = BITS_PER_BYTE / baud
@@ -55,7 +55,7 @@ class RecordedLine(Wire):
         for time_s, from_host, data in read_exchange(path):
             if from_host:
                 found.append(Exchange(data))
-            elif found:  # what comes first answers nobody
+            elif found:  # the first bytes are not a reply
                 begin_s = time_s - len(data) * byte_s
                 found[-1].replies.append(Reply(max(begin_s - quiet_s, 0.0), data))
             quiet_s = time_s
@@ -78,7 +78,7 @@ class RecordedLine(Wire):
         """Packets are compared whole."""
 
     def _on_baud_change(self, baud: int) -> None:
-        """Whoever asks is answered, at any rate."""
+        """Every client gets replies, at any rate."""
 
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         for alike in (_same, _same_write):

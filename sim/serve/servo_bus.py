@@ -74,7 +74,7 @@ class ServoBus:
         """(S,) values of a register, in the order of the IDs; a copy, as fresh as a read is.
 
         Raises:
-            KeyError: there is no such register; the closest names are listed.
+            KeyError: the register does not exist; the closest names are listed.
 
         """
         if self._server is None:

@@ -1,7 +1,7 @@
 """The control tables of all servos of a bus as one array, and the rules for reading and writing.
 
-A register is a live, typed view over all servos at once, so a group read or write is one slice.
-What the registers *do* (drive the motor, show the shaft, run the watchdog) is in
+A register is a live, typed view over all servos at once, so a group read or write is one slice. The
+actions of registers (drive the motor, show the shaft, run the watchdog) are in
 ``sim.servo.firmware``.
 """
 
@@ -48,9 +48,9 @@ class ServoScales:
     rad_s2_per_acceleration: Floats
     full_pwm: Floats
     lowest_position: Floats
-    """Of one turn."""
+    """Limit within one turn."""
     homing_limit: Floats
-    """Infinite if there is none."""
+    """Infinite without a limit."""
 
     @staticmethod
     def of(models: Sequence[ServoModel]) -> "ServoScales":
@@ -70,8 +70,8 @@ class ServoScales:
 class ServoBank:
     """S servos with factory settings, except ID and baud rate, of one model or of several.
 
-    The registers of a run are at the same address in all models of a bank, so that a register is
-    one column over all servos; other registers and the rules are looked up by row.
+    The registers of a run are at the same address in all models of a bank, so a register is one
+    column over all servos. Other registers and the rules are looked up by row.
 
     Args:
         ids: in the order of the chain.
@@ -258,7 +258,7 @@ class ServoBank:
         return error
 
     def take_registered(self, row: int) -> tuple[int, bytes] | None:
-        """Take out the registered write, address and data; None if there is none."""
+        """Remove and return the registered write, address and data; None without one."""
         self["Registered Instruction"][row] = 0
         return self._registered.pop(row, None)
 
@@ -347,7 +347,7 @@ class ServoBank:
         return ResultError.NONE
 
     def goal_limits(self, name: str, row: int) -> tuple[int, int]:
-        """Least and greatest value that a goal register takes now."""
+        """Least and greatest value that a goal register accepts at present."""
         if name == "Goal Position":
             if self["Operating Mode"][row] == POSITION_MODE:
                 return int(self["Min Position Limit"][row]), int(self["Max Position Limit"][row])

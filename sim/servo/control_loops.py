@@ -1,10 +1,10 @@
 """The servos' own control loops where they are more than the bridge's plain proportional law.
 
-Position PID with feed-forward along a profile, and the velocity loop, run every ``CONTROL_S``; they
-reach the motors through the same drive: a proportional gain, and a goal shifted by what the other
-terms add. Gains are the e-manual's: K_P = register / 128 PWM units a tick, K_D / 16, K_I / 65536,
-feed-forward / 4; velocity K_P / 128 a unit of velocity, K_I / 65536. It gives no unit of time
-for the other terms: they are taken a control period, one millisecond (ours).
+Position PID with feed-forward along a profile, and the velocity loop, run every ``CONTROL_S``. They
+reach the motors through the same drive: a proportional gain, and a goal shifted by the sum of the
+other terms. Gains are the e-manual's: K_P = register / 128 PWM units a tick, K_D / 16, K_I / 65536,
+feed-forward / 4; velocity K_P / 128 a unit of velocity, K_I / 65536. It gives no unit of time for
+the other terms: they are taken a control period, one millisecond (ours).
 """
 
 import numpy as np

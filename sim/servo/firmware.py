@@ -138,7 +138,7 @@ class Firmware:
                 self._slice_s += SLICE_S
 
     def on_instruction(self, time_s: float) -> None:
-        """Feed the watchdogs: any instruction packet does, whoever it is for (e-manual)."""
+        """Feed the watchdogs: any instruction packet feeds all of them (e-manual)."""
         dog = self._watchdog
         dog.fed_s, dog.due_s = time_s, time_s + dog.timeout_s
 
@@ -175,7 +175,7 @@ class Firmware:
             self._control_s = self._time_s + CONTROL_S
         full = np.abs(bank["Goal PWM"].astype(float)) / self._scales.full_pwm
         drive.pwm_limit[:] = np.where(self.no_output, 0.0, full)
-        self.protection.full = np.where(full > 0.0, full, 1.0)  # 0 of 0 is no effort
+        self.protection.full = np.where(full > 0.0, full, 1.0)  # 0 of 0 means no effort
         self._push = np.zeros(len(bank))
         for pushing, goal in ((PWM_MODE, "Goal PWM"), (CURRENT_MODE, "Goal Current")):
             if goal in bank:
@@ -302,7 +302,7 @@ class Firmware:
         self._readings.clear(rows, name)
 
     def cut_power(self, rows: NDArray[np.intp]) -> None:
-        """Take the supply away: shafts go limp, and all that is not EEPROM is lost."""
+        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
         self.powered[rows] = False
         self.apply_registers()
 

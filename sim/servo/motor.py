@@ -200,11 +200,11 @@ class Gearbox:
     The greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``: teeth press
     harder the more they carry, and most when motor and load strive against each other. While the
     shaft is slow it is ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|`` more, times
-    ``exp(-(|w| / stribeck_rad_s)^stribeck_exponent)``. Where motor and load strive against each
-    other, the slow share has a square as well: ``by_load_square t_load^2`` while the motor is the
-    stronger, ``by_motor_square t_motor^2`` while the load is (Duclusaud et al., "Extended Friction
-    Models for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to M6). It never
-    reverses a shaft; a shaft that it can hold rests.
+    ``exp(-(|w| / stribeck_rad_s)^stribeck_exponent)``. If motor and load oppose each other, the
+    slow share also has a square: ``by_load_square t_load^2`` while the motor is stronger,
+    ``by_motor_square t_motor^2`` while the load is. (Duclusaud et al., "Extended Friction Models
+    for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to M6.) It never reverses a
+    shaft; a shaft that it can hold rests.
     """
 
     armature_kg_m2: Floats | float
@@ -214,11 +214,11 @@ class Gearbox:
     stribeck_n_m: Floats | float
     stribeck_rad_s: Floats | float
     by_motor: Floats | float
-    """Share of the motor's torque that friction takes."""
+    """Share of the motor's torque that friction consumes."""
     by_load: Floats | float
-    """Share of the load's torque that friction takes."""
+    """Share of the load's torque that friction consumes."""
     by_load_slow: Floats | float
-    """Share that it takes more while the shaft is slow."""
+    """Additional share while the shaft is slow."""
     by_motor_slow: Floats | float = 0.0
     stribeck_exponent: Floats | float = 2.0
     by_motor_square: Floats | float = 0.0

@@ -1,8 +1,8 @@
 """Output and current of the motors as the servos themselves measure them.
 
-A plant reports the output that the bridge was asked for. Where a current limit cuts the output, or
-something holds the shaft, a servo's registers show what is left: so a gripper that closes with
-little current is not taken for one that pushes with all it has.
+A plant reports the output that the bridge was asked for. If a current limit cuts the output, or
+something holds the shaft, a servo's registers show the remaining output. So a gripper that closes
+with little current does not look like one that pushes with full output.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 AT_LIMIT = 0.999
 """Share of its limit from which on a current is taken to be cut."""
 LEAST_SUPPLY_V = 0.1
-"""Less supply than this is none."""
+"""A lower supply counts as zero."""
 
 
 class MotorOutput:

@@ -1,4 +1,4 @@
-"""Present values: what the registers show of shafts, trajectories, motion and time."""
+"""Present values: registers that show shafts, trajectories, motion and time."""
 
 import math
 
@@ -65,7 +65,7 @@ class PresentValues:
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
         plant, current_a = self._plant, self._motor_output.current_a()
-        if self._any_load:  # what full output would draw at stall, in the unit of such a row
+        if self._any_load:  # current of full output at stall, in the unit of such a row
             output_a = self._motor_output.pwm(plant.velocity_rad_s) * self._stall_a
             current_a = np.where(self._measured, current_a, output_a)
         write_motion(

@@ -1,7 +1,7 @@
-"""Profiles: how a servo turns a new goal into a trajectory (e-manual, What is the Profile).
+"""Profiles: trajectories of a servo towards a new goal (e-manual, section Profile).
 
-Velocity-based profiles limit speed and acceleration; time-based ones (Drive Mode(10), bit 2) say
-how long the whole move and its acceleration take, and become the former when the goal is set.
+Velocity-based profiles limit speed and acceleration. Time-based ones (Drive Mode(10), bit 2) state
+the duration of the whole move and of its acceleration, and become the former when the goal is set.
 Profile Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezoid or triangle.
 """
 
@@ -33,7 +33,7 @@ class Trajectory:
         self.velocity = np.zeros(servos)
         self.goal = np.zeros(servos)
         self.acceleration = np.zeros(servos)
-        """Of the last step, for the feed-forward."""
+        """Acceleration of the last step, for the feed-forward."""
         self.kind = np.zeros(servos, np.uint8)
         """Moving Status bits of the profile in use."""
         self._speed = np.full(servos, np.inf)
@@ -50,7 +50,7 @@ class Trajectory:
         self.velocity[which] = self.acceleration[which] = 0.0
 
     def set_goals(self, goal: Floats, velocity: Floats, ramp: Floats, timed: Bools) -> None:
-        """Take new goals, rad, with the present profile registers."""
+        """Set new goals, rad, with the present profile registers."""
         new = goal != self.goal
         if not new.any():
             return

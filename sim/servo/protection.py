@@ -54,10 +54,10 @@ class SupplyAndAmbient:
     supply_v: float | None = None
     """None: the nominal voltage of each servo's model."""
     supply_ohm: float = SOURCE_OHM
-    """Of battery and cable together; servos of one voltage share a cable."""
+    """Resistance of battery and cable together; servos of one voltage share a cable."""
     ambient_c: float = 25.0
     cabling: Cabling | None = None
-    """Cables between the servos, which are then all on one source; None: they take nothing."""
+    """Cables between the servos, which then all have one source; None: no drop."""
 
     @staticmethod
     def of(robot: RobotConfig) -> "SupplyAndAmbient":
@@ -186,8 +186,9 @@ class Protection:
     def _sag_along(self, cabling: Cabling, pwm: Floats, current_a: Floats) -> None:
         """Let the voltage sag along the chain; output and shaft speed stay as they are now.
 
-        A bridge draws more at more volts, by ``pwm^2 / R``, unless something limits its current: so
-        the voltages are those of the whole chain at once, also where cables take most of them.
+        A bridge draws more at more volts, by ``pwm^2 / R``, unless something limits its current. So
+        the voltages are solved for the whole chain at once, even if the cables cause most of the
+        drop.
         """
         drive = self._drive
         drives = (pwm * current_a > 0.0) & (np.abs(current_a) < AT_LIMIT * drive.current_limit_a)

@@ -1,6 +1,6 @@
-"""What every control cycle asks of the servos, as compiled loops over servos and bytes.
+"""Work of the servos in every control cycle, as compiled loops over servos and bytes.
 
-Arguments are arrays and plain numbers: numba takes five times longer to unpack a tuple than an
+Arguments are arrays and plain numbers: numba needs five times longer to unpack a tuple than an
 array.
 """
 
@@ -17,7 +17,7 @@ from snakewalk.drivers.protocol.frames import (
     read_plain,
 )
 
-# as numba writes them; what is only read may be read-only, and a register's column has gaps
+# as numba writes them; read-only arguments may be read-only, and a register's column has gaps
 _READ = readonly_array("uint8", layout="C")
 _TABLE = "uint8[:, ::1]"
 _PLACES = readonly_array("int64", layout="C")
@@ -202,7 +202,7 @@ def accept_goals(
 def warm_up(
     temperature_c: Floats, heat_j: Floats, slice_s: float, ambient_c: float, thermal: Floats
 ) -> None:
-    """Move each sensor towards where its heat would take it in the long run.
+    """Move each sensor towards the final temperature of its heat.
 
     Args:
         temperature_c: (S,)
@@ -241,7 +241,7 @@ def out_of_range(
 
 @compiled(f"float64({_SEEN}, {_SEEN})", makes_arrays=False)
 def supply_current_a(pwm: Floats, current_a: Floats) -> float:
-    """Current that the bridges take from the supply, A."""
+    """Current of the bridges from the supply, A."""
     sum_a = 0.0
     for row in range(len(pwm)):
         sum_a += abs(pwm[row] * current_a[row])

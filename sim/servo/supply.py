@@ -11,7 +11,8 @@ from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 SOURCE_OHM = 0.02
-"""Of battery and cable together: the voltage sags with the current of all servos on it (ours)."""
+"""Resistance of battery and cable together: the voltage sags with the current of all servos on it
+(ours)."""
 _ROW = readonly_array(layout="C")
 
 
@@ -30,7 +31,7 @@ class Supply:
         return float(self._volts[0])
 
     def change(self, volts: float | None, rows: Indices | None = None) -> None:
-        """Set another voltage for the chain, or for ``rows`` alone; None: what it was before."""
+        """Set another voltage for the chain, or for ``rows`` alone; None: the usual voltage."""
         if rows is None:
             self._volts[:] = self.usual_v if volts is None else volts
             return
@@ -38,7 +39,7 @@ class Supply:
         self._overridden = not np.isnan(self._override_v).all()
 
     def feed(self, supply_v: Floats, drop_v: Floats | float = 0.0) -> None:
-        """Set ``supply_v`` (S,), where the cable takes ``drop_v`` from the chain's voltage."""
+        """Set ``supply_v`` (S,) to the chain's voltage without the drop ``drop_v`` of the cable."""
         np.subtract(self._volts, drop_v, out=supply_v)
         if self._overridden:
             own = ~np.isnan(self._override_v)
@@ -103,8 +104,9 @@ def servo_voltages(
     """Voltage at each servo of a ladder, into ``out``; arguments as of ``Cabling.servo_v``.
 
     Kirchhoff's law at each servo is a row of a tridiagonal system, which one sweep there and one
-    back solve (Thomas). What the leads share couples all rows by the one rail voltage, in which the
-    servos' voltages are linear: the sweep runs for a rail of 0 V and for each volt of it.
+    back solve (Thomas). The resistance that the leads share couples all rows by the one rail
+    voltage, and the servos' voltages are linear in it. The sweep therefore runs for a rail of 0 V
+    and for each volt of it.
     """
     servos = len(out)
     upper = np.empty(servos)

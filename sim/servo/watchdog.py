@@ -1,7 +1,7 @@
 """Bus Watchdog(98): a servo that receives nothing for its time stops where it is.
 
-Any instruction packet feeds the watchdogs of all, whoever it is for, while torque is on; one that
-has run out reads -1 until 0 is written. (e-manual, Bus Watchdog.)
+While torque is on, any instruction packet feeds the watchdogs of all servos. A watchdog that has
+run out reads -1 until 0 is written. (e-manual, Bus Watchdog.)
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ class Watchdog:
         """When the first of them runs out."""
 
     def arm(self, on: Bools) -> None:
-        """Take over the register and which servos (S,) have torque on."""
+        """Read the register, and copy which servos (S,) have torque on."""
         dog = self._bank["Bus Watchdog"]
         self._watched = (dog > 0) & (dog < WATCHDOG_TRIPPED) & on
         watched = self._watched

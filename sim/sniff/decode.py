@@ -34,7 +34,7 @@ _GROUP_READS = (
 
 @dataclass(frozen=True, slots=True)
 class DecodedPacket:
-    """One packet, or bytes that are none."""
+    """One packet, or bytes that are not a packet."""
 
     time_s: float
     kind: str

@@ -9,7 +9,7 @@ from snakewalk.config.archive import parse_json, read_bytes
 from snakewalk.config.errors import InputError
 
 _MOST_BYTES = 200_000_000
-"""Of a recording (ours)."""
+"""Limit of a recording (ours)."""
 
 
 class TraceWriter:
@@ -27,7 +27,7 @@ class TraceWriter:
 
 
 def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
-    """(time in s, whether the host sent it, bytes) of what ``TraceWriter`` wrote.
+    """(time in s, whether the host sent it, bytes) of the file of a ``TraceWriter``.
 
     Raises:
         InputError: the file is missing, or is something else, with the line that is wrong.
@@ -38,7 +38,9 @@ def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: is no exchange of bus serve --record") from None
+        raise InputError(
+            f"{path}: is not an exchange of bus serve --record; choose another file"
+        ) from None
     for number, line in enumerate(text.splitlines(), 1):
         try:
             entry = parse_json(line)
@@ -56,7 +58,7 @@ def read_trace(path: Path) -> Iterator[tuple[float, bytes]]:
     """(time in s, bytes) of a recording; hex text and raw bytes have no times: 0.
 
     Raises:
-        InputError: the file is missing, or is none of the three, with the line that is wrong.
+        InputError: the file is missing, or of another format, with the line that is wrong.
 
     """
     try:

@@ -214,7 +214,7 @@ def test_what_has_no_end_is_not_read_to_it() -> None:
 )
 def test_a_calibration_that_opencv_would_crash_on_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "lens.yml").write_text(text)
-    with pytest.raises(InputError, match=r"lens\.yml: is no file of a calibration: "):
+    with pytest.raises(InputError, match=r"lens\.yml: is not a calibration file: "):
         Lens.read(tmp_path / "lens.yml")
 
 

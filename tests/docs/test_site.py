@@ -32,6 +32,19 @@ def test_no_page_stands_in_two_places() -> None:
     assert len(names) == len(set(names))
 
 
+GENERATED = {"configuration.md", "reference.md"}
+LARGEST_PAGE = 250
+
+
+def test_no_page_written_by_hand_is_long() -> None:
+    lines = {
+        page.relative_to(DOCS).as_posix(): len(page.read_text(encoding="utf-8").splitlines())
+        for page in DOCS.rglob("*.md")
+        if page.name not in GENERATED
+    }
+    assert {name: count for name, count in lines.items() if count > LARGEST_PAGE} == {}
+
+
 def test_the_reference_has_every_public_name() -> None:
     text = (DOCS / "reference.md").read_text(encoding="utf-8")
     named = re.findall(r"^\.\. (?:autoclass|autofunction|data):: (\w+)", text, re.MULTILINE)

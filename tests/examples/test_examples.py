@@ -95,7 +95,7 @@ def test_it_is_short_and_imports_only_the_library(name: str) -> None:
     assert all("." not in module for module in modules if module.startswith("snakewalk"))
 
 
-@pytest.mark.parametrize("tool", ["film_strip", "gallery", "overhead_picture"])
+@pytest.mark.parametrize("tool", ["film_strip", "gallery", "landing_film", "overhead_picture"])
 def test_the_tools_that_draw_the_pages_explain_themselves(
     tool: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

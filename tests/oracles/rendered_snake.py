@@ -59,6 +59,16 @@ class SnakeScene:
     """How far the camera goes with the animal: 1 keeps its middle in the middle of the picture."""
     gain: float = 1.0
     """Exposure: above 1 the ground saturates."""
+    tip: float = 0.15
+    """Width of the tail's tip over the greatest width; 0: pointed."""
+    head: float = 1.0
+    """Width of the first sixth of the body over that of the rest; above 1: a wide head."""
+    faint: float = 1.0
+    """Contrast of the tail over that of the head; the change is at a third of the body."""
+    bands: int = 0
+    """Number of light bands across the body."""
+    band: float = 0.25
+    """Contrast of a light band over that of the body."""
 
 
 def camera_places(scene: SnakeScene, midlines: Floats) -> Floats:
@@ -146,7 +156,17 @@ def half_width(scene: SnakeScene) -> Floats:
         0.8 + 0.2 * np.sin(np.pi * np.minimum(s / 0.8, 1.0))
     )
     tail = np.clip((1.0 - s) / scene.taper, 0.0, 1.0) ** 0.8
-    return np.asarray(0.5 * scene.length_px / scene.slender * np.minimum(shape, 0.15 + 0.85 * tail))
+    wide = np.minimum(shape, scene.tip + (1.0 - scene.tip) * tail)
+    wide = wide * (1.0 + (scene.head - 1.0) * np.clip((0.22 - s) / 0.06, 0.0, 1.0))
+    return np.asarray(0.5 * scene.length_px / scene.slender * wide)
+
+
+def strength(scene: SnakeScene) -> Floats:
+    """(100,) contrast of each piece of the body over the greatest: its bands, its faint tail."""
+    s = (np.arange(100) + 0.5) / 100.0
+    faint = 1.0 + (scene.faint - 1.0) * np.clip((s - 0.3) / 0.06, 0.0, 1.0)
+    light = (np.sin(2.0 * np.pi * scene.bands * s) < 0.0) if scene.bands else np.zeros(100, bool)
+    return np.asarray(faint * np.where(light, scene.band, 1.0))
 
 
 def _coverage(scene: SnakeScene, midline: Floats) -> NDArray[np.float32]:
@@ -160,15 +180,16 @@ def _coverage(scene: SnakeScene, midline: Floats) -> NDArray[np.float32]:
     size = np.ceil(midline.max(axis=0) + reach - low).astype(int)
     canvas = np.zeros((size[1] * fine, size[0] * fine), dtype=np.uint8)
     left, right = midline + wide * normal, midline - wide * normal
+    grey = np.rint(255.0 * strength(scene))
     for k in range(len(midline) - 1):
         piece = np.stack([left[k], left[k + 1], right[k + 1], right[k]])
         corners = ((piece - low + 0.5) * fine - 0.5) * 256.0
-        cv2.fillConvexPoly(canvas, np.rint(corners).astype(np.int32), 255, shift=8)
+        cv2.fillConvexPoly(canvas, np.rint(corners).astype(np.int32), grey[k], shift=8)
     cv2.circle(
         canvas,
         tuple(int(v) for v in np.rint(((midline[-1] - low + 0.5) * fine - 0.5) * 256.0)),
         round(float(wide[-1, 0]) * fine * 256.0),
-        255,
+        grey[-1],
         -1,
         shift=8,
     )

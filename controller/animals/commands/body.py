@@ -41,27 +41,39 @@ from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 Animate = Annotated[
     str | None,
     typer.Option(
-        help="what moves it: a recording, the log of a run, or a spine gait",
+        help="source of the motion: a recording, the log of a run, or a spine gait",
         autocompletion=completion.MOVING,
     ),
 ]
-Curves = Annotated[int | None, typer.Option(help="boundary curves of the skin; default 37")]
+Curves = Annotated[
+    int | None, typer.Option(help="number of boundary curves of the skin; default: 37")
+]
 Order = Annotated[
     int | None,
-    typer.Option(help="of the skin: 1 creased, 2 biharmonic (default), 3 with even curvature"),
+    typer.Option(
+        help="order of the skin: 1 creased, 2 biharmonic (default), 3 with even curvature"
+    ),
 ]
 Surface = Annotated[
-    bool, typer.Option("--surface", help="of a mesh: the surface through its curves instead")
+    bool,
+    typer.Option(
+        "--surface",
+        help="fit a PDE surface through curves of a given mesh, and write it instead of the mesh",
+    ),
 ]
 Forward = Annotated[
-    str | None, typer.Option(help="of a mesh: axis to its head, +x, -z, ...; default: longest")
+    str | None,
+    typer.Option(
+        help="axis of a given mesh that points to its head: +x, -z, ...; default: its longest axis"
+    ),
 ]
 Up = Annotated[
-    str | None, typer.Option(help="of a mesh: axis that points up; default: +y, of an .obj +z")
+    str | None,
+    typer.Option(help="axis of a given mesh that points up; default: +y, for an .obj +z"),
 ]
 Frame = Annotated[
     int | None,
-    typer.Option(help="of the track, from 0 (default): that --image shows, or --posed takes"),
+    typer.Option(help="frame of the track that --image shows or --posed uses; default: 0"),
 ]
 
 
@@ -79,10 +91,13 @@ def body(
             autocompletion=completion.BODIES,
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="body.glb or body.obj")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="write the body here: body.glb or body.obj")
+    ],
     animate: Animate = None,
     fps: Annotated[
-        float | None, typer.Option(help="frames a second; default: a recording's own, 25 of a log")
+        float | None,
+        typer.Option(help="frames per second; default: the recording's rate, or 25 for a log"),
     ] = None,
     curves: Curves = None,
     order: Order = None,
@@ -90,15 +105,20 @@ def body(
     forward: Forward = None,
     up: Up = None,
     image: Annotated[
-        Path | None, typer.Option(help="picture of the body from above: the skin's texture")
+        Path | None,
+        typer.Option(help="picture of the body from above, used as the texture of the skin"),
     ] = None,
     frame: Frame = None,
     side: Annotated[
-        Path | None, typer.Option(help="an .npz of the same body seen from the side: its heights")
+        Path | None,
+        typer.Option(help="an .npz of the same body seen from the side, used for its heights"),
     ] = None,
-    aspect: Annotated[float, typer.Option(help="height over width, without a side view")] = 0.85,
+    aspect: Annotated[
+        float, typer.Option(help="ratio of height to width without a side view")
+    ] = 0.85,
     posed: Annotated[
-        bool, typer.Option("--posed", help="bent as in --frame, not straight")
+        bool,
+        typer.Option("--posed", help="bend the body as in --frame instead of straightening it"),
     ] = False,
     picture: Annotated[
         Path | None, typer.Option(help="draw widths, skin and solid here (.png, .svg, .pdf)")
@@ -106,7 +126,7 @@ def body(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make the body's mesh, or a skin that moves: a textured, animated glTF (--animate)."""
+    """Make the body's mesh (.obj, .glb), or an animated, textured skin with --animate."""
     check_picture(picture)
     if not 0.1 <= aspect <= 10.0:
         raise InputError(f"aspect: height over width must be from 0.1 to 10, not {aspect:g}")
@@ -213,6 +233,7 @@ class _Made:
                 "frames": len(motion.time_s),
                 "duration_s": round(float(motion.time_s[-1]), 3),
                 "bones": len(motion.bone_m),
+                **motion.pose,
             }
         if self.picture is not None:
             _plots().draw_skin(self.picture, skin, motion, body.texture)
@@ -248,7 +269,7 @@ def _check_options(
     """Refuse options that would do nothing."""
     mesh = given and body.lower().endswith(MESH_ENDINGS)
     faults = [
-        f"{name}: is for recordings with widths; {body} is none"
+        f"{name}: is for recordings with widths, and {body} has none; leave it out"
         for name, value in of_widths.items()
         if given and value
     ]
@@ -317,7 +338,7 @@ def _read_picture(image: Path) -> Image:
     except Pillow.DecompressionBombError as error:
         raise InputError(f"{image}: {error}") from None
     except (UnidentifiedImageError, OSError, SyntaxError):
-        raise InputError(f"{image}: is no picture that can be read") from None
+        raise InputError(f"{image}: is not a readable picture; choose another file") from None
 
 
 def _check_frame(name: str, points: Floats, frame: int) -> None:

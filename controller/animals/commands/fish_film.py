@@ -19,7 +19,7 @@ from snakewalk.controller.console.progress import ProgressBar
     examples=("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel"),
 )
 def film(
-    folder: Annotated[Path, typer.Argument(help="folder to write frames and truth.npz into")],
+    folder: Annotated[Path, typer.Argument(help="folder for the frames and truth.npz")],
     motion: Annotated[
         str | None,
         typer.Option(
@@ -28,17 +28,26 @@ def film(
         ),
     ] = None,
     build: Build = "carp",
-    length_px: Annotated[float, typer.Option(min=20, max=2000, help="body length")] = 120.0,
-    frames: Annotated[int | None, typer.Option(min=2, help="at most so many")] = None,
-    side: Annotated[bool, typer.Option("--side", help="film from the side as well")] = False,
+    length_px: Annotated[
+        float, typer.Option(min=20, max=2000, help="body length in pixels")
+    ] = 120.0,
+    frames: Annotated[
+        int | None, typer.Option(min=2, help="largest number of frames to render")
+    ] = None,
+    side: Annotated[
+        bool, typer.Option("--side", help="render a second film from the side")
+    ] = False,
     fins: Annotated[
-        float, typer.Option(min=0.0, max=0.3, help="pectoral fins seen from above, body lengths")
+        float,
+        typer.Option(
+            min=0.0, max=0.3, help="length of pectoral fins seen from above, in body lengths"
+        ),
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="of patterns and noise")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of patterns and noise")] = 0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Render a fish whose every angle is known, with marks, shadow, blur and noise."""
+    """Render a film of a fish with known angles, marks, shadow, blur and noise."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is a file; give a folder")
     if folder.is_dir() and any(folder.iterdir()) and not force:

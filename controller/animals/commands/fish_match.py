@@ -18,7 +18,10 @@ from snakewalk.controller.console.result_files import (
     check_picture,
 )
 
-Rate = Annotated[float | None, typer.Option(help="frames a second, instead of what the file says")]
+Rate = Annotated[
+    float | None,
+    typer.Option(help="frame rate in frames per second; default: the rate that the film states"),
+]
 
 
 @command(
@@ -31,29 +34,41 @@ Rate = Annotated[float | None, typer.Option(help="frames a second, instead of wh
 )
 def match(
     footage: Annotated[
-        Path, typer.Argument(help="video or folder of images from above; or tracked midlines")
+        Path,
+        typer.Argument(help="video or folder of images from above, or a file of tracked midlines"),
     ],
     side: Annotated[
-        Path | None, typer.Option(help="the same moments from the side: height and pitch")
+        Path | None,
+        typer.Option(
+            help="video or folder of the same moments from the side, for height and pitch"
+        ),
     ] = None,
     background: Annotated[
-        Path | None, typer.Option(help="picture of the empty scene; default: median of frames")
+        Path | None, typer.Option(help="picture of the empty scene; default: median of the frames")
     ] = None,
-    side_background: Annotated[Path | None, typer.Option(help="the same of the side view")] = None,
+    side_background: Annotated[
+        Path | None,
+        typer.Option(
+            help="picture of the empty scene from the side; default: median of the frames"
+        ),
+    ] = None,
     build: Build = "carp",
     rate: Rate = None,
     length: Annotated[
-        float | None, typer.Option(help="body length, m; without it the unit is the body length")
+        float | None,
+        typer.Option(help="body length in metres; without it, lengths are in body lengths"),
     ] = None,
     truth: Annotated[
         Path | None, typer.Option(help="known postures to compare with: truth.npz of fish film")
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="postures")] = Path("postures.npz"),
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="write the postures here (.npz)")
+    ] = Path("postures.npz"),
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Lay a deformable fish over every frame: head, spine angles, and from the side its pitch."""
+    """Fit a deformable fish to every frame: head, spine angles, and from the side its pitch."""
     check_picture(picture)
     check_npz(output)
     if length is not None and not 0.0 < length < 1e3:

@@ -11,11 +11,11 @@ from snakewalk.controller.console import completion
 Build = Annotated[
     str,
     typer.Option(
-        help="carp (A0..A3 behind a rigid head) or eel (8 angles)",
+        help="model of the body: carp (A0..A3 behind a rigid head) or eel (8 angles)",
         autocompletion=completion.words("carp", "eel"),
     ),
 ]
-Picture = Annotated[Path | None, typer.Option(help="draw here (.png, .svg, .pdf)")]
+Picture = Annotated[Path | None, typer.Option(help="draw the result here (.png, .svg, .pdf)")]
 
 
 def check_npz(path: Path) -> None:
@@ -26,4 +26,4 @@ def check_npz(path: Path) -> None:
 
     """
     if path.suffix.lower() != ".npz":
-        raise InputError(f"{path}: what is written is an .npz")
+        raise InputError(f"{path}: the result is an .npz; change the ending")

@@ -32,37 +32,55 @@ def synthesise(
     through: Annotated[
         list[str] | None,
         typer.Option(
-            help="control point X,Y or X,Y,Z from the start, x along the head; give several"
+            help="control point X,Y or X,Y,Z from the start, x along the head; may be repeated"
         ),
     ] = None,
     seconds: Annotated[
-        float, typer.Option(min=0.1, max=3600.0, help="at least so long, at random")
+        float,
+        typer.Option(min=0.1, max=3600.0, help="shortest duration of a random motion in seconds"),
     ] = 20.0,
-    seed: Annotated[int, typer.Option(min=0, help="of the random order")] = 0,
-    radius: Annotated[float, typer.Option(min=0.01, help="of a control point, body lengths")] = 0.5,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the random order")] = 0,
+    radius: Annotated[
+        float, typer.Option(min=0.01, help="radius of a control point in body lengths")
+    ] = 0.5,
     limit: Annotated[
-        float, typer.Option(min=1.0, max=3600.0, help="seconds for all control points")
+        float,
+        typer.Option(
+            min=1.0, max=3600.0, help="time limit in seconds for reaching all control points"
+        ),
     ] = 120.0,
     mirror: Annotated[
-        bool, typer.Option("--mirror", help="use every segment mirrored too")
+        bool, typer.Option("--mirror", help="also use the mirror image of every segment")
     ] = False,
     within: Annotated[
-        float, typer.Option(min=0.1, max=45.0, help="degrees from the basic posture")
+        float,
+        typer.Option(
+            min=0.1, max=45.0, help="largest difference from the basic posture in degrees"
+        ),
     ] = 4.0,
-    merge: Annotated[float, typer.Option(min=0.0, help="degrees below which beats merge")] = 20.0,
+    merge: Annotated[
+        float, typer.Option(min=0.0, help="merge tail beats that differ by fewer degrees than this")
+    ] = 20.0,
     reference: Annotated[
         str, typer.Option(help="basic posture: straight, or the commonest of the film")
     ] = "straight",
-    blend: Annotated[float, typer.Option(min=0.02, help="seconds of the blend of a join")] = 0.25,
+    blend: Annotated[
+        float, typer.Option(min=0.02, help="duration of the blend at a join in seconds")
+    ] = 0.25,
     robot: Annotated[
-        str, typer.Option(help="whose joints are written along", autocompletion=completion.ROBOTS)
+        str,
+        typer.Option(
+            help="add the joint angles of this robot to the track", autocompletion=completion.ROBOTS
+        ),
     ] = "yaw16",
-    output: Annotated[Path, typer.Option("--output", "-o", help="track")] = Path("track.npz"),
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="write the track here (.npz)")
+    ] = Path("track.npz"),
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Put segments of a film together anew, at random or through control points."""
+    """Join segments of a film in a new order, at random or through control points."""
     check_picture(picture)
     options = SynthesisOptions(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,

@@ -37,32 +37,35 @@ from snakewalk.controller.track.readers.load import load_keypoints
 )
 def stride(
     keypoints: Annotated[
-        Path, typer.Argument(help="SLEAP, DeepLabCut, QTM or C3D, seen from above")
+        Path,
+        typer.Argument(help="file of keypoints seen from above: SLEAP, DeepLabCut, QTM or C3D"),
     ],
     spine: Annotated[str, typer.Option(help="A,B,C: keypoints along the spine, head first")],
     girdles: Annotated[
-        str, typer.Option(help="F,H: those of the spine at the front and the hind legs")
+        str, typer.Option(help="F,H: keypoints of the spine at the front and the hind legs")
     ],
     feet: Annotated[
-        str, typer.Option(help="keypoints: front left,front right,hind left,hind right")
+        str, typer.Option(help="keypoints of the feet: front left,front right,hind left,hind right")
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="the animal's file")] = Path(
-        "animal.toml"
-    ),
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="write the animal's file here (.toml)")
+    ] = Path("animal.toml"),
     animal: Annotated[
         str,
         typer.Option(
-            help="whose heights, knees and skin are taken", autocompletion=completion.ANIMALS
+            help="animal whose heights, knees and skin to use", autocompletion=completion.ANIMALS
         ),
     ] = "lizard",
     length_m: Annotated[
-        float | None, typer.Option(help="of the spine; default: by the file's scale")
+        float | None, typer.Option(help="length of the spine in metres; default: the file's scale")
     ] = None,
     rate: Rate = None,
     min_score: MinScore = None,
     individual: Individual = None,
     plane: Plane = None,
-    picture: Annotated[Path | None, typer.Option(help="the fit of each foot")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw the fit of each foot here (.png, .svg, .pdf)")
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

@@ -37,7 +37,7 @@ from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
-"""Of the files, by what is in them."""
+"""Endings of the files, by content."""
 
 
 @command(
@@ -54,7 +54,7 @@ def synthesise(
     output: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", help="NAME: writes NAME.npz, NAME.png, ...; default: the run"
+            "--output", "-o", help="write NAME.npz, NAME.png, ...; default: the run's name"
         ),
     ] = None,
     robot: Robot = None,
@@ -64,30 +64,40 @@ def synthesise(
     motion: Annotated[
         str | None,
         typer.Option(
-            help="walk; walk-printed: aimed as [PT] prints it; kp: the older state graph of [KP]"
+            help="kind of motion: walk; walk-printed, aimed as [PT] prints it; kp, the state "
+            "graph of [KP]"
         ),
     ] = None,
     animal: Annotated[
         str | None,
         typer.Option(
-            help="with legs, in place of a snake: lizard, goat, or a .toml ([KP])",
+            help="animal with legs instead of a snake: lizard, goat, or a .toml ([KP])",
             autocompletion=completion.ANIMALS,
         ),
     ] = None,
     set_: Set = None,
     frames: Annotated[
         int | None,
-        typer.Option(min=2, max=100_000, help="exactly so many; default: to the last waypoint"),
+        typer.Option(
+            min=2,
+            max=100_000,
+            help="exact number of frames; default: as many as the last waypoint needs",
+        ),
     ] = None,
-    film: Annotated[bool, typer.Option("--film", help="NAME.mp4: the skin on the ground")] = False,
-    glb: Annotated[bool, typer.Option("--glb", help="NAME.glb: the skin as animated glTF")] = False,
+    film: Annotated[
+        bool, typer.Option("--film", help="write a film of the skin on the ground to NAME.mp4")
+    ] = False,
+    glb: Annotated[
+        bool, typer.Option("--glb", help="write the skin as animated glTF to NAME.glb")
+    ] = False,
     look: Annotated[
-        str, typer.Option(help="of both: animal, or a BODY as of `snakewalk body`")
+        str,
+        typer.Option(help="body in film and glTF: animal, or a BODY that `snakewalk body` accepts"),
     ] = "animal",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make an animal's motion over a world: a snake's by states ([PT]), or that of legs ([KP])."""
+    """Make an animal's motion over a world: a snake from states ([PT]), or legs ([KP])."""
     prepared = prepare_walk(
         run, keys=key_values("--set", set_), on_paper=True, seed=seed, motion=motion, robot=robot,
         world=world, track=track,

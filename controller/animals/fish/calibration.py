@@ -1,8 +1,8 @@
 """The model's size and sections from the film itself, [TH] 3.2.3, without a fish that holds still.
 
 The text films a straight fish and grows a small model until it fits best. Here the posture is
-searched in a few frames, the width is read off the silhouettes along the spines found, length and
-width are scaled to the largest V, and so are the pectoral fins chosen; twice.
+searched in a few frames, and the width is measured on the silhouettes along the spines found.
+Length, width and pectoral fins are scaled to the largest V; all of it twice.
 """
 
 from dataclasses import replace

@@ -25,17 +25,17 @@ class MatchFacts:
     rate_hz: float
     largest_angles_deg: list[float]
     length_px: float | None = None
-    """Of a film; None of midlines, and so are the next five."""
+    """Length in a film; None for midlines, like the next five."""
     fins: float | None = None
     """Length of the pectoral fins that were seen from above, body lengths; 0: none."""
     rate_assumed: bool | None = None
     background: str | None = None
-    """What the film's frames were compared with, in words."""
+    """Background of the film's frames, in words."""
     left_out: dict[str, int] | None = None
     """Frames without a posture, by reason."""
     value_v: float | None = None
     left_over_deg: float | None = None
-    """Of midlines: what the spine angles do not explain, root mean square."""
+    """Difference that the spine angles do not explain, root mean square; midlines only."""
 
     def to_dict(self) -> dict[str, object]:
         """Return the facts that are known, for JSON."""
@@ -45,7 +45,7 @@ class MatchFacts:
 
 @dataclass(frozen=True, slots=True)
 class MatchedRecording:
-    """Postures, what is known of them, and the matched film they come from."""
+    """Postures, facts of the match, and the matched film."""
 
     postures: Postures
     facts: MatchFacts

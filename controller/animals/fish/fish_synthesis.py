@@ -89,7 +89,7 @@ class SynthesisedMotion:
     facts: SynthesisFacts
 
     def save(self, file: Path) -> None:
-        """Write it as a recording that a run can take."""
+        """Write it as a recording that a run accepts."""
         save_motion(file, self.motion, self.joints_rad, self.facts.robot, self.sequence)
 
 

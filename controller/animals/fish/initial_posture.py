@@ -1,6 +1,6 @@
 """The first posture of a search: the silhouette's skeleton, with the head at either end.
 
-[TH] 3.3.1 takes the displacement of the silhouette's centre from the first frame to the second for
+[TH] 3.3.1 uses the displacement of the silhouette's centre from the first frame to the second as
 the direction of the head. A fish at rest has no displacement, and one that backs has the wrong one,
 so the build decides: both orientations are matched, and the better one is kept.
 """

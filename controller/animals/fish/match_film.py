@@ -1,6 +1,7 @@
 """A whole film, one camera or two, to postures: calibrate, then track from frame to frame.
 
-The last posture is the start of the next search; a fish that is lost is searched for anew.
+The last posture is the start of the next search; a lost fish is searched again in the complete
+frame.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -44,7 +45,7 @@ class FilmMatch:
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:
-    """The match of one frame, or why there is none."""
+    """The match of one frame, or the reason for its absence."""
 
     match: Match | None
     """None where the fish was not found; the frame is left out, not guessed."""
@@ -138,10 +139,10 @@ def track_film(
 ) -> Iterator[TrackedFrame]:
     """Match every frame.
 
-    A search starts from the last frame's posture moved on by the last step ([TH]: around the
-    prolongation of the head), from the last frame's posture itself, and from the silhouette's own
-    skeleton with its head at the same end; the last one finds a fish that beats its tail fast.
-    Where V falls below ``LEAST_VALUE`` the head may be at either end again.
+    A search starts from three postures: the last one moved on by the last step ([TH]: around the
+    prolongation of the head), the last one itself, and the silhouette's skeleton with its head at
+    the same end. The third one finds a fish that beats its tail fast. Where V falls below
+    ``LEAST_VALUE`` the head may be at either end again.
 
     Args:
         frames: grey pictures and silhouettes.

@@ -18,8 +18,8 @@ LEAST_VALUE = 0.3
 def agreement(drawn: Image, observed: Image) -> float:
     """Eq. 1 and 2: ``(f(P and S) - f(P xor S)) / f(P)``; 1 for the same area, below it otherwise.
 
-    With shaded pixels the smaller of two values is their AND and the difference their XOR; so
-    ``f(P xor S) = f(P) + f(S) - 2 f(P and S)`` as for plain ones. -inf where nothing was drawn.
+    With shaded pixels the smaller of two values is their AND, and the difference is their XOR. So
+    ``f(P xor S) = f(P) + f(S) - 2 f(P and S)`` as for plain ones. -inf if nothing was drawn.
     """
     area = float(cv2.sumElems(drawn)[0])
     if area <= 0.0:
@@ -87,7 +87,7 @@ class Target:
         return np.asarray(blurred, dtype=np.float32) * np.float32(1.0 / 255.0)
 
     def value_of_pieces(self, pieces_px: list[Floats]) -> float:
-        """V of convex pieces that overlap: the rim of what they cover is the outline."""
+        """V of convex pieces that overlap: the rim of their union is the outline."""
         draw_pieces(self._canvas, self.window, pieces_px)
         area = agreement(self._canvas, self._area)
         if self._edge is None or area == float("-inf"):
@@ -98,7 +98,7 @@ class Target:
 
 
 def _edges(grey: Image, area: Image, width_px: int) -> Image | None:
-    """Canny edges near the silhouette's rim, ``width_px`` wide; None where there are none.
+    """Canny edges near the silhouette's rim, ``width_px`` wide; None without edges.
 
     Thresholds come from the contrast between fish and surroundings. Marks on the back and marks on
     the ground are edges too, but of no outline: only those near the rim count.

@@ -95,7 +95,7 @@ def speed_classes(begin: Floats, end: Floats, classes: int = CLASSES) -> tuple[I
 def piece_graph(
     postures: Postures, segments: list[MotionSegment], *, mirror: bool = False
 ) -> PieceGraph:
-    """Take segments out of their film.
+    """Cut segments from their film.
 
     Args:
         postures: of the film.

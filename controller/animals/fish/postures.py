@@ -1,4 +1,4 @@
-"""Postures of a fish over time: what matching finds and what segments are cut from."""
+"""Postures of a fish over time: the result of matching and the input of segmentation."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -215,7 +215,7 @@ def holds_fish(path: Path) -> bool:
 
 
 def _names(path: Path) -> set[str]:
-    """Names of its arrays; none of what is no .npz."""
+    """Names of its arrays; empty for files of other formats."""
     try:
         return set() if path.suffix != ".npz" else set(read_arrays(path, ())[1])
     except (ValueError, OSError):

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.animals.fish.model import FishModel
 
-_SHIFT = 4  # cv2 takes coordinates in sixteenths of a pixel
+_SHIFT = 4  # cv2 accepts coordinates in sixteenths of a pixel
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A part of the frame, reduced: what a canvas shows."""
+    """A part of the frame, reduced: the area of a canvas."""
 
     left: int
     top: int

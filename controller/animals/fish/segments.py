@@ -42,7 +42,7 @@ class MotionSegment:
     """Change of the head's direction, positive to the left."""
     begin_speed: float
     end_speed: float
-    """Of the base of the head, in the recording's unit a second."""
+    """Speed of the base of the head, in the recording's unit a second."""
     parts: int = 1
     """Beats that were merged."""
 
@@ -68,7 +68,7 @@ def commonest_posture(angles_rad: Floats, within_rad: float) -> Floats:
 def segment_motion(
     postures: Postures, cutting: Segmentation | None = None, reference_rad: Floats | None = None
 ) -> list[MotionSegment]:
-    """Cut a motion into glides and merged beats; what comes before and after is left out.
+    """Cut a motion into glides and merged beats; the frames before and after are left out.
 
     Args:
         postures: of a film.
@@ -99,10 +99,10 @@ def segment_motion(
     if not found:
         closest = float(np.nanmin(np.abs(postures.angles_rad - reference).max(axis=1)))
         raise InputError(
-            f"{postures.name}: the basic posture is passed {len(runs)} times, so there is no "
-            f"segment; all angles come within {np.degrees(closest):.1f} degrees of it, asked are "
-            f"{np.degrees(how.within_rad):.1f}: say --within, or --reference commonest for an "
-            "animal that is never straight"
+            f"{postures.name}: the basic posture occurs {len(runs)} times, which "
+            f"gives no segment; the closest frame differs by {np.degrees(closest):.1f} degrees, "
+            f"the limit is {np.degrees(how.within_rad):.1f}; raise --within, or use "
+            "--reference commonest"
         )
     return merge(found, how.merge_rad)
 
@@ -133,7 +133,7 @@ def merge(segments: list[MotionSegment], merge_rad: float) -> list[MotionSegment
 def speeds(postures: Postures) -> Floats:
     """(T,) speed of the base of the head, by a straight line through a sixth of a second.
 
-    In space, where a side view tells the height of the base.
+    The speed is in space if a side view gives the height of the base.
     """
     half = max(1, round(postures.rate_hz / 12.0))
     base = postures.base

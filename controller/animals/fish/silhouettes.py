@@ -18,7 +18,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _FOR_BACKGROUND = 25
 _LEAST_WHOLE = 0.5
 """Share of those frames that must show a whole body on the ground that was found (ours)."""
-_THIN = 0.5  # of the silhouette's threshold: what is connected to the body down to it belongs to it
+_THIN = 0.5  # share of the silhouette's threshold: connected pixels above it belong to the body
 _SURE = 12.0  # grey values above the ground at least
 
 
@@ -28,7 +28,7 @@ class FishFilm:
 
     footage: Footage
     detector: BodyDetector
-    """Of the ground, or of the way to find it in each frame."""
+    """Detector of the ground, or of the body in each frame."""
     size_px: tuple[int, int]
     """Rows and columns of a frame."""
 
@@ -79,9 +79,9 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
     detector = make_detector(some, empty)
     if empty is None and whole_share(detector, some) < _LEAST_WHOLE:
         raise InputError(
-            f"{path}: no ground was found on which a fish is seen whole in half of the frames; if "
-            "it holds station over a pattern, give --background (of the side --side-background), a "
-            "picture of the empty scene"
+            f"{path}: fewer than half of the frames show a complete fish on an empty ground; if "
+            "it stays at one place, give a picture of the empty scene with --background (for "
+            "the side view --side-background)"
         )
     return FishFilm(footage, detector, some[0].shape)
 

@@ -74,8 +74,8 @@ def sequence_through(
 ) -> PieceSequence:
     """Swim through control points in order, from the origin along x.
 
-    The text takes the piece that ends nearest to the point; with turns of one size that can circle
-    a point for ever. Here the best of many sequences of ``depth`` pieces is searched, and its first
+    The text uses the piece that ends nearest to the point; with turns of one size that can circle a
+    point for ever. Here the best of many sequences of ``depth`` pieces is searched, and its first
     piece taken. A point counts as reached when the base of the head comes within ``radius`` of it,
     within a piece as well as at its end.
 
@@ -116,7 +116,7 @@ def sequence_through(
 def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_S) -> Postures:
     """Put the pieces end to end; angles, direction and path are blended at every junction.
 
-    Of a film with a side view so are height, which goes on from piece to piece, and pitch.
+    A film with a side view also gives height, which continues from piece to piece, and pitch.
     """
     parts = [pieces.pieces[k] for k in sequence.order]
     base, head = [], []
@@ -155,7 +155,7 @@ def _seconds(pieces: PieceGraph, piece: int) -> float:
 
 
 def _ahead(pieces: PieceGraph, here: _Node, points: Floats, radius: float, depth: int) -> _Node:
-    """Take the first piece of the best sequence found."""
+    """Return the first piece of the best sequence found."""
     reached = len(here.reached_at)
     beam, best, first = [here], None, len(here.order)
     for level in range(depth):
@@ -263,7 +263,7 @@ def join(pieces: list[Floats], samples: int) -> Floats:
     whole = np.concatenate([pieces[0]] + [piece[1:] for piece in pieces[1:]])
     at = len(pieces[0]) - 1
     for piece in pieces[1:]:
-        # what stands here holds what is left of the fade before, which this one takes over
+        # this sample holds the rest of the fade before, which this fade continues
         step = whole[at] - piece[0]
         slope = whole[at] - whole[at - 1] - (piece[1] - piece[0])
         count = len(piece) - 1

@@ -1,9 +1,9 @@
 """One frame from above: a posture searched coarse to fine, [TH] 3.3.3.
 
 The last step moves all parameters at once, by least squares on shaded areas. A coordinate search
-stops on a ridge: two spine angles that change against each other hardly move the outline, so that
-from a start five degrees off it leaves the angles where they are (measured: docs/fish.md). The
-difference of areas is a sum over pixels, so its derivative is cheap.
+stops on a ridge: two spine angles that change against each other hardly move the outline. So from a
+start five degrees off it leaves the angles where they are (measured: docs/fish.md). The difference
+of areas is a sum over pixels, so its derivative is cheap.
 """
 
 from collections.abc import Callable
@@ -20,8 +20,9 @@ from snakewalk.controller.animals.fish.raster import Window
 LEVELS = ((70.0, 5, 6), (140.0, 3, 6), (260.0, 3, 6))
 """Coarse to fine: body length on the canvas (px), width of edges (px), rounds at most."""
 STIFFNESS = 0.15
-"""Cost of spine angles that alternate, per px of body length on the canvas, with four angles; with
-more it falls with the cube of their number, since a wave then turns back within fewer of them."""
+"""Cost of spine angles that alternate, per px of body length on the canvas, with four angles. With
+more angles it falls with the cube of their number, since a wave then turns back within fewer of
+them."""
 _FOLDED_RAD = 1.5
 _NUDGE_PX, _NUDGE_RAD = 0.5, 0.02
 

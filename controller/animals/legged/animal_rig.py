@@ -24,7 +24,7 @@ _KNEE, _FOOT = 0.75, 0.55
 _POINT = 0.15
 """Radius of an ornament's tip over that of its root."""
 _PLAIN_UV = 0.3, 0.98
-"""A place of the texture beside its bands."""
+"""A place of the texture outside its bands."""
 _DARK_V = 0.5
 
 

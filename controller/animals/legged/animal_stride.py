@@ -33,10 +33,10 @@ class Names:
 
     @classmethod
     def of(cls, spine: str, girdles: str, feet: str) -> "Names":
-        """Take the words of the command line, A,B,C each.
+        """Parse the words of the command line, A,B,C each.
 
         Raises:
-            InputError: too few, or girdles that are no points of the spine.
+            InputError: too few names, or girdles that are not points of the spine.
 
         """
         parts = [tuple(one.strip() for one in text.split(",")) for text in (spine, girdles, feet)]

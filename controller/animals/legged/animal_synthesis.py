@@ -92,7 +92,7 @@ class SynthesisedAnimal:
         }
 
     def save(self, file: Path, name: str) -> None:
-        """Write a track of the spine, and the legs beside it.
+        """Write a track of the spine and the legs.
 
         ``points`` (T, S + 1, 2) and ``height_m`` (T, S + 1) are the spine, head first; ``hip_m``,
         ``knee_m`` and ``foot_m`` (T, 4, 3), in the order of ``legs``; ``on_ground`` (T, 4).
@@ -138,7 +138,7 @@ def read_animal(name: str) -> AnimalConfig:
 def synthesise_animal(
     prepared: WalkRun, animal: AnimalConfig, frames: int | None = None
 ) -> SynthesisedAnimal:
-    """Lead an animal along a run's path until its trunk is at the end, or exactly so many frames.
+    """Lead an animal along a run's path until its trunk is at the end, or for a number of frames.
 
     Raises:
         InputError: the path bends more sharply than the animal is wide.

@@ -1,9 +1,9 @@
 """The prototype bent along a path and stood on the ground ([KP] 4.4).
 
-What the prototype has at x along its line stands on the path's normal at arc length x, as far to
-the left as it stood there. A foot on the ground so stays where it is on any path. The body is then
-turned to stand upright on the plane that fits the ground below it; the feet stand on the ground
-itself, where the paper leaves them on that plane, and the legs reach for them.
+A point of the prototype at x along its line moves to the path's normal at arc length x, at the same
+distance to the left. A foot on the ground so stays where it is on any path. The body is then turned
+upright on the plane that fits the ground below it. The feet stand on the ground itself, although
+the paper leaves them on that plane, and the legs reach for them.
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class PathNormals:
         """Points (..., 3) of a line on the path: (..., 3), z as it was.
 
         Raises:
-            InputError: a point is further beside the path than the path's centre of curvature.
+            InputError: a point is further from the path than the path's centre of curvature.
 
         """
         s, beside = points[..., 0], points[..., 1]
@@ -72,9 +72,9 @@ class PathNormals:
         if inside.any():
             worst = int(np.argmax(np.where(inside, beside * curvature, 0.0)))
             raise InputError(
-                f"the path bends by a radius of {1.0 / abs(curvature.ravel()[worst]):.3f} m after "
-                f"{on.ravel()[worst]:.2f} m, and a foot stands {abs(beside.ravel()[worst]):.3f} m "
-                "beside it: take a smaller animal (length_m), or move the waypoints"
+                f"path: its radius is {1.0 / abs(curvature.ravel()[worst]):.3f} m after "
+                f"{on.ravel()[worst]:.2f} m, and a foot is {abs(beside.ravel()[worst]):.3f} m "
+                "to the side; choose a smaller animal (length_m), or move the waypoints"
             )
         left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
         plan = self._curve(on) + (s - on)[..., None] * forward + beside[..., None] * left
@@ -137,7 +137,7 @@ def local_planes(plan_m: Floats, height_m: Floats) -> tuple[Floats, Floats, Floa
 
 
 def _upright(up: Floats) -> Floats:
-    """(T, 3, 3) least turns that take z to unit vectors (T, 3)."""
+    """(T, 3, 3) smallest turns from z to unit vectors (T, 3)."""
     axis = np.stack([-up[:, 1], up[:, 0], np.zeros(len(up))], axis=-1)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
     angle = np.arctan2(sine, up[:, 2:])

@@ -15,11 +15,11 @@ from snakewalk.controller.gaits.footfall import lift, swing
 from snakewalk.controller.gaits.wave import TURN
 
 SEGMENTS = 24
-"""Of the spine."""
+"""Number of segments of the spine."""
 LEGS = ("front left", "front right", "hind left", "hind right")
 _SIDES = np.array([1.0, -1.0])
 _STRAIGHTENS = 0.06
-"""Of the body's length: over so much the head's heading comes back to that of the body."""
+"""Share of the body's length over which the head's heading returns to that of the body."""
 _TAIL_WAVES = 0.5
 """On the tail, where it swings."""
 
@@ -141,8 +141,8 @@ def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
 def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, at: Floats) -> Floats:
     """(T,) height of the body over a pair: that of the feet's pendulums that bear it, by vault.
 
-    A foot that comes down or leaves bears little; where one takes over from the other, both stand
-    equally far from the hip, and the height has no step.
+    A foot that comes down or leaves supports little. When one foot replaces the other, both are
+    equally far from the hip, so the height has no step.
     """
     height_m = animal.height * animal.length_m
     bears = np.where(at < pair.duty, np.sin(np.pi * np.clip(at / pair.duty, 0.0, 1.0)) + 1e-9, 0.0)

@@ -20,10 +20,10 @@ from snakewalk.controller.gaits.wave import TURN
 
 FEWEST_CYCLES = 2.0
 _FEWEST_FRAMES = 6
-"""Of a cycle."""
+"""Fewest frames of a cycle."""
 _PLACES = 24
 _MOST_HZ = 0.3
-"""Of the frame rate: the highest frequency that is looked for."""
+"""Share of the frame rate: the highest frequency of the search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Foot:
     duty: float
     """Share of the cycle on the ground."""
     duty_sd: float
-    """Of single cycles; NaN where there are fewer than three."""
+    """Spread of single cycles; NaN for fewer than three."""
     down: float
     """When it comes down, in cycles after the front left foot."""
     step: float
@@ -48,7 +48,7 @@ class Foot:
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """What the tracks of an animal say of one cycle."""
+    """One cycle of an animal, measured from its tracks."""
 
     cycle_s: float
     cycles: float
@@ -56,11 +56,11 @@ class Stride:
     stride: float
     """Way of a cycle, body lengths."""
     length: float
-    """Of the spine, in the unit of the tracks."""
+    """Length of the spine, in the unit of the tracks."""
     at: tuple[float, float]
     """Places of the girdles along the spine: front, hind."""
     turn_rad: tuple[float, float]
-    """Of the girdles, to either side."""
+    """Turn of the girdles, to either side."""
     feet: tuple[Foot, Foot, Foot, Foot]
     """In the order of ``LEGS``."""
     phase: Floats
@@ -69,7 +69,7 @@ class Stride:
     """(T, 4) of the feet ahead of their girdles, body lengths; NaN where not seen."""
 
     def of(self, animal: AnimalConfig, name: str, source: str, length_m: float) -> AnimalConfig:
-        """Return an animal that moves so; what was not measured is taken from another one."""
+        """Return an animal with this motion; other figures come from ``animal``."""
         pairs = tuple(
             pair.model_copy(update=self._pair(k)) for k, pair in enumerate(animal.leg_pairs)
         )
@@ -208,7 +208,7 @@ def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
 
 
 def _fit(phase: Floats, ahead: Floats, stride: float) -> tuple[float, float, float, float]:
-    """Duty, when the foot comes down in cycles, middle of its step, RMS of what is left."""
+    """Duty, touch-down of the foot in cycles, middle of its step, RMS of the residual."""
     seen = np.isfinite(ahead)
     if seen.sum() < _FEWEST_FRAMES:
         raise InputError(f"a foot is seen in {int(seen.sum())} frames; expected six or more")
@@ -258,7 +258,7 @@ def _turns(
     wave = np.exp(-1j * TURN * phase)
     whole = _whole(phase)
     amplitude = 2.0 * (heading[whole] * wave[whole, None]).mean(axis=0)
-    # the tail swings beside what the hind girdle hands on: its segments say nothing of the girdle
+    # the tail swings more than the hind girdle moves it: its segments do not show the girdle
     ahead_of_tail = places[1:] <= at[1] + 1e-9
     shares = spine_shares(at, places)[ahead_of_tail]
     if len(shares) < 2:

@@ -29,7 +29,7 @@ class BodyLook:
         """Reject a look that cannot be made, before a run.
 
         Raises:
-            InputError: there is no such skin, or an extra is missing.
+            InputError: the skin does not exist, or an extra is missing.
 
         """
         _check(look)

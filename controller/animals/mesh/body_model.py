@@ -1,6 +1,6 @@
 """The body model: an ellipse at each skeleton point ([PT] 2.2).
 
-Its half width is the distance from the skeleton to the silhouette's boundary in the top view; its
+Its half width is the distance from the skeleton to the silhouette's boundary in the top view. Its
 half height follows from a constant ratio, or is measured the same way in a view from the side.
 """
 
@@ -30,7 +30,7 @@ class BodyModel:
     half_height: Floats
     """(101,) half axes upwards."""
     length_m: float | None
-    """Of the body; None without scale."""
+    """Length of the body; None without scale."""
     measured: bool
     """Whether the widths come from a recording."""
 
@@ -122,7 +122,7 @@ def body_model(
         aspect: height over width.
 
     Raises:
-        InputError: no whole frame, or an aspect that is none.
+        InputError: no complete frame, or an aspect out of range.
 
     """
     if not 0.1 <= aspect <= 10.0:

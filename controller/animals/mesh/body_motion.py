@@ -1,4 +1,4 @@
-"""What moves a skin: a recording, the log of a run, or a spine gait in place."""
+"""Motion of a skin: a recording, the log of a run, or a spine gait in place."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -63,7 +63,7 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
         return _robot_skin(skin, read_log(log), LOG_FPS if fps is None else fps, source)
     time_s, points = _in_space(skin, source)
     if len(time_s) < 2:
-        raise InputError(f"{source}: one frame is no motion")
+        raise InputError(f"{source}: has one frame; a motion needs two")
     rows = np.arange(len(time_s)) if fps is None else _thinned(time_s, fps)
     motion = from_points(points[rows], time_s[rows])
     return skin.sized(motion.length_m), motion
@@ -72,8 +72,8 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
 def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
     """Times (T,) and spines (T, P, 3) of a recording.
 
-    A fish is where it swam, the lowest place of all over the ground; what ``synthesise`` made has
-    heights of its own; all else is level and lies on the ground.
+    A fish is where it swam, with its lowest place on the ground. A track of ``synthesise`` has its
+    own heights. All others are level and lie on the ground.
     """
     path = Path(source)
     if holds_postures(path):
@@ -85,6 +85,8 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
         return time_s, points
     track = load_track(source)
     flat = even_points(track)
+    if not track.places_recorded:
+        flat = flat - flat.mean(axis=1, keepdims=True)  # the images were cropped: no travel
     belly_m = _belly_m(skin, 1.0 if track.length_m is None else track.length_m)
     height_m = np.full(flat.shape[:2], belly_m)
     held = read_arrays(path, {"height_m"})[0] if path.suffix == ".npz" else {}
@@ -102,11 +104,13 @@ def _belly_m(skin: Skin, length_m: float) -> float:
 def _robot_skin(skin: Skin, record: RunRecord, fps: float, source: str) -> tuple[Skin, BoneMotion]:
     time_s, qpos = body_qpos(record)
     if len(time_s) < 2:
-        raise InputError(f"{source}: the log holds no two poses: there is no motion")
+        raise InputError(f"{source}: the log has fewer than two poses; choose a longer log")
     rows = _thinned(time_s, fps)
     robot = record.header.robot
     in_water = isinstance(record.header.world.ground, Water)
-    return robot_skin(skin, robot, in_water), from_poses(robot, time_s[rows], qpos[rows])
+    motion = from_poses(robot, time_s[rows], qpos[rows])
+    motion = replace(motion, pose=record.header.pose_evidence.texts)
+    return robot_skin(skin, robot, in_water), motion
 
 
 def robot_skin(skin: Skin, robot: RobotConfig, in_water: bool = False) -> Skin:

@@ -19,15 +19,15 @@ from snakewalk.controller.animals.mesh.pde_surface import TURN
 from snakewalk.controller.track.resample import SEGMENTS
 
 CURVES = 37
-"""As many as [GC] Fig. 3 takes from its dolphin."""
+"""Number of curves that [GC] Fig. 3 cuts from its dolphin."""
 AROUND = 32
 """Points of a curve."""
 _TIP = 5
 """Curves that round each tip."""
 _FIRST = 0.002
-"""Of the length: how near the ends of a mesh its first and last cut lie."""
+"""Share of the length between the ends of a mesh and its first and last cut."""
 _TRIALS = 101
-"""Planes by which the body is told from fins."""
+"""Number of planes that separate the body from fins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def ellipses(model: BodyModel, lift: Floats | None = None, curves: int = CURVES)
     """
     if curves < 2 * _TIP + 2:
         raise InputError(
-            f"curves: a body with round tips takes {2 * _TIP + 2} or more, not {curves}"
+            f"curves: a body with round tips needs {2 * _TIP + 2} or more, not {curves}"
         )
     head, tail = tips(model)
     quarter = 1.0 - np.cos(np.linspace(0.0, 0.5 * np.pi, _TIP))
@@ -94,12 +94,13 @@ def ellipses(model: BodyModel, lift: Floats | None = None, curves: int = CURVES)
 
 
 def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
-    """Take the curves from a mesh: its sections at right angles to x ([GC] 2.1).
+    """Cut curves from a mesh: its sections at right angles to x ([GC] 2.1).
 
-    A plane may cut several loops: fins, lobes of a tail. The body's is the one around the middle of
-    the loop before; from the thickest place the cuts go both ways for as long as there is one, so
-    that a forked tail is no part of the tube. Each half of a loop, over the back and under the
-    belly, is divided into equal arcs: left, back, right and belly keep their place in every curve.
+    A plane may cut several loops: fins, lobes of a tail. The body's loop is the one around the
+    middle of the loop before. From the thickest place the cuts continue both ways as long as there
+    is one, so that a forked tail is not a part of the tube. Each half of a loop, over the back and
+    under the belly, is divided into equal arcs: left, back, right and belly keep their place in
+    every curve.
 
     Args:
         solid: ``trimesh.Trimesh`` in the pose above, metres or any unit.
@@ -111,7 +112,7 @@ def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
 
     """
     if curves < 4:
-        raise InputError(f"curves: a skin takes 4 or more, not {curves}")
+        raise InputError(f"curves: a skin needs 4 or more, not {curves}")
     x = np.asarray(solid.vertices, dtype=float)[:, 0]
     length = float(np.ptp(x))
     trial = np.linspace(_FIRST, 1.0 - _FIRST, _TRIALS)

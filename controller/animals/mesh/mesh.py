@@ -1,6 +1,6 @@
 """The body's mesh: rings of ellipses joined, closed at both tips, with mirrored texture ([PT] 2.2).
 
-The picture's place across the body is the cosine of the angle around it, so the points over and
+The picture's place across the body is the cosine of the angle around it. So the points over and
 under the middle plane show the same pixel: the upper side's picture is mirrored to the lower. (A
 mirror at the ellipse's centre, as the text may be read, would put a seam along both sides.)
 """

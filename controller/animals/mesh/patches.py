@@ -1,9 +1,8 @@
 """A skin of PDE patches: a tube through many closed curves, and fins that grow out ([GC] 1.3).
 
 The paper cuts many curves into fours, each of which makes one patch. Two such patches meet in a
-curve, but not in a tangent plane: the skin has a crease there. Here a patch spans two
-curves, and is also told the slope along the body at both, which its neighbour is told as well; of
-order 3, the curvature too.
+curve, but not in a tangent plane: the skin has a crease there. Here a patch spans two curves, and
+shares the slope along the body at both with its neighbour; of order 3, the curvature too.
 
 A fin is a patch of its own: its first curve is drawn on the tube, three more stand above it.
 """
@@ -38,19 +37,19 @@ class Tube:
         """Join curves (K, C, 3) at rising stations (K,); a tip is a curve of one place.
 
         Raises:
-            InputError: too few curves for the slopes, an order that is none, curves that make none.
+            InputError: too few curves for the slopes, an unknown order, or curves that coincide.
 
         """
         if not 1 <= order <= 3:
             raise InputError(f"a skin is of order 1 (creased), 2 or 3, not {order}")
         if len(curves_m) < 4 or len(stations) != len(curves_m) or np.any(np.diff(stations) <= 0.0):
             raise InputError(
-                f"a skin takes 4 curves or more at rising stations, not {len(curves_m)}"
+                f"curves: a skin needs 4 or more at increasing stations, not {len(curves_m)}"
             )
         # over the skin, not along the body, where the radius of a round tip rises without bound
         span = np.linalg.norm(np.diff(curves_m, axis=0), axis=-1).mean(axis=1)
         if not span.all():
-            raise InputError("a skin takes curves that differ: two lie on each other")
+            raise InputError("curves: two of the skin coincide; leave one out")
         way = np.concatenate([[0.0], np.cumsum(span)])
         given = [CubicSpline(way, curves_m)(way, k) for k in range(order)]
         given[0] = np.asarray(curves_m, dtype=float)

@@ -2,16 +2,16 @@
 
     (d2/du2 + a2 d2/dv2)^N X = 0,   X = A_0(u) + sum_n [A_n(u) cos(nv) + B_n(u) sin(nv)] + R(u, v)
 
-``2N`` closed curves are met, each as a place of the surface or as its slope, curvature, ... along
-u: four places with N = 2 are the biharmonic surface of the paper; places and slopes at both ends
-join patches without a crease, and so do six conditions with N = 3 with even curvature.
+The surface meets ``2N`` closed curves, each as a place of the surface or as its slope, curvature,
+... along u. Four places with N = 2 are the biharmonic surface of the paper. Places and slopes at
+both ends join patches without a crease, and six conditions with N = 3 also with even curvature.
 
 Mode n of the curves' Fourier series is carried from curve to curve by ``e^(-a n (1 - u))``, the
-same with ``u``, and both times powers: the printed ``e^(a n u)`` (Eq. 4) grows to 1e13 at n = 30,
-which makes the system singular in practice (condition 1e18; here 7e4): these are the same
-functions, scaled. All modes that the samples hold are taken unless fewer are asked for; what the
-series then leaves out of a curve goes into the remainder R, of mode ``M + 1`` (Eq. 8), so that the
-curves are met exactly either way. ``A_0``, a polynomial, is the spine.
+same with ``u``, and both times powers. The printed ``e^(a n u)`` (Eq. 4) grows to 1e13 at n = 30,
+which makes the system singular in practice (condition 1e18; here 7e4). These are the same
+functions, scaled. All modes of the samples are used unless fewer are asked for. The rest of a curve
+goes into the remainder R, of mode ``M + 1`` (Eq. 8), so that the curves are met exactly either way.
+``A_0``, a polynomial, is the spine.
 
 The equation is printed (Eq. 1) without ``a2``, although its solution (Eq. 4) has ``a``.
 """
@@ -76,18 +76,25 @@ class PdeSurface:
         curves = np.asarray(curves_m, dtype=float)
         if curves.ndim != 3 or curves.shape[0] % 2 or not curves.size or curves.shape[2] != 3:
             raise InputError(
-                f"a PDE surface takes curves of shape (2 N, points, 3), not {curves.shape}"
+                "curves: a PDE surface needs an array of shape (2 N, points, 3), not "
+                f"{curves.shape}"
             )
         number, count = curves.shape[:2]
         places = np.linspace(0.0, 1.0, number) if at is None else np.array(at, dtype=float)
         kinds = [0] * number if slopes is None else [int(kind) for kind in slopes]
         if len(places) != number or len(kinds) != number:
-            raise InputError(f"a PDE surface takes a place and a kind for each of {number} curves")
+            raise InputError(
+                f"curves: a PDE surface needs a place and a kind for each of {number} curves"
+            )
         rising = list(zip(places, kinds, strict=True))
         if rising != sorted(set(rising)) or min(kinds) < 0 or max(kinds) >= number:
-            raise InputError("a PDE surface takes rising places, and at one place rising slopes")
+            raise InputError(
+                "curves: a PDE surface needs increasing places, and increasing slopes at one place"
+            )
         if not np.isfinite(curves).all() or spread <= 0.0 or kinds.count(0) == 0:
-            raise InputError("a PDE surface takes finite points, a > 0 and one place at least")
+            raise InputError(
+                "curves: a PDE surface needs finite points, a > 0 and at least one place"
+            )
         size = np.ptp(curves, axis=1).max(axis=1)
         again = np.abs(curves[:, -1] - curves[:, 0]).max(axis=1) <= 1e-9 * size
         if (again & (size > 0.0) & (np.array(kinds) == 0)).any():
@@ -122,7 +129,7 @@ class PdeSurface:
         )
 
     def spine_m(self, u: ArrayLike) -> Floats:
-        """(U, 3) the zeroth term: what the surface is wound around."""
+        """(U, 3) the zeroth term: the spine around which the surface is wound."""
         return np.asarray(_basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0)
                           @ self.spine_terms)  # fmt: skip
 
@@ -151,7 +158,7 @@ class PdeSurface:
         return out
 
     def moved_m(self, u: ArrayLike, v: ArrayLike, shift_m: ArrayLike) -> Floats:
-        """(U, V, 3) with the spine moved by (U, 3), as printed: no part beside it turns."""
+        """(U, V, 3) with the spine moved by (U, 3), as printed: nothing else turns."""
         return np.asarray(self.points_m(u, v) + np.asarray(shift_m, dtype=float)[:, None])
 
     @property

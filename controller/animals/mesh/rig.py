@@ -16,7 +16,7 @@ class Rig:
 
     mesh: Mesh
     held: Weights
-    """Of its corners."""
+    """Weights of its corners."""
     rest_m: Floats
     """(K, 3) fronts of the bones at rest."""
     parent: Ints

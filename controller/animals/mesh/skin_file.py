@@ -24,7 +24,8 @@ MOST_BONES: Final = 256
 Y_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _ROOT_QUATERNION = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
 _STILL_M = 1e-6
-"""Over the body's length: a bone whose place on the one before it stays within this is no slide."""
+"""Share of the body's length: a bone whose place relative to the one before stays within this does
+not slide."""
 
 
 def write_skin(
@@ -63,7 +64,11 @@ def write_skin(
     nodes, local = _bones(rig)
     animation = _animation(out, rig, motion, local, name)
     gltf = pygltflib.GLTF2(
-        asset=pygltflib.Asset(version="2.0", generator="snakewalk"),
+        asset=pygltflib.Asset(
+            version="2.0",
+            generator="snakewalk",
+            extras=dict(motion.pose),
+        ),
         scene=0,
         scenes=[pygltflib.Scene(name=name, nodes=[0, 1])],
         nodes=nodes,

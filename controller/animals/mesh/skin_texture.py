@@ -57,7 +57,7 @@ def painted(
     eye_at: float,
     eye_radius: tuple[float, float],
 ) -> Image:
-    """Paint a strip for a body of which there is no picture: bands across, and an eye a side.
+    """Paint a strip for a body without a picture: bands across, and an eye on each side.
 
     Args:
         back_rgb: colour, 0 to 1.

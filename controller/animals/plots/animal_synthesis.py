@@ -36,7 +36,7 @@ def draw_animal(made: SynthesisedAnimal, file: Path, title: str) -> None:
     """Draw the motion to ``file``.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)

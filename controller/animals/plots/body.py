@@ -39,7 +39,7 @@ def draw_body(
         silhouette: image, skeleton (P, 2) and radii (P,) in its pixels, if there is one.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)
@@ -87,7 +87,7 @@ def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image 
     """Draw a skin at rest, or in four frames of its motion, all to one scale.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)

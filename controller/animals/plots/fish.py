@@ -1,4 +1,4 @@
-"""What matching found: the model over frames of the film, and the spine angles over time."""
+"""Result of matching: the model over frames of the film, and the spine angles over time."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ def draw_match(
     """Draw frames with the model's outline (of a film), and spine angles, dotted where known.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)

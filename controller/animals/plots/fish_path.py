@@ -31,7 +31,7 @@ def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOption
     """Draw a synthesis to ``file``.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)
@@ -78,7 +78,7 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
     axes.set_ylim(-1.25, 1.25)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_title("what may follow what (dark: used)")
+    axes.set_title("possible successors (dark: used)")
 
 
 def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:

@@ -39,7 +39,7 @@ def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, tit
     """Draw a synthesis ([PT] Fig. 10 and 11) to ``file``.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)
@@ -59,7 +59,7 @@ def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, tit
 
 
 def _extent(made: SynthesisedWalk) -> tuple[Floats, Floats]:
-    """Corners (2,) of what is drawn in plan."""
+    """Corners (2,) of the drawing in plan."""
     ends = made.path.position(np.linspace(0.0, made.path.length_m, 400))
     points = np.concatenate([made.skeleton.points_m[..., :2].reshape(-1, 2), ends])
     return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M

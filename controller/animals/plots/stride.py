@@ -23,7 +23,7 @@ def draw_stride(found: Stride, file: Path, title: str) -> None:
     """Draw the fit of each foot to ``file``.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)

@@ -1,11 +1,10 @@
 """Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
 
-States are joined by distance, a walk by ``deg / 2^v`` takes them in turn, and coefficients between
-two are interpolated linearly: the angles ``A_c``. On land the angles of the head are handed down
-the body by a point a frame, ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``
-with m from 1 at the head to 0 behind.
-Correction: the text wants m "close to 1" at the head. It must be 1 there, as nothing is in front of
-the head that the rest of it could come from.
+States are joined by distance, and a walk by ``deg / 2^v`` visits them. Coefficients between two are
+interpolated linearly: the angles ``A_c``. On land the angles of the head are handed down the body
+by a point a frame: ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``, with m
+from 1 at the head to 0 behind. Correction: the text wants m "close to 1" at the head. It must be 1
+there, as nothing is in front of the head that the rest of it could come from.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,8 +20,9 @@ from snakewalk.controller.shape.walks import walk
 from snakewalk.controller.terrain.path import SplinePath
 
 HEAD_SHARE = 0.5
-"""Of the body, behind which m is 0 (ours). States next to each other on the graph differ little at
-the head: handed down from the first tenth alone they make a body that is nearly straight."""
+"""Share of the body, behind which m is 0 (ours). States next to each other on the graph differ
+little at the head: handed down from the first tenth alone they make a body that is nearly
+straight."""
 
 
 def leading(points: int) -> Floats:
@@ -32,14 +32,16 @@ def leading(points: int) -> Floats:
 
 
 def handed_down(wanted_rad: Floats, before_rad: Floats, m: Floats) -> Floats:
-    """One frame of Eq. 9: (N,) from A_c of now, A_f of the frame before, and m.
+    """One frame of Eq. 9: (N,) from the present A_c, A_f of the frame before, and m.
 
     Raises:
         ValueError: m is not 1 at the head.
 
     """
     if m[0] != 1.0:
-        raise ValueError(f"m is {m[0]:g} at the head: there is nothing ahead of it to take from")
+        raise ValueError(
+            f"m: is {m[0]:g} at the head, which has no body ahead of it; set its first value to 1"
+        )
     ahead = np.concatenate([wanted_rad[:1], before_rad[:-1]])
     return np.asarray(m * wanted_rad + (1.0 - m) * ahead)
 
@@ -72,9 +74,9 @@ def graph_motion(
 ) -> Locomotion:
     """Lay at most ``frames`` frames along a path: mass centre on it, mean heading along it.
 
-    The centre advances by what a point of the body moves along the path where nothing slips: a
-    segment a frame, times the mean cosine of the angles about their mean (ours; the text leaves
-    the speed open).
+    Without slip a point of the body moves along the path by a segment a frame, times the mean
+    cosine of the angles about their mean. The centre advances by the same distance (ours; the text
+    leaves the speed open).
 
     Args:
         shapes: of ``graph_angles``.

@@ -34,7 +34,7 @@ from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.walk.angle_track import AngleTrack
 
 FRAMES_MAX = 300_000
-"""That a motion may have room for: 240 s at 1000 Hz are fewer (ours)."""
+"""Largest number of frames of a motion: 240 s at 1000 Hz are fewer (ours)."""
 _ANIMAL = ("turn", "self-contact")
 """Tests of a shape that no robot needs to make."""
 
@@ -114,11 +114,11 @@ class SynthesisedWalk:
         }
 
     def save(self, file: Path, name: str, source: str) -> None:
-        """Write a track: what every command reads that takes a recording, and more beside it.
+        """Write a track that every command for recordings accepts, with additional arrays.
 
         ``points`` (T, N + 1, 2) are the skeleton in the ground's plane and ``height_m`` (T, N + 1)
-        its height; ``radius_m`` (N + 1,) is half the body's thickness, ``tongue`` (T,) and
-        ``state`` (T,) the state last taken.
+        its height. ``radius_m`` (N + 1,) is half the body's thickness, ``tongue`` (T,) its tongue,
+        and ``state`` (T,) the last state.
         """
         points = self.skeleton.points_m
         frames = np.arange(len(points))
@@ -189,10 +189,10 @@ class SnakeSynthesis:
         return GroundStep(self.prepared.ground)
 
     def synthesise(self, frames: int | None = None) -> SynthesisedWalk:
-        """Synthesise a motion until the last target, or exactly so many frames.
+        """Synthesise a motion until the last target, or for a number of frames.
 
         Raises:
-            InputError: the run's time limit leaves room for more than ``FRAMES_MAX``.
+            InputError: the run's time limit allows more than ``FRAMES_MAX``.
 
         """
         run, how, robot = self.run, self.how, self.prepared.robot

@@ -1,10 +1,10 @@
 """Skeleton angles and points over time ([PT] 2.6.4, Eq. 8-13).
 
 ``Theta(n, t)`` moves along the body at ``u = |v| + g(n, t)`` and slides with weight ``w_d(n, t)``.
-Corrections: the angle track stays untouched and each point keeps its *place* on it, as looking up
-fractions of a point again and again (Eq. 10-12 as printed) blurs the angles; places change by the
-shift less the share w_d of it, which is what Eq. 12 does with a forward difference; the base is
-added once; the head moves along the new ``Theta(1, t)``; a track that runs out grows.
+Corrections: the angle track stays untouched and each point keeps its *place* on it; looking up
+fractions of a point again and again (Eq. 10-12 as printed) blurs the angles. Places change by the
+shift less the share w_d of it, which equals Eq. 12 with a forward difference. The base is added
+once, and the head moves along the new ``Theta(1, t)``. A track that runs out grows.
 """
 
 from collections.abc import Callable
@@ -85,9 +85,9 @@ def varied_pulse(
 
 
 Grow = Callable[[AngleTrack, Floats], object]
-"""Takes the track and the body's points (N + 1, 2) and appends the next state to the track."""
+"""Appends the next state to the track, from the track and the body's points (N + 1, 2)."""
 Until = Callable[[int, Floats], bool]
-"""Takes a frame and its points; true ends the motion with this frame."""
+"""Returns whether the motion ends with a frame, from its number and points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,16 +234,17 @@ def chain(angles_rad: Floats, segment_m: float) -> Floats:
 
 _PATH_POINTS = 200
 Replan = Callable[[Floats, float], SplinePath]
-"""Takes points (W + 1, 2), from the head through the waypoints left, and the body's heading."""
+"""Plans from points (W + 1, 2), the head and the remaining waypoints, and from the body's
+heading."""
 
 
 class Targets:
     """The targets T_n of a motion, in order ([PT] 2.6, Algorithm 2).
 
     They are the waypoints, and points of the planned path evenly between them. Corrections: the
-    loop ends when the last of L targets is reached, where the text prints ``until n < N``; and a
-    target between waypoints counts as reached, too, when the body has passed it by within twice the
-    radius, or reached the next one: a body does not turn back for it.
+    loop ends when the last of L targets is reached, where the text prints ``until n < N``. A target
+    between waypoints also counts as reached when the body has passed it by within twice the radius,
+    or reached the next one: a body does not turn back for it.
     """
 
     def __init__(

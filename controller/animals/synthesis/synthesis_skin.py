@@ -34,7 +34,7 @@ class SynthesisSkin:
 
     @classmethod
     def of(cls, look: str, track: str, robot: RobotConfig) -> "SynthesisSkin":
-        """Take ``animal``, which is the recording's own body or a plain snake, or a BODY.
+        """Make ``animal``, which is the recording's own body or a plain snake, or a BODY.
 
         Raises:
             InputError: no such body, or an extra is missing.

@@ -1,7 +1,7 @@
 """The tongue: a second-order Markov chain over heights ([PT] 2.6.6), for any head accessory.
 
-``P(H(t) | H(t - 1), H(t - 2))`` is counted on a short sequence; a servo, an LED or the viewer's
-tongue shows ``Tongue.height(t)``, 0 is drawn in and 1 is out.
+``P(H(t) | H(t - 1), H(t - 2))`` is counted on a short sequence. A servo, an LED or the viewer's
+tongue shows ``Tongue.height(t)``: 0 is in and 1 is out.
 """
 
 import numpy as np

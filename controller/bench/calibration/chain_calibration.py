@@ -48,7 +48,7 @@ that, and a busy line does it soon (ours)."""
 
 
 class Observer(Protocol):
-    """Somebody, or something, that sees the robot."""
+    """A person or a program that sees the robot."""
 
     def which(
         self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
@@ -66,13 +66,13 @@ class Observer(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ChainCalibration:
-    """What was found, as a robot and in words."""
+    """Results as a robot and in words."""
 
     robot: RobotConfig
     ranges: tuple[JointRange, ...]
     """One value per joint, head first; empty if no range was swept."""
     notes: tuple[str, ...]
-    """What a person should look at: joints with less range than the others, or without a stop."""
+    """Joints to look at: those with less range than the others, or without a stop."""
 
 
 def find_servos(port: BytePort, latency_s: float, count: int | None = None) -> dict[int, str]:

@@ -46,7 +46,7 @@ STOP_LAG_RAD = 0.1
 STOP_EFFORT = 0.8
 """... with this share of its goal current, for ... (ours)."""
 STOP_S = 0.2
-"""... so long, s, has met its stop (ours)."""
+"""... for this time, s, has met its stop (ours)."""
 REST_S = 0.3
 """How long a joint may come to rest before the next moves, s (ours)."""
 RANGE_RAD = 3.1

@@ -19,7 +19,7 @@ from snakewalk.controller.console.result_files import atomic_write
     results=("out",),
 )
 def backup(
-    out: Annotated[Path, typer.Option("--out", "-o", help="file (.json)")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="write the backup to this file (.json)")],
     port: ChainPort = None,
     baud: Baud = 1_000_000,
     force: Force = False,

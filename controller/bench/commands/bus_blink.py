@@ -18,10 +18,12 @@ def blink(
     servo_id: Ids,
     port: ChainPort = None,
     baud: Baud = 1_000_000,
-    times: Annotated[int, typer.Option(min=1, max=1000, help="how often")] = 5,
+    times: Annotated[
+        int, typer.Option(min=1, max=1000, help="number of times that the LED blinks")
+    ] = 5,
     as_json: Json = False,
 ) -> None:
-    """Let the LED of servos blink, to find them; nothing moves."""
+    """Blink the LED of servos to find them; nothing moves."""
     with open_lines(port, baud) as lines:
         buses = {each: lines.open_servo(each) for each in servo_id}
         clock = lines.lines[0][0].clock

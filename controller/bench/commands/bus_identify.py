@@ -24,15 +24,16 @@ from snakewalk.controller.console.result_files import atomic_write
 def bus_identify(
     port: ChainPort = None,
     baud: Annotated[
-        list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
+        list[int] | None,
+        typer.Option(help="search only this baud rate; may be repeated; default: all"),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="a robot's file to begin with (.toml)")
+        Path | None, typer.Option("--out", "-o", help="write a first robot file here (.toml)")
     ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Tell who is on the wire: models, IDs, firmware, faults; suggest a robot's file."""
+    """List the servos on the wire: models, IDs, firmware, faults; suggest a robot file."""
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     scan.check_bauds(baud or ())

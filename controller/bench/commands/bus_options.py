@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-Ids = Annotated[list[int], typer.Option("--id", help="a servo, 0 to 252; may be repeated")]
-Baud = Annotated[int, typer.Option(help="at which the servos answer")]
+Ids = Annotated[list[int], typer.Option("--id", help="ID of a servo, 0 to 252; may be repeated")]
+Baud = Annotated[int, typer.Option(help="current baud rate of the servos")]
 
 
 def confirmed(as_json: bool, question: str = "write this?") -> bool:

@@ -16,14 +16,16 @@ def reboot(
     servo_id: Ids,
     port: ChainPort = None,
     baud: Baud = 1_000_000,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="without asking")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="reboot without asking")] = False,
     as_json: Json = False,
 ) -> None:
-    """Restart servos, which clears their alarms; torque goes off: what they hold falls."""
+    """Restart servos and clear their alarms; torque goes off, so a held load falls."""
     facts: dict[str, object] = {}
     with open_lines(port, baud) as lines:
         buses = {each: lines.open_servo(each) for each in servo_id}
-        if yes or confirmed(as_json, "torque goes off: what these servos hold falls; reboot them?"):
+        if yes or confirmed(
+            as_json, "torque goes off, and a load that these servos hold falls; reboot them?"
+        ):
             for each, bus in buses.items():
                 before, after = restart(bus, each)
                 facts[f"ID {each}"] = (

@@ -21,17 +21,19 @@ from snakewalk.controller.console.options import ChainPort, Json, console
     examples=("bus restore servos.json --dry-run", "bus restore servos.json --id 7 --yes"),
 )
 def restore(
-    file: Annotated[Path, typer.Argument(help="of `snakewalk bus backup`", dir_okay=False)],
+    file: Annotated[Path, typer.Argument(help="file of `snakewalk bus backup`", dir_okay=False)],
     servo_id: Annotated[
-        list[int] | None, typer.Option("--id", help="only this servo; may be repeated")
+        list[int] | None, typer.Option("--id", help="restore only this servo; may be repeated")
     ] = None,
     port: ChainPort = None,
     baud: Baud = 1_000_000,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="show the changes and write nothing")
+    ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
     as_json: Json = False,
 ) -> None:
-    """Write a backup's values where they differ; shows them and asks first."""
+    """Write the values of a backup that differ; shows them and asks first."""
     servos = {each.id: each for each in load_backup(file).servos}
     wanted = servo_id or list(servos)
     missing = [str(each) for each in wanted if each not in servos]

@@ -63,15 +63,15 @@ LATE_SHARE = 0.05
 """Share of the time served; a larger loss is reported at the end (ours)."""
 Servos = Annotated[
     str | None,
-    typer.Option(help="IDS[:MODEL],... on a bench: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
+    typer.Option(help="servos on a bench, IDS[:MODEL],...: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
 ]
 BenchImu = Annotated[
     str | None,
-    typer.Option(help="ID[:MODEL] of an IMU beside --servos, level and still: 200:imu_to_dxl"),
+    typer.Option(help="level, motionless IMU to add to --servos, ID[:MODEL]: 200:imu_to_dxl"),
 ]
 Recorded = Annotated[
     Path | None,
-    typer.Option(help="give the replies of an exchange that --record wrote, instead of servos"),
+    typer.Option(help="replay the replies of an exchange that --record wrote, instead of servos"),
 ]
 WithConsole = Annotated[
     bool,
@@ -92,16 +92,23 @@ def serve(
     pose_out: PoseOut = None,
     tracker: Tracker = None,
     truth: TruthFile = None,
-    seed: Annotated[int, typer.Option(help="of the noise of the poses")] = 0,
+    seed: Annotated[int, typer.Option(help="seed of the noise of the poses")] = 0,
     imu: BenchImu = None,
-    baud: Annotated[int | None, typer.Option(help="of the servos, bit/s")] = None,
-    pace: Annotated[float, typer.Option(help="simulated seconds a second")] = 1.0,
-    faults: Annotated[Path | None, typer.Option(help="TOML file of what goes wrong")] = None,
-    latency: Annotated[float, typer.Option(help="of the USB adapter, ms")] = 0.0,
-    link: Annotated[Path | None, typer.Option(help="symbolic link that leads to the port")] = None,
-    record: Annotated[Path | None, typer.Option(help="write the exchange here, JSON lines")] = None,
+    baud: Annotated[int | None, typer.Option(help="baud rate of the servos in bit/s")] = None,
+    pace: Annotated[float, typer.Option(help="simulated seconds per second")] = 1.0,
+    faults: Annotated[Path | None, typer.Option(help="TOML file of faults to simulate")] = None,
+    latency: Annotated[float, typer.Option(help="latency of the USB adapter in ms")] = 0.0,
+    link: Annotated[
+        Path | None, typer.Option(help="create a symbolic link to the port here")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="write the exchange here as JSON lines")
+    ] = None,
     play: Recorded = None,
-    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for", help="stop after this many seconds; default: serve until ^C"),
+    ] = None,
     with_console: WithConsole = False,
     force: Force = False,
     as_json: Json = False,
@@ -208,14 +215,14 @@ def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
         )
     if output_flushes:
         LOGGER.warning(
-            "a client flushed its output at least %d times: what it had sent less than 5 ms before "
-            "may be lost, as on no UART (docs/bus.md)",
+            "a client flushed its output at least %d times: bytes that it sent less than 5 ms "
+            "before may be lost, which no UART does (docs/how-to/serve-a-bus.md)",
             output_flushes,
         )
 
 
 def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served]") -> "Served":
-    """What is served, its line, who looks at it, what puts its packets into words, its faults."""
+    """Name of the line, the line, its taps, the decoder of its packets, and its faults."""
     if play is None:
         return simulated()
     line = RecordedLine.of(play, baud or 1_000_000)

@@ -30,26 +30,34 @@ from snakewalk.drivers.protocol.registers import BAUDS
     ),
 )
 def bus_set(
-    servo_id: Annotated[int, typer.Option("--id", help="the servo, 0 to 252")],
+    servo_id: Annotated[int, typer.Option("--id", help="ID of the servo, 0 to 252")],
     port: ChainPort = None,
-    baud: Annotated[int, typer.Option(help="at which it answers now")] = 1_000_000,
-    new_id: Annotated[int | None, typer.Option(help="0 to 252")] = None,
-    new_baud: Annotated[int | None, typer.Option(help="bit/s")] = None,
-    min_position: Annotated[float | None, typer.Option(help="rad, 0 is straight")] = None,
-    max_position: Annotated[float | None, typer.Option(help="rad, 0 is straight")] = None,
-    current_limit: Annotated[float | None, typer.Option(help="A")] = None,
-    temperature_limit: Annotated[float | None, typer.Option(help="C")] = None,
-    voltage_min: Annotated[float | None, typer.Option(help="V")] = None,
-    voltage_max: Annotated[float | None, typer.Option(help="V")] = None,
-    return_delay: Annotated[float | None, typer.Option(help="us")] = None,
-    robot: Annotated[
-        str | None, typer.Option(help="file of the robot whose fingerprint file is updated")
+    baud: Annotated[int, typer.Option(help="current baud rate of the servo")] = 1_000_000,
+    new_id: Annotated[int | None, typer.Option(help="new ID, 0 to 252")] = None,
+    new_baud: Annotated[int | None, typer.Option(help="new baud rate in bit/s")] = None,
+    min_position: Annotated[
+        float | None, typer.Option(help="lower position limit in rad; 0 is straight")
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="show the changes, no more")] = False,
+    max_position: Annotated[
+        float | None, typer.Option(help="upper position limit in rad; 0 is straight")
+    ] = None,
+    current_limit: Annotated[float | None, typer.Option(help="current limit in A")] = None,
+    temperature_limit: Annotated[
+        float | None, typer.Option(help="temperature limit in degrees C")
+    ] = None,
+    voltage_min: Annotated[float | None, typer.Option(help="lower voltage limit in V")] = None,
+    voltage_max: Annotated[float | None, typer.Option(help="upper voltage limit in V")] = None,
+    return_delay: Annotated[float | None, typer.Option(help="return delay time in us")] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="robot whose fingerprint file to update")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="show the changes and write nothing")
+    ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
     as_json: Json = False,
 ) -> None:
-    """Change settings of one servo that outlive its power; shows them and asks first."""
+    """Change settings of one servo that persist without power; shows them and asks first."""
     if baud not in BAUDS:
         raise ControlTableError(f"--baud {baud}: servos have {', '.join(map(str, BAUDS))}")
     request = SettingsRequest(

@@ -20,16 +20,19 @@ from snakewalk.sim.sniff.trace import read_trace
 @command("bus sniff", examples=("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))
 def sniff(
     source: Annotated[
-        Path, typer.Argument(help="a recording (JSON lines, hex text, raw), or a serial device")
+        Path, typer.Argument(help="recording (JSON lines, hex text, raw), or a serial device")
     ],
-    baud: Annotated[int, typer.Option(help="of the device, bit/s")] = 1_000_000,
+    baud: Annotated[int, typer.Option(help="baud rate of the device in bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="model, or its file, of servos that no ping has shown")
+        str, typer.Option(help="model, or its file, for servos whose model no ping has shown")
     ] = "XM430-W350",
     through: Annotated[
-        bool, typer.Option("--through", help="stand between a client and the device")
+        bool, typer.Option("--through", help="forward the bytes between a client and the device")
     ] = False,
-    for_s: Annotated[float | None, typer.Option("--for", help="seconds; default: until ^C")] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for", help="stop after this many seconds; default: sniff until ^C"),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Decode a live or recorded exchange packet by packet."""

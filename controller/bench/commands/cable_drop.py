@@ -19,17 +19,20 @@ def power(
     name: RobotName,
     current: Annotated[
         float,
-        typer.Option(min=0.0, max=10.0, help="what each servo takes from the supply, A, at work"),
+        typer.Option(min=0.0, max=10.0, help="supply current of each working servo in A"),
     ] = 0.1,
     leads: Annotated[
-        int, typer.Option(min=0, max=3, help="more places to inject power that are looked for")
+        int,
+        typer.Option(
+            min=0, max=3, help="number of additional places for injecting power to propose"
+        ),
     ] = 2,
     as_json: Json = False,
 ) -> None:
     """Compute the voltage of each servo under a load, and where to inject power.
 
-    Cables and leads are those of the robot's table `power`; without one, cables as they are sold,
-    and power at the first servo.
+    Cables and leads come from the table `power` of the robot. Without one, the command assumes
+    standard cables and power at the first servo.
     """
     robot = load_robot(name)
     described = robot.power or PowerConfig()

@@ -31,20 +31,21 @@ if TYPE_CHECKING:
     from snakewalk.controller.bench.homing_offset import HomingOffset
 
 Sweep = Annotated[
-    bool, typer.Option("--sweep/--no-sweep", help="look for the ends of each joint's range")
+    bool, typer.Option("--sweep/--no-sweep", help="search for the ends of each joint's range")
 ]
 ToEeprom = Annotated[
     bool,
     typer.Option(
         "--homing-offset",
-        help="zeros into the servos' EEPROM, Homing Offset(20), after a question, not the file",
+        help="write the zeros into the servos' EEPROM, Homing Offset(20), after a question, "
+        "instead of the file",
     ),
 ]
 
 
 @command("calibrate", group=BUS, examples=("calibrate --robot alternating16 -o my-robot.toml",))
 def calibrate(
-    out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="write the robot's file here (.toml)")],
     robot: Annotated[
         str,
         typer.Option(
@@ -53,12 +54,14 @@ def calibrate(
         ),
     ] = "alternating16",
     port: Port = None,
-    baud: Annotated[int | None, typer.Option(help="default: as the robot says")] = None,
-    current: Annotated[float, typer.Option(help="A, the most that a servo may use")] = 0.3,
+    baud: Annotated[
+        int | None, typer.Option(help="baud rate of the servos; default: the robot file's rate")
+    ] = None,
+    current: Annotated[float, typer.Option(help="largest current of a servo in A")] = 0.3,
     sweep: Sweep = True,
     homing_offset: ToEeprom = False,
     yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="with --homing-offset: write without asking")
+        bool, typer.Option("--yes", "-y", help="write without asking, with --homing-offset")
     ] = False,
     resume: Annotated[
         bool,
@@ -67,10 +70,10 @@ def calibrate(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Wiggle one servo at a time, weakly, ask which joint moved, and write the robot's file.
+    """Move one servo at a time weakly, ask which joint moved, and write the robot's file.
 
-    Hang the robot up, or hold it: joints should carry no weight. Then lay it straight when asked.
-    Each answer is saved at once in OUT.part; --resume continues from there.
+    Hang the robot up or hold it, so that joints carry no weight. Later the command asks you to
+    lay it straight. Each answer is saved at once in OUT.part; --resume continues from there.
     """
     _check_options(out, current, homing_offset=homing_offset, yes=yes)
     backup = out.with_name(f"{out.stem}-eeprom.json") if homing_offset else None

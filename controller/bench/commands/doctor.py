@@ -32,26 +32,34 @@ from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.port_map import is_port_map, port_map_text
 
+DoctorPort = Annotated[
+    str | None,
+    typer.Option(
+        callback=check_port_name,
+        help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT for "
+        "segments; robot: the ports of the robot's file; default: the only USB adapter",
+    ),
+]
+
 
 @command(
     "doctor", group=BUS, examples=("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16")
 )
 def doctor(
-    port: Annotated[
-        str | None,
-        typer.Option(
-            callback=check_port_name,
-            help="serial port, or a URL such as socket://host:5000; 1-8=PORT,9-16=PORT, or robot, "
-            "whose file says which; default: the only USB adapter there is",
-        ),
-    ] = None,
+    port: DoctorPort = None,
     robot: Robot = None,
     run: Annotated[
-        str, typer.Option(help="run whose rate and limits count", autocompletion=completion.RUNS)
+        str,
+        typer.Option(
+            help="check against the rate and the limits of this run", autocompletion=completion.RUNS
+        ),
     ] = DEFAULT_RUN,
     wiggle: Annotated[
         bool,
-        typer.Option("--wiggle", help="move all joints by 0.15 rad for 2 s: does the supply sag?"),
+        typer.Option(
+            "--wiggle",
+            help="move all joints by 0.15 rad for 2 s, and check whether the supply sags",
+        ),
     ] = False,
     accept: Annotated[
         bool,
@@ -60,13 +68,13 @@ def doctor(
         ),
     ] = False,
     yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="with --accept: write without asking")
+        bool, typer.Option("--yes", "-y", help="write without asking, with --accept")
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Examine adapter, bus and servos; every fault with its remedy.
+    """Examine adapter, bus and servos; list every fault with its remedy.
 
-    Changes nothing, unless the joints are to wiggle: then the chain is set up as in a run.
+    The command changes nothing, except with --wiggle: then it sets the chain up as in a run.
     """
     job = load_run(run)
     robot_file = robot if robot is not None else job.robot

@@ -1,4 +1,4 @@
-"""``snakewalk scan``: who is on the bus."""
+"""``snakewalk scan``: the servos on the bus."""
 
 import json
 from typing import Annotated
@@ -17,7 +17,8 @@ from snakewalk.controller.console.options import ChainPort, Json, console
 def scan(
     port: ChainPort = None,
     baud: Annotated[
-        list[int] | None, typer.Option(help="only this rate, may be given again; default: all")
+        list[int] | None,
+        typer.Option(help="search only this baud rate; may be repeated; default: all"),
     ] = None,
     as_json: Json = False,
 ) -> None:

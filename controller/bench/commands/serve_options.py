@@ -18,7 +18,7 @@ OfRun = Annotated[
     str | None,
     typer.Option(
         "--run",
-        help="robot, world and start of a shipped run or a RUN.toml, instead of --robot",
+        help="use robot, world and start of a shipped run or a RUN.toml, instead of --robot",
         autocompletion=completion.RUNS,
     ),
 ]
@@ -26,23 +26,22 @@ At = Annotated[
     str | None,
     typer.Option(
         metavar="X,Y[,DEG]",
-        help="where the head lies and the body points to; default: that of --run, else 0,0,0",
+        help="start of the head and direction of the body; default: the start of --run, else 0,0,0",
     ),
 ]
 PoseOut = Annotated[
     str | None,
-    typer.Option(metavar="udp:HOST:PORT", help="publish the robot's pose there"),
+    typer.Option(metavar="udp:HOST:PORT", help="publish the robot's pose at this address"),
 ]
 Tracker = Annotated[
     list[str] | None,
     typer.Option(
         metavar="KEY=VALUE",
-        help="noise_m, noise_deg, delay_s, dropout_every_s, ... of these poses; may be repeated",
+        help="errors of these poses: noise_m, noise_deg, delay_s, dropout_every_s, ...; may "
+        "be repeated",
     ),
 ]
 TruthFile = Annotated[
     Path | None,
-    typer.Option(
-        "--truth", help="write where the robot really was, for `snakewalk judge`, JSON lines"
-    ),
+    typer.Option("--truth", help="write the true poses here as JSON lines, for `snakewalk judge`"),
 ]

@@ -30,23 +30,26 @@ def stop(
     run: Annotated[
         str | None,
         typer.Argument(
-            help="name, folder or process of a run; default: every run of yours on this machine "
-            "that holds a port, else the newest in simulation",
+            help="name, folder or process of a run; default: all your runs on this machine that "
+            "hold a port, else the newest simulated run",
             show_default=False,
         ),
     ] = None,
     port: Annotated[
-        str | None, typer.Option(help="what holds this serial port (or URL), or the servos on it")
+        str | None,
+        typer.Option(help="stop the run that holds this serial port (or URL), or the servos on it"),
     ] = None,
     baud: Annotated[
         list[int] | None,
-        typer.Option(help="of a port that no program holds, may be given again; default: all"),
+        typer.Option(
+            help="baud rate of a port that no program holds; may be repeated; default: all"
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Stop a run at once: torque off, latched. Where no run holds the port: torque off to all."""
+    """Stop a run at once, latched; without a run, switch off the torque of all servos on a port."""
     if run is not None and port is not None:
-        raise InputError("stop takes a run or --port, not both")
+        raise InputError("stop: a run and --port exclude each other; leave one out")
     who = f"snakewalk stop (process {os.getpid()})"
     outcomes = emergency_stop.stop_runs(emergency_stop.runs_of(port, run), who)
     if run is not None and not outcomes:

@@ -14,11 +14,15 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import atomic_write
 
-Pattern = Annotated[str, typer.Option(help="charuco, which may be seen in part, or chessboard")]
-Squares = Annotated[str, typer.Option(help="across x down, also of a chessboard", metavar="NxM")]
-SquareMm = Annotated[float, typer.Option(help="side of a square, mm, as measured on the print")]
+Pattern = Annotated[
+    str, typer.Option(help="pattern: charuco, which may be seen in part, or chessboard")
+]
+Squares = Annotated[
+    str, typer.Option(help="number of squares across x down, also for a chessboard", metavar="NxM")
+]
+SquareMm = Annotated[float, typer.Option(help="side of a square in mm, as measured on the print")]
 DOTS = 300.0
-"""Per inch of what is printed."""
+"""Resolution of the print, dots per inch."""
 
 
 def read_squares(text: str) -> tuple[int, int]:
@@ -40,14 +44,16 @@ def read_squares(text: str) -> tuple[int, int]:
     results=("out",),
 )
 def board(
-    out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="write a .pdf in its true size, or a .png")
+    ],
     pattern: Pattern = "charuco",
     squares: Squares = "7x5",
     square: SquareMm = 36.0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw the board for `camera calibrate`; print it without scaling, and glue it on a plate."""
+    """Draw the board for `camera calibrate`; print it without scaling, and glue it to a plate."""
     made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
     check_print(out)
     write_print(out, [made.picture(DOTS)])
@@ -63,7 +69,7 @@ def check_print(out: Path) -> None:
 
     """
     if out.suffix.lower() not in (".pdf", ".png"):
-        raise InputError(f"{out}: what is printed ends in .pdf or .png")
+        raise InputError(f"{out}: the ending must be .pdf or .png")
 
 
 def write_print(out: Path, pages: list[Image]) -> None:

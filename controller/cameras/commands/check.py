@@ -25,15 +25,22 @@ def check(
     device: Annotated[
         str | None, typer.Option(help="camera: a number, a device, an address or a film")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=1.0, max=36_000.0, help="how long it looks")] = 8.0,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, max=36_000.0, help="duration of the check in seconds")
+    ] = 8.0,
     set_: Set = None,
-    view: Annotated[bool, typer.Option("--view", help="show it in a browser meanwhile")] = False,
-    view_at: Annotated[str, typer.Option(metavar="HOST:PORT", help="of the page")] = VIEW_AT,
+    view: Annotated[
+        bool, typer.Option("--view", help="show the picture in a browser during the check")
+    ] = False,
+    view_at: Annotated[
+        str, typer.Option(metavar="HOST:PORT", help="address of the page")
+    ] = VIEW_AT,
     as_json: Json = False,
 ) -> None:
-    """Look through a run's camera, or the simulator's: markers, frame rate, latency, light.
+    """Check a camera, real or simulated: markers, frame rate, latency, light.
 
-    With --port the joints are read, never moved: turn one by hand, unevenly, for the latency.
+    With --port the command reads the joints and never moves them. Turn one joint by hand,
+    unevenly, to measure the latency.
     """
     prepared = prepare_job(run, keys=key_values("--set", set_))
     if device is not None:

@@ -44,18 +44,25 @@ _PAUSE_S = 0.7
 )
 def calibrate_camera(
     source: Annotated[str, typer.Argument(help="folder of pictures, a film, or a device's number")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="the lens's file (.yml, .json)")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="write the lens file here (.yml, .json)")
+    ],
     pattern: Pattern = "charuco",
     squares: Squares = "7x5",
     square: SquareMm = 36.0,
-    views: Annotated[int, typer.Option(min=5, max=200, help="pictures looked at, at most")] = 40,
-    size: Annotated[str, typer.Option(help="px, asked of a device", metavar="WxH")] = "640x480",
+    views: Annotated[
+        int, typer.Option(min=5, max=200, help="largest number of pictures to use")
+    ] = 40,
+    size: Annotated[
+        str, typer.Option(help="picture size of a device in pixels", metavar="WxH")
+    ] = "640x480",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Find a camera's lens from pictures of the board of `camera board`, by OpenCV's calibration.
+    """Calibrate a camera's lens with OpenCV from pictures of the board of `camera board`.
 
-    Hold the board at 15 places or more, also in the picture's corners, tilted by up to 45 degrees.
+    Hold the board at 15 places or more, also in the corners of the picture, tilted by up to 45
+    degrees.
     """
     if out.suffix.lower() not in _ENDINGS:
         raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
@@ -108,7 +115,7 @@ def _from_files(
 def _from_device(
     name: str, size: str, board: CalibrationBoard, count: int
 ) -> tuple[list[BoardView | None], tuple[int, int]]:
-    """Take pictures one after another and say of each whether the board was found in it."""
+    """Take pictures one after another and report for each whether the board was found in it."""
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
         raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")

@@ -18,17 +18,21 @@ from snakewalk.controller.console.options import Force, Json, show
     results=("out",),
 )
 def markers(
-    out: Annotated[Path, typer.Option("--out", "-o", help="a .pdf in its true size, or a .png")],
-    count: Annotated[int, typer.Option(min=1, max=50, help="markers, a page each")] = 6,
-    first: Annotated[int, typer.Option(min=0, max=49, help="number of the first")] = 0,
-    side: Annotated[float, typer.Option(help="of a marker, mm, without its white margin")] = 150.0,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="write a .pdf in its true size, or a .png")
+    ],
+    count: Annotated[int, typer.Option(min=1, max=50, help="number of markers, one per page")] = 6,
+    first: Annotated[int, typer.Option(min=0, max=49, help="number of the first marker")] = 0,
+    side: Annotated[
+        float, typer.Option(help="side of a marker in mm, without its white margin")
+    ] = 150.0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Draw markers for the floor under the camera; print them without scaling.
 
-    Four or more, flat on the floor, as far apart as the picture allows: the table
-    `camera.markers_m` of a run names their places.
+    Lay four or more flat on the floor, as far apart as the picture allows. The table
+    `camera.markers_m` of a run contains their positions.
     """
     check_print(out)
     if out.suffix.lower() == ".png" and count > 1:

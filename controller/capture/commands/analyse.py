@@ -46,7 +46,9 @@ def analyse(
     plane: Plane = None,
     picture: Annotated[
         Path | None,
-        typer.Option(help="draw tracks and maps: a file (.png, .svg, .pdf), or a folder for PNGs"),
+        typer.Option(
+            help="draw tracks and maps into a file (.png, .svg, .pdf), or a folder for PNGs"
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="overwrite pictures")] = False,
     as_json: Json = False,
@@ -93,6 +95,7 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
 
 def _show(facts: dict[str, Any]) -> None:
     """One recording as a table of two columns with the units in words."""
+    missing = f"{facts['frames_missing']} missing in the file, " if facts["frames_missing"] else ""
     assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
     if facts["times_uneven"]:
         assumed = " (frames came at uneven times; bodies put between them)"
@@ -106,6 +109,7 @@ def _show(facts: dict[str, Any]) -> None:
     )
     rows = {
         "frames": f"{facts['frames']}, {facts['frames_left_out']} left out, "
+        f"{missing}"
         f"{bridged}"
         f"{facts['rate_hz']:g} Hz{assumed}, {length}",
         "frequency": no_wave or f"{facts['frequency_hz']} Hz",
@@ -137,6 +141,10 @@ def _show(facts: dict[str, Any]) -> None:
         rows["note"] = (
             f"the wave runs towards the head {facts['time_towards_head']:.0%} of the time"
         )
+    if facts["every_nth_frame"] > 1:
+        rows["rows"] = f"every {facts['every_nth_frame']}th frame of the camera"
+    if facts["notes"]:
+        rows["changed by the reader"] = "\n".join(facts["notes"])
     table = Table(title=facts["recording"], title_justify="left", box=None, show_header=False)
     for key, text in rows.items():
         table.add_row(key, text)

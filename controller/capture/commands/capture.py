@@ -17,15 +17,15 @@ from snakewalk.controller.console.options import Force, Json, show
 Footage = Annotated[
     Path,
     typer.Argument(
-        help="a video, or a folder of images; with --corrections a track captured before",
+        help="a video, a TIFF stack or a folder of images; with --corrections, an earlier track",
         metavar="VIDEO|FOLDER|TRACK.npz",
     ),
 ]
 Marker = Annotated[
     str | None,
     typer.Option(
-        help="or: the SIDE, m, of a printed ArUco or AprilTag marker in view; or "
-        "X0,Y0,X1,Y1,METRES, two places in the image and how far apart they are"
+        help="scale from a printed ArUco or AprilTag marker with SIDE in metres; or "
+        "X0,Y0,X1,Y1,METRES: two points in the image and their distance"
     ),
 ]
 Cropped = Annotated[
@@ -35,22 +35,23 @@ Cropped = Annotated[
 Threshold = Annotated[
     float | None,
     typer.Option(
-        help="grey levels by which the body's boundary stands out from the background; "
-        "default: half of the body's own contrast"
+        help="grey levels between body and background at the boundary; default: half of the "
+        "body's contrast"
     ),
 ]
 Review = Annotated[
     Path | None,
     typer.Option(
-        help="write a page (.html) on which a person flips heads, leaves frames out, drags "
-        "points, and saves the corrections; open it in a browser",
+        help="write a page (.html) for flipping heads, leaving out frames and dragging "
+        "points; open it in a browser",
         metavar="PAGE",
     ),
 ]
 Corrections = Annotated[
     Path | None,
     typer.Option(
-        help="apply what was saved on the review page of TRACK.npz; write to -o", metavar="JSON"
+        help="apply the corrections that the review page of TRACK.npz saved, and write -o",
+        metavar="JSON",
     ),
 ]
 Background = Annotated[
@@ -70,28 +71,36 @@ Background = Annotated[
 )
 def capture(
     recording: Footage,
-    output: Annotated[Path, typer.Option("-o", "--output", help="the track")] = Path("track.npz"),
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="write the track here (.npz)")
+    ] = Path("track.npz"),
     background: Background = None,
     length_m: Annotated[
-        float | None, typer.Option(help="how long the animal is: the scale")
+        float | None, typer.Option(help="length of the animal in metres, which sets the scale")
     ] = None,
     marker: Marker = None,
     rate: Annotated[
-        float | None, typer.Option(help="frames a second, instead of what the file says")
+        float | None,
+        typer.Option(
+            help="frame rate in frames per second; default: the rate that the film states"
+        ),
     ] = None,
     head: Annotated[
         str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")
     ] = None,
     cropped: Cropped = False,
     roi: Annotated[
-        str | None, typer.Option(help="look only here: X,Y,W,H in pixels", metavar="X,Y,W,H")
+        str | None,
+        typer.Option(
+            help="search only this part of the image: X,Y,W,H in pixels", metavar="X,Y,W,H"
+        ),
     ] = None,
     mask: Annotated[
-        Path | None, typer.Option(help="look only where this picture is white", metavar="PNG")
+        Path | None, typer.Option(help="search only where this picture is white", metavar="PNG")
     ] = None,
     threshold: Threshold = None,
     overlay: Annotated[
-        Path | None, typer.Option(help="write the film with the skeleton on it (.mp4, .avi)")
+        Path | None, typer.Option(help="write a film with the skeleton on it (.mp4, .avi)")
     ] = None,
     sheet: Annotated[
         Path | None, typer.Option(help="write a contact sheet of frames (.png, .jpg)")

@@ -31,10 +31,11 @@ from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
 )
-from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.generated import EMBEDDED
 from snakewalk.controller.track.readers.keypoints import ALL, choice_of
 from snakewalk.controller.track.readers.load import check_rate
+from snakewalk.controller.track.readers.writers import SUFFIXES, write_track
+from snakewalk.controller.track.track import UNSURE_HEAD
 
 
 @command(
@@ -61,7 +62,9 @@ def track(
     plane: Plane = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="write what was chosen as a track of its own (.npz)"),
+        typer.Option(
+            "-o", "--output", help="write the chosen animal as a track (.npz, .csv or .wcon)"
+        ),
     ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="draw midlines and angles here (.png, .svg, .pdf)")
@@ -73,8 +76,10 @@ def track(
     check_picture(picture)
 
     names = recordings or list(EMBEDDED)
-    if output is not None and (len(names) > 1 or output.suffix.lower() != ".npz"):
-        raise InputError(f"{output}: one recording makes one .npz; {len(names)} are named")
+    if output is not None and output.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{output}: a track is written as one of {', '.join(SUFFIXES)}")
+    if output is not None and len(names) > 1:
+        raise InputError(f"{output}: one recording makes one file; {len(names)} are named")
     check_rate(rate, names)
     choice = choice_of(individual, keypoints, plane)
     found = [
@@ -92,7 +97,7 @@ def track(
         draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
     if output is not None:
         with atomic_write(output) as part:
-            save_track(part, found[0].track)
+            write_track(part, found[0].track, output.suffix)
     if as_json:
         print(json.dumps([one.facts.to_dict() for one in found]))
         return
@@ -105,6 +110,7 @@ def _show(facts: "RecordingFacts") -> None:
     pace = facts.pace
     length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
     bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""
+    missing = f"{facts.frames_missing} missing in the file, " if facts.frames_missing else ""
     assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
     if facts.times_uneven:
         assumed = " (frames came at uneven times; bodies put between them)"
@@ -113,6 +119,7 @@ def _show(facts: "RecordingFacts") -> None:
     rows = {
         "source": "; ".join(dict.fromkeys((str(facts.source), str(facts.licence)))),
         "frames": f"{facts.frames}, {facts.frames_left_out} left out, "
+        f"{missing}"
         f"{bridged}"
         f"{facts.rate_hz:g} Hz{assumed}, {length}",
         "wave": f"{facts.waves_on_body} on the body, {facts.wave_hz} Hz, "
@@ -131,10 +138,21 @@ def _show(facts: "RecordingFacts") -> None:
         f"acceleration {pace.slowed_by_for_acceleration}); "
         f"{pace.longer_if_slowed_where_needed} times longer if only where needed",
     }
+    if not facts.places_recorded:
+        rows["places"] = "not recorded: the images were cropped to the animal or the camera moved"
     if facts.head_and_tail_swapped:
         rows["warning"] = f"head and tail change places {facts.head_and_tail_swapped} times"
+    elif facts.head_sure is not None and facts.head_sure < UNSURE_HEAD:
+        rows["warning"] = (
+            f"head and tail may be exchanged (sure by {facts.head_sure:.2f}); capture the film "
+            "again with --head X,Y, or correct it on the page of capture --review"
+        )
     elif facts.time_towards_head is not None and facts.time_towards_head > 0.5:
         rows["warning"] = "the wave runs towards the head: an animal going backwards, or tail first"
+    if facts.every_nth_frame > 1:
+        rows["rows"] = f"every {facts.every_nth_frame}th frame of the camera"
+    if facts.notes:
+        rows["changed by the reader"] = "\n".join(facts.notes)
     table = Table(title=facts.recording, title_justify="left", box=None, show_header=False)
     for key, text in rows.items():
         table.add_row(key, text)

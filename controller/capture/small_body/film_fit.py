@@ -47,6 +47,8 @@ _LOST = 2.0  # times the median noise: the picture shows something else
 _FOUND = 1.5  # the same for a frame that had no skeleton
 _ALIKE = 0.3  # of the usual contrast
 _DOUBT = 0.35  # margin of the ends under which both ways are tried
+_NEAR = 3  # frames between which the margin of the ends counts: one may have no body
+_EVIDENCE = 9.0  # squares of the noise: the grey values must say so by three standard deviations
 _TRIED = 5  # frames of a stretch between doubts
 _FREE = 0.03  # of the body's cover: less than that is ground
 _PRIOR_FRAMES = 2.0  # weight of the surroundings of a place, in frames
@@ -149,6 +151,16 @@ def _with_status(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
     return body
 
 
+def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> FittedFilm:
+    """The film with expected errors of at least so much in some frames."""
+    expected, out = film.expected_px.copy(), list(film.skeletons)
+    for k, least in least_px.items():
+        if np.isfinite(expected[k]):
+            expected[k] = max(float(expected[k]), least)
+            out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
+    return replace(film, skeletons=tuple(out), expected_px=expected)
+
+
 def expected_error(fit: Fit, body: FilmBody) -> float:
     """Expected error of a point, mean along the body, working pixels."""
     length = float(body.values[0])
@@ -185,7 +197,7 @@ def _reverse_wrong_stretches(
     """Reverse stretches whose grey values fit the body better from its other end."""
     stretches: list[list[int]] = []
     for k in sorted(fits):
-        joined = stretches and stretches[-1][-1] == k - 1 and margin[k] >= _DOUBT
+        joined = stretches and k - stretches[-1][-1] <= _NEAR and margin[k] >= _DOUBT
         if joined:
             stretches[-1].append(k)
         else:
@@ -193,11 +205,12 @@ def _reverse_wrong_stretches(
     if len(stretches) == 1:
         return
     for stretch in stretches:
-        worse = 0.0
+        worse = []
         for k in stretch[:: max(1, len(stretch) // _TRIED)]:
             other = fit_frame(patches[k], reversed_body(fits[k].frame), body)
-            worse += float((other.residual**2).sum() - (fits[k].residual ** 2).sum())
-        if worse < 0.0:
+            squares = float((other.residual**2).sum() - (fits[k].residual ** 2).sum())
+            worse.append(squares / max(fits[k].noise, 1e-9) ** 2)
+        if float(np.sum(worse)) < -_EVIDENCE:
             for k in stretch:
                 fits[k] = fit_frame(patches[k], reversed_body(fits[k].frame), body)
 

@@ -38,17 +38,24 @@ from snakewalk.controller.runlog.reader import read_log
 def export(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     csv: Annotated[
-        Path | None, typer.Option(file_okay=False, help="folder of CSV tables, one a channel")
+        Path | None,
+        typer.Option(file_okay=False, help="write CSV tables into this folder, one per channel"),
     ] = None,
     parquet: Annotated[
-        Path | None, typer.Option(file_okay=False, help="folder of Parquet tables, one a channel")
+        Path | None,
+        typer.Option(
+            file_okay=False, help="write Parquet tables into this folder, one per channel"
+        ),
     ] = None,
     ros2: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="a ROS 2 bag, FILE.mcap", metavar="FILE")
+        Path | None,
+        typer.Option(dir_okay=False, help="write a ROS 2 bag, FILE.mcap", metavar="FILE"),
     ] = None,
     foxglove: Annotated[
         Path | None,
-        typer.Option(dir_okay=False, help="for Foxglove in 3-D, FILE.mcap", metavar="FILE"),
+        typer.Option(
+            dir_okay=False, help="write a file for Foxglove in 3-D, FILE.mcap", metavar="FILE"
+        ),
     ] = None,
     joint_numbers: Annotated[
         bool, typer.Option("--joint-numbers", help="name joints by number, as older versions did")

@@ -28,15 +28,15 @@ def export_robot(
     ros2_control: Annotated[
         Literal["topic", "dynamixel"] | None,
         typer.Option(
-            help="with a tag for ros2_control in the URDF: topic drives snakewalk ros, dynamixel "
-            "the servos without it",
+            help="add a ros2_control tag to the URDF: topic drives snakewalk ros, dynamixel the "
+            "servos directly",
             show_default=False,
         ),
     ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write a robot for other programs: the same masses and kinematics."""
+    """Write a robot as URDF or MuJoCo model with the same masses and kinematics."""
     if urdf is None and mjcf is None:
         raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
     if ros2_control is not None and urdf is None:

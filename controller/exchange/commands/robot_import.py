@@ -23,17 +23,19 @@ from snakewalk.controller.exchange.robot_import import robot_import
 )
 def import_robot(
     file: Annotated[Path, typer.Argument(help="URDF, xacro or MuJoCo model (.xml)")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="the robot's file (.toml)")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="write the robot's file here (.toml)")],
     servo: Annotated[
-        str, typer.Option(help="model of all servos, which such files do not know")
+        str, typer.Option(help="model of all servos; such files do not contain it")
     ] = ("XM430-W350"),
-    scale: Annotated[float, typer.Option(help="lengths times this, masses times its cube")] = 1.0,
-    reverse: Annotated[bool, typer.Option(help="the model's first body is the tail")] = False,
+    scale: Annotated[
+        float, typer.Option(help="factor on lengths; its cube is the factor on masses")
+    ] = 1.0,
+    reverse: Annotated[bool, typer.Option(help="the first body of the model is the tail")] = False,
     assume: Assume = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a robot's file of another program's model; report what was dropped or changed."""
+    """Make a robot's file from a URDF or MuJoCo model; report what was dropped or changed."""
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:

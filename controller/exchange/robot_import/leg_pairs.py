@@ -197,7 +197,8 @@ def _pair(
     )
     if not same:
         raise InputError(
-            f"legs {both[0].name} and {both[1].name} of {name}: are no mirror images of each other"
+            f"{name}: the legs {both[0].name} and {both[1].name} are not mirror images; correct "
+            "the model"
         )
     masses = [*left.masses_kg, *right.masses_kg]
     mean_kg = float(np.mean(masses))

@@ -110,13 +110,13 @@ class ChainFigures:
                 worst_m = max(worst_m, off_m)
                 if off_m > max(_ASIDE, 0.05 / len(hinges)) * span_m:
                     raise InputError(
-                        f"joint {hinge.name}: lies {off_m:.4g} m beside the line of the others at "
-                        "zero angles; links are straight here, and the chain is at zero"
+                        f"joint {hinge.name}: lies {off_m:.4g} m from the line of the others at "
+                        "zero angles; a chain needs straight links, straight at zero angles"
                     )
         if worst_m > _ASIDE * span_m:
             self.notes.append(
-                f"joints lie up to {worst_m:.2g} m beside one line at zero angles; here they are "
-                "on it"
+                f"joints lie up to {worst_m:.2g} m from one line at zero angles; the robot's "
+                "file puts them on the line"
             )
         for hinge, before, here in zip(hinges[1:], at_m, at_m[1:], strict=False):
             if here > before + 1e-9:

@@ -182,8 +182,8 @@ def _check_size(links: list[LinkFigures], names: list[str], scale: float) -> Non
             if value == 0.0 or low < value <= high:
                 continue
             raise InputError(
-                f"link {name}: its {what} is {value:.3g} {unit}; a link has over {low:g} and at "
-                f"most {high:g} {unit}: add --scale for what is not of the size of servos"
+                f"link {name}: its {what} is {value:.3g} {unit}, and must be over {low:g} and "
+                f"at most {high:g} {unit}; add --scale for another size than that of servos"
             )
 
 
@@ -263,7 +263,7 @@ def _plan_limits(
         notes.append(f"torque of a plan: the model states {min(efforts):g} N m{words}")
     elif efforts:
         notes.append(
-            f"torque of a plan: the model states {min(efforts):g} N m, which is no servo's; a "
+            f"torque of a plan: the model states {min(efforts):g} N m, which no servo has; a "
             f"{servo_model} holds {held_n_m:g}"
         )
     low, high = _SPEED_RAD_S
@@ -272,8 +272,8 @@ def _plan_limits(
         notes.append(f"joint speed of a plan: {min(speeds):g} rad/s, as the model states")
     elif speeds:
         notes.append(
-            f"joint speed of a plan: the model states {min(speeds):g} rad/s, which is no servo's: "
-            "left out"
+            f"joint speed of a plan: the model states {min(speeds):g} rad/s, which no servo "
+            "has; it is left out"
         )
     return keys
 

@@ -147,9 +147,9 @@ def _first_link(source: ModelSource, path: Path) -> str:
     turning = [j for j in holding if j.get("type") not in ("fixed", "floating", "planar")]
     if turning:
         raise InputError(
-            f"{path}: joint {turning[0].get('name')}, {turning[0].where}: bolts the robot to the "
-            f"link world by a {turning[0].get('type')} joint; a robot here moves freely: join its "
-            "first link by a fixed or floating joint, or leave the link world out"
+            f"{path}: joint {turning[0].get('name')}, {turning[0].where}: connects the robot to "
+            f"the link world by a {turning[0].get('type')} joint, but this robot must move "
+            "freely; use a fixed or floating joint, or remove the link world"
         )
     if len(holding) != 1:
         held = ", ".join(str(_end(joint, "child")) for joint in holding) or "nothing"

@@ -1,4 +1,4 @@
-"""A central pattern generator: one oscillator a joint, coupled along the body, that takes any gait.
+"""A central pattern generator: one oscillator a joint, coupled along the body, for any gait.
 
 The form is that of A. J. Ijspeert, A. Crespi, D. Ryczko, J.-M. Cabelguen, From swimming to walking
 with a salamander robot driven by a spinal cord model, Science 315, 2007:
@@ -6,10 +6,11 @@ with a salamander robot driven by a spinal cord model, Science 315, 2007:
     theta_i' = omega + sum_j w sin(theta_j - theta_i - phi_ij),    q_i = x_i + r_i cos theta_i
     r_i'' = a (a/4 (R_i - r_i) - r_i'),  and the same for x_i
 
-Three things are added. Each joint has the higher harmonics of its gait beside ``r_i``, so that
-gaits which are no sine waves are met too. The frequency and the phases between joints go to new
-values by the same critically damped equation, instead of jumping: angles are then C1 at every
-change. And the coupling does not fade with the amplitude, so that joints at rest pass the phase on.
+Three things are added. Each joint has the higher harmonics of its gait in addition to ``r_i``, so
+that it also reproduces gaits that are not sine waves. The frequency and the phases between joints
+go to new values by the same critically damped equation, instead of jumping: angles are then C1 at
+every change. And the coupling does not fade with the amplitude, so that joints at rest pass the
+phase on.
 
 The phase differences ``phi_ij = beta_j - beta_i`` are those of a gait: with ``eps_i = theta_i - phi
 - beta_i`` and ``phi' = omega`` the coupling reads ``eps_i' = sum_j w sin(eps_j - eps_i)``. All
@@ -103,7 +104,7 @@ class Cpg:
         return self._slow, self._clock, self._t_s, self._phase_rad, self.pattern
 
     def restore(self, state: CpgState) -> None:
-        """Go back to what ``state`` returned."""
+        """Restore a state that ``state`` returned."""
         self._slow, self._clock, self._t_s, self._phase_rad, self.pattern = state
 
     def advance(self, time_s: float) -> None:

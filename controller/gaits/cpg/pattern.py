@@ -23,7 +23,7 @@ class Pattern:
     offset_rad: Floats
     """(J,) X"""
     bias_rad: Floats
-    """(J,) beta: phase of each joint's first harmonic; NaN where there is none."""
+    """(J,) beta: phase of each joint's first harmonic; NaN if it is zero."""
     harmonics_rad: Complexes
     """(J, HARMONICS) amplitudes ``d`` of ``Re(d e^(i k theta))``; the first is R, real."""
 

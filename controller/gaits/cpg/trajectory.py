@@ -37,9 +37,9 @@ def _evaluate(
 ) -> None:
     """Angles and speeds (J,) at one time, of the first ``count`` harmonics.
 
-    ``state`` is room for values and rates (2, rows, J), ``work`` for (5, J).
+    ``state`` is memory for values and rates (2, rows, J), ``work`` for (5, J).
 
-    Many short loops over joints: the processor takes several joints at a time in each.
+    Many short loops over joints: the processor handles several joints at a time in each.
     """
     harmonics = (len(goal) - 2) // 2
     phase, wanted, missing, ramp, slowing = clock[0], clock[1], clock[2], clock[3], clock[4]

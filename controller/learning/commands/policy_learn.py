@@ -25,24 +25,26 @@ from snakewalk.controller.learning.wave_search import (
     results=("out",),
 )
 def learn_policy(
-    out: Annotated[Path, typer.Option("--out", "-o", help="the policy (.toml)")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="write the policy here (.toml)")],
     robot: GivenRobot = "yaw16",
     world: GivenWorld = "flat",
-    generations: Annotated[int, typer.Option(min=1, max=100_000)] = 24,
+    generations: Annotated[
+        int, typer.Option(min=1, max=100_000, help="number of generations")
+    ] = 24,
     population: Annotated[
-        int, typer.Option(min=4, max=10_000, help="candidates of a generation")
+        int, typer.Option(min=4, max=10_000, help="number of candidates per generation")
     ] = 12,
     steps: Annotated[
-        int, typer.Option(min=50, max=100_000, help="steps of 20 ms in one episode")
+        int, typer.Option(min=50, max=100_000, help="number of steps of 20 ms per episode")
     ] = 250,
-    seed: Annotated[int, typer.Option(min=0, help="of candidates and starts")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    seed: Annotated[int, typer.Option(min=0, help="seed of candidates and starts")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     resume: Annotated[
         bool, typer.Option("--resume", help="continue an interrupted search from OUT.part")
     ] = False,
     force: Force = False,
 ) -> None:
-    """Learn a wave with its feedback by CMA-ES, on episodes of the Gymnasium environment.
+    """Learn a wave with feedback by CMA-ES, on episodes of the Gymnasium environment.
 
     Each generation is saved at once in OUT.part. --resume continues from there, with the same
     result as without the interruption.

@@ -39,9 +39,9 @@ def run_policy(
     world: World = None,
     set_: Set = None,
     seconds: Annotated[
-        float, typer.Option(min=1.0, max=3600.0, help="then it comes to rest")
+        float, typer.Option(min=1.0, max=3600.0, help="duration of the motion in seconds")
     ] = 20.0,
-    seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of every random choice")] = 0,
     shadow: Shadow = False,
     *,
     options: RunOptions,
@@ -63,8 +63,6 @@ def run_policy(
         "tripped": finished.outcome.tripped,
         "slowed_to": round(finished.outcome.least_rate, 3),
         **summarized(finished.summary, "travelled_m"),
-        "pose_evidence": finished.summary.pose_evidence,
-        "pose_source": finished.summary.pose_source,
         "electrical_energy_j": finished.summary.electrical_energy_j,
         "peak_current_a": finished.summary.peak_current_a,
     }

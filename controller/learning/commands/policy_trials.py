@@ -36,18 +36,23 @@ def policy_trials(
     ],
     world: Annotated[
         list[str] | None,
-        typer.Option(help="may be given again; default: flat", autocompletion=completion.WORLDS),
+        typer.Option(
+            help="shipped world, or a TOML file; may be repeated; default: flat",
+            autocompletion=completion.WORLDS,
+        ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 10,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per row")] = 10,
     first_seed: FirstSeed = 0,
-    seconds: Annotated[float, typer.Option(min=5.0, max=3600.0, help="of each run")] = 12.0,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    seconds: Annotated[
+        float, typer.Option(min=5.0, max=3600.0, help="duration of each run in seconds")
+    ] = 12.0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     as_json: Json = False,
 ) -> None:
-    """Compare policies with gaits: the same seeds move start, friction and supply of all."""
+    """Compare policies with gaits: each seed varies start, friction and supply equally for all."""
     require_extra("trials need", "mujoco")
     rows = [(motion, ground) for ground in world or ["flat"] for motion in motions]
-    rows = list(dict.fromkeys(rows))  # what is given twice is run once
+    rows = list(dict.fromkeys(rows))  # repeated rows run once
     planned = [
         PolicyTrial(motion, ground, seed, seconds)
         for motion, ground in rows
@@ -73,8 +78,9 @@ def policy_trials(
         "J/m",
         "course\nrad",
         "trips",
+        "pose",
     ):
-        grid.add_column(title, justify="left" if title in {"motion", "world"} else "right")
+        grid.add_column(title, justify="left" if title in {"motion", "world", "pose"} else "right")
     for row in table:
         grid.add_row(*["-" if value is None else str(value) for value in asdict(row).values()])
     console.print(grid)
@@ -93,13 +99,17 @@ class _Row:
     course_rad: float | None
     """Root of the mean square: how far off x they went."""
     trips: int
+    pose: str
+    """Evidence of the poses: ``measured (simulator)``."""
 
 
 def _row(motion: str, world: str, found: list[tuple[PolicyTrial, PolicyTrialResult]]) -> _Row:
     whole = [result for _, result in found if result.tripped is None]
     speeds = [result.speed_m_s for result in whole]
+    poses = {f"{result.pose_evidence} ({result.pose_source})": None for _, result in found}
+    pose = ", ".join(poses)
     if not whole:
-        return _Row(motion, world, None, None, None, None, None, len(found))
+        return _Row(motion, world, None, None, None, None, None, len(found), pose)
     return _Row(
         Path(motion).stem,
         world,
@@ -109,4 +119,5 @@ def _row(motion: str, world: str, found: list[tuple[PolicyTrial, PolicyTrialResu
         round(fmean(result.energy_j_m for result in whole), 2),
         round(fmean(result.course_rad**2 for result in whole) ** 0.5, 3),
         len(found) - len(whole),
+        pose,
     )

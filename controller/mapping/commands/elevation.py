@@ -23,15 +23,16 @@ if TYPE_CHECKING:
     from snakewalk.controller.mapping.elevation_file import FileMap
     from snakewalk.controller.terrain.elevation_map import CellHeight
 
-WorldOut = Annotated[Path, typer.Option("--out", "-o", help="the world's file (.toml)")]
+WorldOut = Annotated[Path, typer.Option("--out", "-o", help="write the world's file here (.toml)")]
 Spacing = Annotated[
-    float | None, typer.Option(help="m between samples in the robot's world", show_default=False)
+    float | None,
+    typer.Option(help="distance of samples in the robot's world in metres", show_default=False),
 ]
 Fill = Annotated[
-    float, typer.Option(help="m: holes narrower than this are filled and count as known")
+    float, typer.Option(help="fill holes narrower than this many metres, and treat them as known")
 ]
 Picture = Annotated[
-    Path | None, typer.Option(help="picture of the map: heights, holes, safe ground")
+    Path | None, typer.Option(help="draw the map with heights, holes and safe ground here")
 ]
 _LEAST, _MOST = 1e-6, 1e6
 """Of lengths, m, and of factors: what is beyond is in another unit (ours)."""
@@ -45,30 +46,30 @@ ElevationFile = Annotated[
     ),
 ]
 Scale = Annotated[float, typer.Option(help="metres in the robot's world per metre")]
-VerticalScale = Annotated[
-    float | None, typer.Option(help="the same of heights; default: as --scale")
-]
+VerticalScale = Annotated[float | None, typer.Option(help="scale of heights; default: as --scale")]
 CropText = Annotated[
     str | None, typer.Option(help="X0,Y0,X1,Y1: metres of the file from its south-west corner")
 ]
 Unit = Annotated[
     str | None,
-    typer.Option(help=f"of the file's lengths: {', '.join(_UNITS)}, deg; default: as it states"),
+    typer.Option(help=f"unit of the file: {', '.join(_UNITS)}, deg; default: as it states"),
 ]
 HeightUnit = Annotated[
     str | None,
-    typer.Option(help="of its heights; default: as it states, else as its lengths where metres"),
+    typer.Option(
+        help="unit of the file's heights; default: as it states, else as its lengths if metric"
+    ),
 ]
 Cell = Annotated[
-    float | None, typer.Option(help="between samples of a PNG, CSV or NPZ, in the unit")
+    float | None, typer.Option(help="distance between samples of a PNG, CSV or NPZ, in the unit")
 ]
 HeightStep = Annotated[
     float | None, typer.Option(help="height of one step of the file's values, in the unit")
 ]
-NoData = Annotated[float | None, typer.Option(help="value of cells that hold nothing")]
+NoData = Annotated[float | None, typer.Option(help="value of empty cells")]
 PointOf = Annotated[
     str | None,
-    typer.Option(help="which point of a cell counts: lowest, median, highest; default: median"),
+    typer.Option(help="point of a cell that counts: lowest, median, highest; default: median"),
 ]
 Up = Annotated[
     str | None,
@@ -109,7 +110,7 @@ def elevation(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a world for `plan` and `run` from a file of real ground; its holes stay known."""
+    """Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown."""
     faults = not_positive(
         {
             "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
@@ -148,7 +149,7 @@ def _head(
         f"{read.relief_m:.4g} m of relief, at a scale of {options.scale:g}, heights at "
         f"{options.rise:g};",
         f"samples {spacing_m:g} m apart.",
-        *([f"Of the file from its south-west corner: {crop} m."] if crop else []),
+        *([f"Part of the file, from its south-west corner: {crop} m."] if crop else []),
         *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         *(f"- {note}" for note in notes),
     ]

@@ -30,21 +30,36 @@ if TYPE_CHECKING:
 
 _UNITS_M: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048}
 Left = Annotated[Path, typer.Argument(help="picture of the left camera")]
-Right = Annotated[Path, typer.Argument(help="picture of the right camera, of the same moment")]
+Right = Annotated[Path, typer.Argument(help="picture of the right camera at the same moment")]
 Calibration = Annotated[
-    Path, typer.Option(help="of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a calib.txt")
+    Path,
+    typer.Option(
+        help="calibration of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a calib.txt"
+    ),
 ]
-Unit = Annotated[str, typer.Option(help="of the calibration's T: m, cm, mm")]
+Unit = Annotated[str, typer.Option(help="unit of the calibration's T: m, cm, mm")]
 Height = Annotated[
-    float | None, typer.Option(help="m of the left camera above the ground; default: fitted")
+    float | None,
+    typer.Option(help="height of the left camera above the ground in metres; default: fitted"),
 ]
-Tilt = Annotated[float | None, typer.Option(help="degrees of its axis, downwards; default: fitted")]
-Roll = Annotated[float, typer.Option(help="degrees about its axis, the right side down")]
-Disparities = Annotated[int, typer.Option(min=16, max=2048, help="px, the largest that is tried")]
-SampleSpacing = Annotated[float, typer.Option(help="m between samples in the robot's world")]
-Error = Annotated[float, typer.Option(help="m: points whose expected error is larger are left out")]
+Tilt = Annotated[
+    float | None, typer.Option(help="downward tilt of its axis in degrees; default: fitted")
+]
+Roll = Annotated[
+    float, typer.Option(help="rotation about its axis in degrees; positive: right side down")
+]
+Disparities = Annotated[
+    int, typer.Option(min=16, max=2048, help="largest disparity to try in pixels")
+]
+SampleSpacing = Annotated[
+    float, typer.Option(help="distance of samples in the robot's world in metres")
+]
+Error = Annotated[
+    float, typer.Option(help="leave out points with a larger expected error in metres")
+]
 Far = Annotated[
-    float | None, typer.Option(help="m ahead, at most; default: as far as --error allows")
+    float | None,
+    typer.Option(help="largest distance ahead in metres; default: as far as --error allows"),
 ]
 Scale = Annotated[float, typer.Option(help="metres in the robot's world per metre")]
 
@@ -75,9 +90,9 @@ def stereo(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a world of the ground in front of a stereo camera; what it did not see stays unknown.
+    """Make a world of the ground in front of a stereo camera; unseen ground stays unknown.
 
-    (0, 0) of the world is below the left camera, x is where it looks.
+    The origin of the world is below the left camera; the x axis points where the camera looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
     from snakewalk.controller.mapping import stereo_camera, stereo_ground  # noqa: PLC0415  an extra
@@ -88,7 +103,7 @@ def stereo(
     check_fill(fill, faults)
     faults += _stand_faults(height, tilt, roll)
     if unit not in _UNITS_M:
-        faults.append(f"--unit {unit}: is none of {', '.join(_UNITS_M)}")
+        faults.append(f"--unit {unit}: is unknown; use one of {', '.join(_UNITS_M)}")
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)

@@ -19,7 +19,7 @@ def judge(
     log: Annotated[Path, typer.Argument(help="log.mcap of the run")],
     as_json: Json = False,
 ) -> None:
-    """Compare a run with the truth of the served robot; 1 unless it truly arrived and says so."""
+    """Compare a run with the truth of the served robot; exit code 1 unless it truly arrived."""
     record = read_log(log)
     numbers = summary(record)
     found = judged(read_truth(truth), record, numbers.trip, numbers.outcome)

@@ -20,6 +20,8 @@ from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.rehearsal.rehearsal import RUNS, RehearsalCase, case_of, rehearse
 
+_METRICS = {"distance %": "distance_m", "cost %": "cost_of_transport", "eta %": "eta"}
+"""Columns of the largest errors of metrics."""
 _TRACKER = {"noise_m": 0.01, "noise_deg": 3.0, "delay_s": 0.1}
 """Noise and delay that the walk must tolerate."""
 
@@ -43,24 +45,30 @@ def rehearse_runs(
         bool,
         typer.Option(
             "--errors",
-            help="wrong friction and mass, a weak servo, horns off by 2 degrees, goals 40 ms late",
+            help="add wrong friction and mass, a weak servo, horns off by 2 degrees and goals 40 "
+            "ms late",
         ),
     ] = False,
     tracker: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY=VALUE",
-            help="of the simulated tracker; default: noise_m=0.01 noise_deg=3 delay_s=0.1",
+            help="errors of the simulated tracker; default: noise_m=0.01 noise_deg=3 delay_s=0.1",
         ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", dir_okay=False, help="results, JSON lines; continued if there"),
+        typer.Option(
+            "--out",
+            "-o",
+            dir_okay=False,
+            help="write the results here as JSON lines, or continue an existing file",
+        ),
     ] = Path("rehearsal.jsonl"),
     as_json: Json = False,
 ) -> None:
-    """Rehearse runs against served robots in simulated time; 1 if one did not truly arrive."""
+    """Rehearse runs against served robots in simulated time; exit code 1 if one did not arrive."""
     given = {**_TRACKER, **dict(key_values("--tracker", tracker))}
     config = checked(TrackerConfig, given, "--tracker")
     planned = [
@@ -101,18 +109,30 @@ def _results(path: Path) -> dict[tuple[str, int, bool, str], dict[str, Any]]:
             found[case_of(row).key] = row
         except (ValueError, KeyError, TypeError):
             raise InputError(
-                f"{path}: line {number} is no rehearsal; remove it, or choose another file"
+                f"{path}: line {number} is not a rehearsal; remove it, or choose another file"
             ) from None
     return found
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> Table:
     table = Table(box=None)
-    for head in ("run", "truly there", "false claims", "path m", "pose m", "pose deg", "why not"):
+    heads = ("run", "truly there", "false claims", "path m", "pose m", "pose deg", *_METRICS)
+    for head in (*heads, "false alarms", "why not"):
         table.add_column(head, justify="left" if head in {"run", "why not"} else "right")
     for run in dict.fromkeys(row["run"] for row in rows):
         table.add_row(*_cells(run, [row for row in rows if row["run"] == run]))
     return table
+
+
+def _worst_errors(metrics: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """Return the largest relative error of each metric, in percent, and the false alarms."""
+    cells = []
+    for key in _METRICS.values():
+        pairs = [(each[key], each[f"true_{key}"]) for each in metrics]
+        errors = [100.0 * (one / true - 1.0) for one, true in pairs if one and true]
+        cells.append(f"{max(errors, key=abs):+.1f}" if errors else "")
+    false = sum(max(each["alarms"] - each["true_alarms"], 0) for each in metrics)
+    return (*cells, str(false) if metrics else "")
 
 
 def _cells(run: str, rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
@@ -134,5 +154,6 @@ def _cells(run: str, rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
         mean("path_error_mean_m", 2),
         mean("pose_error_rms_m", 3),
         mean("heading_error_rms_deg", 1),
+        *_worst_errors([row["metrics"] for row in judged if row.get("metrics")]),
         "; ".join(why),
     )

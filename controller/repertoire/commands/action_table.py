@@ -11,7 +11,7 @@ from rich.table import Table
 from snakewalk.controller.console.options import console
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
-Picture = Annotated[Path | None, typer.Option(help="draw the actions' ways here")]
+Picture = Annotated[Path | None, typer.Option(help="draw the path of each action here")]
 
 
 def plots() -> ModuleType:

@@ -23,21 +23,30 @@ from snakewalk.controller.repertoire.repertoire import load_repertoire
     results=("out",),
 )
 def crowd(
-    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
+    file: Annotated[Path, typer.Argument(help="file of recorded actions")] = Path(
+        "repertoire-yaw16-flat.npz"
+    ),
     world: Annotated[
         str, typer.Option(help="shipped world with hills, or a TOML file")
     ] = "jacksboro-basin",
-    bodies: Annotated[int, typer.Option(min=1, max=5000, help="how many")] = 100,
-    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="of the film")] = 20.0,
-    out: Annotated[Path, typer.Option("-o", "--out", help="the film, .mp4")] = Path("crowd.mp4"),
+    bodies: Annotated[int, typer.Option(min=1, max=5000, help="number of animals")] = 100,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=600.0, help="duration of the film in seconds")
+    ] = 20.0,
+    out: Annotated[Path, typer.Option("-o", "--out", help="write the film here (.mp4)")] = Path(
+        "crowd.mp4"
+    ),
     detail: Annotated[
-        bool, typer.Option("--detail/--no-detail", help="level of detail and culling")
+        bool,
+        typer.Option(
+            "--detail/--no-detail", help="reduce detail with distance and skip hidden animals"
+        ),
     ] = True,
-    seed: Annotated[int, typer.Option(min=0, help="of places, sizes and whims")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of places, sizes and choices")] = 0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Film many animals that wander over a terrain by recorded actions, without physics."""
+    """Make a film of many animals that cross a terrain by recorded actions, without physics."""
     require_extra("films need", "av")
     if out.suffix != ".mp4":
         raise InputError(f"{out}: a film ends in .mp4")

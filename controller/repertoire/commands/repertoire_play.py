@@ -30,17 +30,26 @@ from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.finish import show_run
 
 Speed = Annotated[
-    float | None, typer.Option(help="wanted, m/s; negative: tail first; default: 0.4")
+    float | None, typer.Option(help="requested speed in m/s; negative: tail first; default: 0.4")
 ]
-Turn = Annotated[float | None, typer.Option(help="wanted, rad/s, positive to the left; default: 0")]
-Seconds = Annotated[float | None, typer.Option(help="then it comes to rest; default: 20")]
+Turn = Annotated[
+    float | None,
+    typer.Option(help="requested turn rate in rad/s, positive to the left; default: 0"),
+]
+Seconds = Annotated[
+    float | None, typer.Option(help="duration of the motion in seconds; default: 20")
+]
 Schedule = Annotated[
     Path | None,
-    typer.Option(help="both over time: TOML, or CSV with time_s,speed_m_s,turn_rad_s"),
+    typer.Option(
+        help="speed and turn rate over time: TOML, or CSV with time_s,speed_m_s,turn_rad_s"
+    ),
 ]
 Patience = Annotated[
     int | None,
-    typer.Option(min=1, help="cycles until an action gives way to another of its kind"),
+    typer.Option(
+        min=1, help="number of cycles after which an action is replaced by another of its kind"
+    ),
 ]
 
 
@@ -53,7 +62,9 @@ Patience = Annotated[
     results=("picture",),
 )
 def play_actions(
-    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
+    file: Annotated[Path, typer.Argument(help="file of recorded actions")] = Path(
+        "repertoire-yaw16-flat.npz"
+    ),
     speed: Speed = None,
     turn: Turn = None,
     seconds: Seconds = None,
@@ -63,13 +74,15 @@ def play_actions(
     world: World = None,
     set_: Set = None,
     picture: Annotated[
-        Path | None, typer.Option(help="draw wanted and measured speed and turn")
+        Path | None, typer.Option(help="draw requested and measured speed and turn rate")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="of the changes by --patience")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="seed of the changes that --patience causes")
+    ] = 0,
     *,
     options: RunOptions,
 ) -> None:
-    """Play recorded actions on servos or in the simulator, as wanted speed and turn ask for."""
+    """Play recorded actions on servos or in the simulator for a requested speed and turn rate."""
     check_picture(picture)
     prepared = prepare_schedule(
         file,

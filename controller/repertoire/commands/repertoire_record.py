@@ -38,13 +38,16 @@ def record(
         typer.Option(help="shipped flat world, or a TOML file", autocompletion=completion.WORLDS),
     ] = "flat",
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="default: repertoire-ROBOT-WORLD.npz")
+        Path | None,
+        typer.Option(
+            "-o", "--out", help="write the actions here; default: repertoire-ROBOT-WORLD.npz"
+        ),
     ] = None,
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run forward, left and right actions on the physics and keep a settled cycle of each."""
+    """Simulate forward, left and right actions, and record a settled cycle of each."""
     check_picture(picture)
     body, ground = load_robot(robot), load_world(world)
     flat(ground)

@@ -23,11 +23,15 @@ from snakewalk.controller.run.finish import write_artifacts
     results=("picture",),
 )
 def run_plan(
-    plan: Annotated[Path, typer.Argument(help="made by: snakewalk plan --with repertoire -o")],
+    plan: Annotated[
+        Path, typer.Argument(help="file written by: snakewalk plan --with repertoire -o")
+    ],
     open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="as planned, without looking where the body is")
+        bool, typer.Option("--open-loop", help="play the plan without measuring where the body is")
     ] = False,
-    picture: Annotated[Path | None, typer.Option(help="draw predicted and measured way")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="draw the predicted and the measured path")
+    ] = None,
     *,
     options: RunOptions,
 ) -> None:

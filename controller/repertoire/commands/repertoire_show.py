@@ -20,7 +20,9 @@ from snakewalk.controller.repertoire.repertoire import load_repertoire
     "repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",), results=("picture",)
 )
 def show_file(
-    file: Annotated[Path, typer.Argument(help="a repertoire")] = Path("repertoire-yaw16-flat.npz"),
+    file: Annotated[Path, typer.Argument(help="file of recorded actions")] = Path(
+        "repertoire-yaw16-flat.npz"
+    ),
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,

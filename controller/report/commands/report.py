@@ -18,13 +18,16 @@ from snakewalk.controller.runlog.reader import read_log
 def report(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="folder; default: the log's")
+        Path | None,
+        typer.Option(file_okay=False, help="folder of the report; default: the log's folder"),
     ] = None,
     film: Annotated[bool, typer.Option("--film/--no-film", help="draw the film again")] = True,
-    fine: Annotated[bool, typer.Option("--fine", help="film in 1280 x 720; slow")] = False,
+    fine: Annotated[
+        bool, typer.Option("--fine", help="draw the film in 1280 x 720, which is slow")
+    ] = False,
     look: Look = "servos",
     folders: Annotated[
-        bool, typer.Option("--folders", help="leave the folders of your files in report.html")
+        bool, typer.Option("--folders", help="keep the folder names of your files in report.html")
     ] = False,
     force: Force = False,
     as_json: Json = False,

@@ -53,5 +53,8 @@ def advance_figure(record: RunRecord) -> Figure | None:
         error.set_title("Centre of mass from the path")
     panels[-1].set_xlabel("time (s)")
     panels[-1].set_xlim(0.0, max(record.end_s, 1e-3))
-    mark_waypoints(panels, waypoint_times_s(pose, record.header.plan))
+    header = record.header
+    mark_waypoints(
+        panels, waypoint_times_s(pose, header.plan), measured=header.pose_evidence.is_measured
+    )
     return figure

@@ -13,6 +13,7 @@ from snakewalk.controller.report.figures.attitude import attitude_figure
 from snakewalk.controller.report.figures.effort import effort_figure
 from snakewalk.controller.report.figures.joints import joints_figure
 from snakewalk.controller.report.figures.safety import safety_figure
+from snakewalk.controller.report.figures.slope import slope_figure
 from snakewalk.controller.report.figures.timing import timing_figure
 from snakewalk.controller.report.figures.walk import walk_figure
 from snakewalk.controller.report.page import Section
@@ -35,8 +36,9 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
     ),
     (
         "Joint angles",
-        "The shape travels from the head (top) to the tail (bottom). What remains between asked "
-        "and measured is servo lag, a clamp, or ground that does not give way.",
+        "The shape travels from the head (top) to the tail (bottom). The remaining difference "
+        "between goal and measured angle is servo lag, a clamp, or ground that does not give "
+        "way.",
         joints_figure,
     ),
     (
@@ -49,6 +51,12 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
         "The walk",
         "Each decision appends a part of the next state to the angles along the way.",
         walk_figure,
+    ),
+    (
+        "Slope under the body",
+        "Mean over the links, from the heights of the plan. On steep ground the walk rides on wide "
+        "waves, which slip less.",
+        slope_figure,
     ),
     (
         "Effort",

@@ -39,6 +39,13 @@ def walk_figure(record: RunRecord) -> Figure | None:
             states.scatter(
                 number[chosen], walk.state[chosen], s=size, color=colour, label=label, zorder=2
             )
+        is_wide = walk.carrier_rad > 0.0
+        label = f"on wide waves, {is_wide.mean():.0%}"
+        if is_wide.any():
+            states.fill_between(
+                number, 0.0, 1.0, where=is_wide, step="mid", color=GREY, alpha=0.25, linewidth=0.0,
+                transform=states.get_xaxis_transform(), label=label,
+            )  # fmt: skip
         states.set_ylabel("state")
         states.set_title("States of the walk")
         legend_above(states)

@@ -39,24 +39,27 @@ _WEEK_S = 604_800.0
 Domain = Annotated[
     int | None,
     typer.Option(
-        min=0, max=232, help="default: ROS_DOMAIN_ID of the environment", show_default=False
+        min=0,
+        max=232,
+        help="ROS domain; default: ROS_DOMAIN_ID of the environment",
+        show_default=False,
     ),
 ]
 Network = Annotated[
     bool,
     typer.Option(
         "--network",
-        help="seen by other machines; default: as ROS_AUTOMATIC_DISCOVERY_RANGE says, else by "
-        "this one only",
+        help="let other machines see the node; default: as ROS_AUTOMATIC_DISCOVERY_RANGE "
+        "says, else this machine only",
     ),
 ]
 Timeout = Annotated[
     float,
-    typer.Option(help="s: joints on their way hold when no joint goals come; inf: they go on"),
+    typer.Option(help="stop moving joints after this many seconds without joint goals; inf: never"),
 ]
 FirstGait = Annotated[
     str | None,
-    typer.Option(help="gait to begin with; default: hold", autocompletion=completion.GAITS),
+    typer.Option(help="first gait; default: hold", autocompletion=completion.GAITS),
 ]
 
 
@@ -76,11 +79,11 @@ def ros(
     gait: FirstGait = None,
     param: Param = None,
     domain: Domain = None,
-    namespace: Annotated[str, typer.Option(help="of all topics and services")] = "",
+    namespace: Annotated[str, typer.Option(help="namespace of all topics and services")] = "",
     network: Network = False,
     timeout: Timeout = 1.0,
     seconds: Annotated[
-        float, typer.Option(help="then torque goes off", show_default="a week")
+        float, typer.Option(help="switch torque off after this many seconds", show_default="a week")
     ] = _WEEK_S,
     set_: Set = None,
     view: View = False,
@@ -89,7 +92,7 @@ def ros(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Hold a robot, and let a ROS 2 graph command, watch and stop it; servos or the simulator."""
+    """Connect a robot or the simulator to ROS 2, which can command, watch and stop it."""
     if not timeout > 0.0:
         raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
     if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):

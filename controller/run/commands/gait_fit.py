@@ -29,19 +29,20 @@ COLUMNS = ("x_m", "y_m", "z_m")
 )
 def fit_gait(
     curve: Annotated[
-        Path, typer.Argument(help="table with the columns x_m, y_m, z_m: a curve, head first")
+        Path, typer.Argument(help="curve, head first: a table with the columns x_m, y_m, z_m")
     ],
     robot: Robot = None,
     picture: Annotated[
         Path | None, typer.Option(help="draw curve and chain here (.png, .svg, .pdf)")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="joint angles and places (.npz)")
+        Path | None,
+        typer.Option("--output", "-o", help="write joint angles and positions here (.npz)"),
     ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Lay the robot on a curve in space: joint angles, and how far the joints are from it."""
+    """Fit the robot to a curve in space: joint angles, and distance of the joints from it."""
     check_picture(picture)
     if output is not None and output.suffix.lower() != ".npz":
         raise InputError(f"{output}: joint angles go to a file that ends in .npz")
@@ -88,7 +89,7 @@ def _read(path: Path) -> list[list[float]]:
     """Points (N, 3) of a table; other columns are left alone.
 
     Raises:
-        InputError: no such file, a column is missing, or a value is no number.
+        InputError: no such file, a column is missing, or a value is not a number.
 
     """
     if not path.is_file():

@@ -13,7 +13,7 @@ from snakewalk.controller.run.commands.gait_options import needed_joints
 
 @command("gait list", examples=("gait list --json",))
 def list_gaits(as_json: Json = False) -> None:
-    """List the gaits, what joints they need, and the shipped sets of their parameters."""
+    """List the gaits, the joints that they need, and the shipped sets of their parameters."""
     sets = [load_gait(name) for name in shipped("gaits")]
     if as_json:
         rows = [

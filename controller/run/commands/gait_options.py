@@ -17,7 +17,8 @@ Name = Annotated[
     ),
 ]
 Param = Annotated[
-    list[str] | None, typer.Option("--param", "-p", help="NAME=VALUE; may be given again")
+    list[str] | None,
+    typer.Option("--param", "-p", help="NAME=VALUE: a parameter of the gait; may be repeated"),
 ]
 
 

@@ -20,23 +20,25 @@ from snakewalk.controller.run.gait_job import GaitJob
 
 Then = Annotated[
     list[str] | None,
-    typer.Option(help="NAME@S[,PARAM=V]: change gait after S seconds; may be given again"),
+    typer.Option(help="NAME@S[,PARAM=V]: change gait after S seconds; may be repeated"),
 ]
 By = Annotated[
     str,
     typer.Option(
-        help="how gaits change: blend, or cpg: oscillators",
+        help="method of changing gaits: blend, or cpg (oscillators)",
         autocompletion=completion.words("blend", "cpg"),
     ),
 ]
-LookHeading = Annotated[float | None, typer.Option(help="world heading that the head keeps")]
+LookHeading = Annotated[
+    float | None, typer.Option(help="world heading that the head keeps, in rad")
+]
 LookAt = Annotated[str | None, typer.Option(help="X,Y in metres: point that the head looks at")]
 Live = Annotated[
     bool,
-    typer.Option("--live", help="change it as it runs: by keys, with --view in the page"),
+    typer.Option("--live", help="change the motion by keys, or in the page with --view"),
 ]
 OnGamepad = Annotated[
-    Path | None, typer.Option(help="the same from a gamepad, e.g. /dev/input/js0")
+    Path | None, typer.Option(help="change the motion with a gamepad, e.g. /dev/input/js0")
 ]
 
 
@@ -56,14 +58,14 @@ def run_gait(
     set_: Set = None,
     then: Then = None,
     by: By = "blend",
-    seconds: Annotated[float, typer.Option(help="then it comes to rest")] = 20.0,
+    seconds: Annotated[float, typer.Option(help="duration of the motion in seconds")] = 20.0,
     look_heading_rad: LookHeading = None,
     look_at: LookAt = None,
     live: Live = False,
     gamepad: OnGamepad = None,
     compliance: Compliant = None,
     shadow: Shadow = False,
-    seed: Annotated[int, typer.Option(help="of every random choice")] = 0,
+    seed: Annotated[int, typer.Option(help="seed of every random choice")] = 0,
     *,
     options: RunOptions,
 ) -> None:

@@ -31,7 +31,7 @@ def show_gait(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Show a gait's parameters with ranges and units, its source, and how fast joints must be."""
+    """Show a gait's parameters with ranges and units, its source, and the joint speeds it needs."""
     check_picture(picture)
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
     gait, body = prepared.gait, prepared.robot

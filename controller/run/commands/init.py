@@ -37,21 +37,24 @@ A line behind # shows a key with its default. Another ground: replace the table 
 )
 def init(
     folder: Annotated[
-        Path, typer.Argument(file_okay=False, help="it is made if it is not there")
+        Path,
+        typer.Argument(
+            file_okay=False, help="folder of the files; it is created if it does not exist"
+        ),
     ] = Path(),
     robot: Robot = None,
     from_: Annotated[
         str | None,
         typer.Option(
             "--from",
-            help="run to begin with, shipped or a TOML file",
+            help="run to copy, shipped or a TOML file",
             autocompletion=completion.RUNS,
         ),
     ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write run.toml, robot.toml and world.toml to change, with their schemas for editors."""
+    """Write run.toml, robot.toml and world.toml for editing, with schemas for editors."""
     if from_ is None:
         known = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
         fitting = (name for name, body in known.items() if body == (robot or "yaw16"))
@@ -65,7 +68,9 @@ def init(
             f"{robot or run.robot}"
         )
     if run.motion in {"gait", "playback", "source", "repertoire"}:
-        raise InputError(f"run {run.name}: a {run.motion} is no walk; --from takes a walk's run")
+        raise InputError(
+            f"run {run.name}: a {run.motion} is not a walk; choose the run of a walk for --from"
+        )
     track = Path(run.track) if beside is None else beside / run.track
     texts = {
         "run.toml": template(

@@ -1,4 +1,4 @@
-"""``snakewalk list``: what is shipped and installed."""
+"""``snakewalk list``: shipped and installed items."""
 
 import json
 
@@ -12,7 +12,7 @@ from snakewalk.controller.console.plugins import OWN, plugins
 
 @command("list", group=JOB, examples=("list --json",))
 def list_(as_json: Json = False) -> None:
-    """List what is shipped and installed: runs, robots, worlds, recordings, policies, plug-ins."""
+    """List shipped and installed items: runs, robots, worlds, recordings, policies, plug-ins."""
     rows = {
         "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
         "robots": [

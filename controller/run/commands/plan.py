@@ -48,30 +48,38 @@ def plan(
     motion: Motion = None,
     set_: Set = None,
     with_: Annotated[
-        str | None, typer.Option("--with", help="repertoire: search over recorded actions")
+        str | None,
+        typer.Option("--with", help="planner to use; repertoire: search over recorded actions"),
     ] = None,
     repertoire: Annotated[
         Path | None, typer.Option(help="file of actions; default: repertoire-ROBOT-WORLD.npz")
     ] = None,
     beam: Annotated[
         int | None,
-        typer.Option(min=1, max=100_000, help="sequences kept a round; default: 400"),
+        typer.Option(
+            min=1, max=100_000, help="number of sequences to keep per round; default: 400"
+        ),
     ] = None,
     physics: Annotated[
-        int, typer.Option(min=0, help="candidates to run on the physics, for the ratio")
+        int,
+        typer.Option(
+            min=0, help="number of candidates to simulate, to compare the computing times"
+        ),
     ] = 0,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="write the sequence, as JSON")
+        Path | None, typer.Option("-o", "--out", help="write the sequence here as JSON")
     ] = None,
-    carry: Annotated[bool, typer.Option("--run", help="run it in the simulator")] = False,
+    carry: Annotated[bool, typer.Option("--run", help="run the sequence in the simulator")] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Judge a run on paper: library, path and joint limits, with no servo and no simulator."""
+    """Check a run without servos or simulator: library of states, path and joint limits."""
     if with_ is not None:
         planner = require("planner", with_, "--with")
         if motion is not None or track is not None or seed is not None or set_:
-            raise InputError("--with repertoire: takes no --motion, --track, --seed or --set")
+            raise InputError(
+                "--with repertoire: does not use --motion, --track, --seed or --set; leave them out"
+            )
         planner.load()(
             run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
             out=out, carry=carry, force=force, as_json=as_json,

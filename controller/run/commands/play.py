@@ -23,29 +23,54 @@ from snakewalk.controller.run.finish import show_run
 @command(
     "play",
     group=MOTION,
-    examples=("play worm-like", "play fish.npz --robot yaw16 --speed 0.5 --json"),
+    examples=(
+        "play worm-like",
+        "play fish.npz --robot yaw16 --speed 0.5 --json",
+        "play angles.csv --unit deg --joint yaw1=motor_1",
+    ),
 )
 def play(
     track: Annotated[
         str,
-        typer.Argument(help="shipped recording, or a file", autocompletion=completion.RECORDINGS),
+        typer.Argument(
+            help="shipped recording, file, ROS 2 bag, or dataset",
+            autocompletion=completion.RECORDINGS,
+        ),
     ],
     robot: Robot = None,
     world: World = None,
     speed: Annotated[
-        str, typer.Option(help="times the animal's own; auto: as fast as the joints can, at most 1")
+        str,
+        typer.Option(
+            help="factor on the animal's speed; auto: as fast as the joints can, at most 1"
+        ),
     ] = "auto",
     scale: Annotated[
-        float, typer.Option(help="times the joint angles: below 1 the whole motion is smaller")
+        float, typer.Option(help="factor on the joint angles; below 1 the motion is smaller")
     ] = 1.0,
     clip: Annotated[
-        bool, typer.Option("--clip", help="hold joints within their limits where it bends further")
+        bool,
+        typer.Option(
+            "--clip", help="hold joints at their limits where the recording bends further"
+        ),
     ] = False,
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROBOT=FILE",
+            help="joint of the file for a joint of the robot; rest as FILE keeps it at 0",
+        ),
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="of joint angles whose file does not state it: rad or deg")
+    ] = None,
+    topic: Annotated[str | None, typer.Option(help="of a bag with several joint topics")] = None,
+    episode: Annotated[int | None, typer.Option(help="of a LeRobot dataset, from 0")] = None,
     set_: Set = None,
     *,
     options: RunOptions,
 ) -> None:
-    """Play a recording on servos or in the simulator; leaves a log, a report and a film."""
+    """Play a recording or joint angles on servos or in the simulator; leaves a log and a film."""
     prepared = prepare_playback(
         track,
         robot=robot,
@@ -54,6 +79,10 @@ def play(
         scale=scale,
         clip=clip,
         keys=key_values("--set", set_),
+        joints={name: str(value) for name, value in key_values("--joint", joint).items()},
+        unit=_unit(unit),
+        topic=topic,
+        episode=episode,
     )
     bar = TimeBar(prepared.run.name, prepared.duration_s)
     with watched_by(options) as watchers:
@@ -65,11 +94,18 @@ def play(
         "speed": round(prepared.speed, 4),
         "scale": scale,
         "clipped": prepared.clipped,
+        "notes": list(prepared.notes),
         "duration_s": round(finished.outcome.duration_s, 2),
         "tripped": finished.outcome.tripped,
         "peak_current_a": finished.summary.peak_current_a,
     }
     show_run(finished, folder, result, options.as_json, film=options.film)
+
+
+def _unit(text: str | None) -> str | None:
+    if text not in (None, "rad", "deg"):
+        raise InputError(f"--unit {text}: expected rad or deg")
+    return text
 
 
 def _speed(text: str) -> float | None:

@@ -1,7 +1,9 @@
 """``snakewalk pose check``: the poses of a source, before torque."""
 
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Final
 
 import typer
@@ -11,13 +13,18 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.pose import PoseConfig
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Json, Robot, console, show
+from snakewalk.controller.console.options import VIEW_AT, Json, Robot, View, ViewAt, console, show
+from snakewalk.controller.console.result_files import LOG
 from snakewalk.controller.pose.feed_statistics import FeedStatistics
 from snakewalk.controller.pose.first_pose import start_fault
 from snakewalk.controller.pose.sample import PoseFeed, PoseSample
 from snakewalk.controller.run.external.external_source import ExternalSource, ground_height
+from snakewalk.controller.run.external.pose_check_page import PoseCheckPage
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.pose_provider import pose_plugin
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.watchers import PAGE, open_observer
+from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.clock import Clock, WallClock
 
 LOOK_S: Final = 0.02
@@ -27,10 +34,10 @@ Judge = Callable[[PoseSample], str | None]
 
 @command(
     "pose check",
-    examples=("pose check udp:9870", "pose check udp:9870 --run jacksboro-traverse --seconds 5"),
+    examples=("pose check udp:9870", "pose check udp:9870 --run jacksboro-traverse --view"),
 )
 def check(
-    source: Annotated[str, typer.Argument(help="external pose source, as of `run --pose`")],
+    source: Annotated[str, typer.Argument(help="external pose source, as for `run --pose`")],
     robot: Robot = None,
     run: Annotated[
         str | None,
@@ -39,20 +46,30 @@ def check(
             autocompletion=completion.RUNS,
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="then it ends")] = 10.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, max=3600.0, help="duration of the check in seconds")
+    ] = 10.0,
+    view: View = False,
+    view_at: ViewAt = VIEW_AT,
     as_json: Json = False,
 ) -> None:
-    """Show position, axes, rate, delay and noise of an external pose; 1 if something is wrong."""
+    """Show position, axes, rate, delay and noise of an external pose; exit code 1 on a fault."""
     plugin, argument = pose_plugin(source)
     if not isinstance(plugin, ExternalSource):
         raise InputError(f"pose check {source}: its poses do not come from another program")
-    config, judge = _expected(robot, run)
+    if view and run is None:
+        raise InputError("--view: the page needs a robot and its ground; add --run NAME")
+    prepared = None if run is None else prepare_job(run, robot=robot)
+    config, judge = _expected(robot, prepared)
     clock = WallClock()
-    with closing(plugin.open_feed(argument, clock)) as feed:
-        found = watch(feed, clock, seconds, config, (lambda line: None) if as_json else _print)
-    newest = found.newest
-    fault = None if newest is None else judge(newest)
-    faults = [*found.faults(), *([] if fault is None else [fault])]
+    with ExitStack() as stack:
+        page = None
+        if view and prepared is not None:
+            page = stack.enter_context(_page(prepared, config, source, view_at))
+        feed = stack.enter_context(closing(plugin.open_feed(argument, clock)))
+        on_line = (lambda line: None) if as_json else _print
+        found = watch(feed, clock, seconds, config, on_line, page=page, judge=judge)
+    faults = _faults(found, judge)
     mount = {"link": config.link, "offset_m": list(config.offset_m)}
     show({**found.facts(), "mount": mount, "faults": faults}, as_json)
     if faults:
@@ -65,18 +82,41 @@ def watch(
     seconds: float,
     config: PoseConfig,
     on_line: Callable[[str], None],
+    page: PoseCheckPage | None = None,
+    judge: Judge = lambda sample: None,
 ) -> FeedStatistics:
-    """Receive poses for some seconds; ``on_line`` accepts a line in each second."""
+    """Receive poses for some seconds; ``on_line`` and ``page`` report in each second."""
     found, start_s = FeedStatistics(config), clock.now_s()
     due_s = start_s + LINE_S
     while clock.now_s() < start_s + seconds:
         clock.sleep_until_s(clock.now_s() + LOOK_S)
         for arrived in feed.arrived(clock.now_s()):
             found.add(arrived)
+        if page is not None and found.newest is not None:
+            page.show(clock.now_s() - start_s, found.newest)
         if clock.now_s() >= due_s:
             due_s += LINE_S
             on_line(_line(found))
+            if page is not None:
+                page.report(clock.now_s() - start_s, found.facts(), _faults(found, judge))
     return found
+
+
+def _faults(found: FeedStatistics, judge: Judge) -> list[str]:
+    fault = None if found.newest is None else judge(found.newest)
+    return [*found.faults(), *([] if fault is None else [fault])]
+
+
+@contextmanager
+def _page(
+    prepared: PreparedRun, config: PoseConfig, source: str, view_at: str
+) -> Iterator[PoseCheckPage]:
+    with (
+        TemporaryDirectory() as folder,
+        open_observer(PAGE, view_at) as page,
+        PoseCheckPage(RunLog(Path(folder) / LOG, page.on_row), prepared, config, source) as shown,
+    ):
+        yield shown
 
 
 def _line(found: FeedStatistics) -> str:
@@ -94,13 +134,12 @@ def _print(line: str) -> None:
     console.print(line)
 
 
-def _expected(robot: str | None, run: str | None) -> tuple[PoseConfig, Judge]:
+def _expected(robot: str | None, prepared: PreparedRun | None) -> tuple[PoseConfig, Judge]:
     """Return the tracked body, and a judge of a pose at the start of a run."""
-    if run is None:
+    if prepared is None:
         body = None if robot is None else load_robot(robot)
         config = PoseConfig() if body is None or body.pose is None else body.pose
         return config, lambda sample: None
-    prepared = prepare_job(run, robot=robot)
     config = prepared.robot.pose or PoseConfig()
     height_m = ground_height(prepared.ground)
     return config, lambda sample: start_fault(

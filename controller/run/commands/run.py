@@ -40,7 +40,7 @@ def run(
         str | None,
         typer.Option(
             help="pose source of the head: simulator, camera, imu, joints, udp:PORT, ros:/TOPIC, "
-            "or that of a plug-in",
+            "or a plug-in's",
             autocompletion=completion.words("simulator", "camera", "imu", "joints", "udp:", "ros:"),
         ),
     ] = None,
@@ -48,8 +48,8 @@ def run(
         str | None,
         typer.Option(
             "--map",
-            help="what the walk knows of hilly ground: world (all of it), or stereo: what the "
-            "robot's stereo head has seen so far",
+            help="map of hilly ground: world (the true ground), or stereo (the part that the "
+            "robot's stereo head has seen)",
             autocompletion=completion.words("world", "stereo"),
         ),
     ] = None,
@@ -60,8 +60,8 @@ def run(
         bool,
         typer.Option(
             "--live",
-            help="waypoints are set in the page as it walks (--view); at the last one it holds, "
-            "and waits for more",
+            help="set waypoints in the page (--view) or by ROS (--ros) during the walk; at the "
+            "last one the robot waits",
         ),
     ] = False,
     observe: Observe = None,
@@ -70,8 +70,7 @@ def run(
         bool,
         typer.Option(
             "--accept-dead-reckoning",
-            help="exit code 0 instead of 3 where the arrival was dead-reckoned, not measured",
-            rich_help_panel="Evidence",
+            help="exit with 0 instead of 3 if the arrival was dead-reckoned, not measured",
         ),
     ] = False,
     *,

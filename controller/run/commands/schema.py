@@ -22,7 +22,7 @@ KINDS: Final = (
     *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal", "schedule"),
     *("faults", "servo", "policy"),
 )
-"""Of ``models``, known before they are built."""
+"""Names of ``models``, known before they are built."""
 
 
 @command("schema", group=JOB, examples=("schema run", "schema robot -o robot.json"))
@@ -30,16 +30,16 @@ def schema(
     kind: Annotated[
         str,
         typer.Argument(
-            help=f"{', '.join(KINDS[:-1])} or {KINDS[-1]}",
+            help=f"kind of file: {', '.join(KINDS[:-1])} or {KINDS[-1]}",
             autocompletion=completion.words(*KINDS),
         ),
     ],
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="write it here")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="write the schema here")] = None,
     force: Force = False,
 ) -> None:
-    """Print the JSON Schema of a TOML file, with which editors complete and check it."""
+    """Print the JSON Schema of a TOML file; editors use it to complete and check the file."""
     if kind not in KINDS:
-        raise InputError(f"{kind}: no such file; there are {', '.join(KINDS)}")
+        raise InputError(f"{kind}: is not a kind of file; use one of {', '.join(KINDS)}")
     refuse_to_overwrite([out], force)
     text = json.dumps(json_schema(kind, models()[kind]), indent=2)
     if out is None:

@@ -66,7 +66,7 @@ class ExternalSource(ABC):
         faults = []
         if not on_port:
             faults.append(
-                f"pose: {self.name}: measures a robot on a port; add --port, or take pose simulator"
+                f"pose: {self.name}: measures a robot on a port; add --port, or use pose simulator"
             )
         try:
             self.check_argument((run.pose or "").partition(":")[2])

@@ -61,8 +61,9 @@ def second_body(
     """Let a bare snake that walks ground that is known use a second body, where there is one.
 
     Returns:
-        What finds the friction under a walk: on a level floor on paper, elsewhere on that body.
-        None where the pose tells nothing of it: by the joints or an IMU it takes friction as known.
+        The estimator of the friction under a walk: on a level floor on paper, elsewhere on that
+            body.
+        None if the pose does not depend on it: the joints or an IMU assume the friction.
 
     """
     run, world, robot = prepared.run, prepared.world, prepared.robot

@@ -124,7 +124,7 @@ class ServedRobot:
         self.body.reset(place.start_m, heading_rad, shaft_rad)
         tracked = TrackedBody(robot, robot.pose or PoseConfig())
         self.tracker = SimulatedTracker(serving.tracker, tracked, serving.seed)
-        """What measures the body and makes datagrams."""
+        """Measures the body and makes datagrams."""
         plant = WatchedPlant(
             self.body, 1.0 / serving.tracker.rate_hz, self._measure, serving.goal_delay_s
         )

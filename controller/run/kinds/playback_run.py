@@ -10,6 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.playback import PlaybackConfig
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.run.kinds.joint_file import foreign_joints
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
@@ -46,8 +47,21 @@ class PlaybackRun(PathlessRun):
     @cached_property
     def _as_recorded(self) -> tuple[Floats, Floats]:
         """The same before joints are clipped."""
-        time_s, joints = recorded_joints(self.run.track, self.robot)
+        if self._foreign is not None:
+            time_s, joints, _ = self._foreign
+        else:
+            time_s, joints = recorded_joints(self.run.track, self.robot)
         return time_s, self._asked.scale * joints
+
+    @cached_property
+    def _foreign(self) -> tuple[Floats, Floats, tuple[str, ...]] | None:
+        """Joint angles of another program's file; None where the recording has midlines."""
+        return foreign_joints(self.run.track, self.robot, self._asked)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Lines about the mapping of joints, and parts that the reader left out or changed."""
+        return () if self._foreign is None else self._foreign[2]
 
     @property
     def _asked(self) -> PlaybackConfig:
@@ -68,7 +82,7 @@ class PlaybackRun(PathlessRun):
 
     @property
     def clipped(self) -> str | None:
-        """What clipping took away, in words; None where it took nothing away."""
+        """Result of clipping, in words; None if nothing was clipped."""
         past = np.abs(self._as_recorded[1]) - np.array(self.robot.limit_rad)
         if not (past > 0.0).any():
             return None
@@ -100,6 +114,8 @@ class PlaybackRun(PathlessRun):
         told = self.clipped
         if told is not None:
             on_event("limit", told)
+        for line in self.notes:
+            on_event("recording", line)
         if self.speed < 1.0:
             on_event("limit", f"played at {self.speed:.2f} times the animal's speed")
         return self._recorded(self.speed)

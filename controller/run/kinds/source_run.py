@@ -31,14 +31,15 @@ class SourceRun(PathlessRun):
 
     def initial_pose(self) -> InitialPose:
         """Return the shape that the source begins with."""
-        return pose_with(self.robot, self.start_heading_rad, self.make(self.robot).goal_rad())
+        goal_rad = _array(self.make(self.robot).goal_rad(), "goal_rad()")
+        return pose_with(self.robot, self.start_heading_rad, goal_rad)
 
     def check_plan(self) -> PlanSummary:
         """Check range, speed and acceleration of every joint over the whole run.
 
-        The source is stepped at the run's rate with the head at rest and the joints on their
-        goals: one that reacts to the measured body may move otherwise in the run, where the
-        safety link still vets every command.
+        The source is stepped at the run's rate with the head at rest and the joints on their goals.
+        A source that reacts to the measured body may move otherwise in the run, where the safety
+        link still vets every command.
 
         Raises:
             InputError: one line for each fault.
@@ -49,18 +50,22 @@ class SourceRun(PathlessRun):
             raise InputError("the motion source: make a fresh one at each call, not always one")
         source.needs.check(robot, "the motion source")
         period_s = 1.0 / self.run.cycle_hz
-        first_rad = self._goal_rad(source.goal_rad(), 0.0)
+        first_rad = self._goal_rad(source.goal_rad(), 0.0, "goal_rad()")
         heading_rad = pose_with(robot, self.start_heading_rad, first_rad).heading_rad
         frame = Frame.flat(*self.run.start_m, heading_rad, robot.body_radius_m)
         head = BodyPose(0.0, frame.origin_m, frame.rotation)
         begun_rad = path_progress(source).begin(body_in_world(robot, head, first_rad))
-        goals = [first_rad, self._goal_rad(begun_rad, 0.0)]
+        goals = [first_rad, self._goal_rad(begun_rad, 0.0, "begin()")]
+        _array(source.velocity_rad_s(), "velocity_rad_s()")
         pace = source.pace()
+        _array(pace.speed_rad_s, "the speed of pace()")
+        _array(pace.acceleration_rad_s2, "the acceleration of pace()")
         for k in range(round(self.run.time_limit_s * self.run.cycle_hz)):
             if source.done:
                 break
             view = body_in_world(robot, head, goals[-1])
-            goals.append(self._goal_rad(source.step(period_s, view), (k + 1) * period_s))
+            goal_rad = source.step(period_s, view)
+            goals.append(self._goal_rad(goal_rad, (k + 1) * period_s, "step()"))
         speed = np.diff(goals[1:], axis=0, prepend=goals[1:2]) / period_s
         acceleration = np.diff(speed, axis=0) / period_s
         limit = Pace.limit(robot)
@@ -87,12 +92,29 @@ class SourceRun(PathlessRun):
         """Return a fresh motion."""
         return self.make(self.robot)
 
-    def _goal_rad(self, goal_rad: Floats, time_s: float) -> Floats:
+    def _goal_rad(self, goal_rad: Floats, time_s: float, call: str) -> Floats:
         """(J,) a copy of goals, if they are J finite numbers."""
-        goal_rad = np.array(goal_rad, dtype=float)
+        goal_rad = _array(goal_rad, call).copy()
         if goal_rad.shape != (self.robot.joint_count,) or not np.isfinite(goal_rad).all():
             raise InputError(
-                f"the motion source: at {time_s:.2f} s its goals are {goal_rad}; "
-                f"robot {self.robot.name} takes {self.robot.joint_count} finite angles"
+                f"the motion source: at {time_s:.2f} s its goals are {goal_rad}; robot "
+                f"{self.robot.name} needs {self.robot.joint_count} finite angles"
             )
         return goal_rad
+
+
+def _array(values: Floats, call: str) -> Floats:
+    """Return values that a compiled loop accepts.
+
+    Raises:
+        InputError: they are a list, or an array of another type.
+
+    """
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return values
+    is_array = isinstance(values, np.ndarray)
+    kind = f"an array of {values.dtype}" if is_array else f"a {type(values).__name__}"
+    raise InputError(
+        f"the motion source: {call} returns {kind}; return an array of float64: "
+        "np.array(values, dtype=float)"
+    )

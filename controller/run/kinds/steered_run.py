@@ -32,7 +32,7 @@ class SteeredRun(PathRun, GaitRun):
         """Check that the gait can be steered, and within the joints' ranges; lay the path.
 
         Raises:
-            InputError: it cannot, or the run asks for what belongs to a gait without waypoints.
+            InputError: it cannot, or the run has keys of a gait without waypoints.
 
         """
         if self.ground is not None and not self.robot.limbs:
@@ -43,8 +43,8 @@ class SteeredRun(PathRun, GaitRun):
         config = self.config
         if config.then or config.look_heading_rad is not None or config.look_at_m is not None:
             raise InputError(
-                f"run {self.run.name}: a gait along waypoints takes no then, look_heading_rad or "
-                "look_at_m in its table [gait]"
+                f"run {self.run.name}: a gait along waypoints cannot have then, "
+                "look_heading_rad or look_at_m; remove them from [gait]"
             )
         try:
             for gait in filter(None, (self.gait, self.ashore)):

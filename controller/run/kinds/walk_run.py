@@ -41,8 +41,8 @@ from snakewalk.controller.walk.walker import Walker
 
 POINTS = 100
 _BRIDGED_LINKS = 4.0
-"""Radius of the ball that bridges the ground, over a link's length (ours): steps of 4 cm are passed
-in 41 s with 4, in 49 s with 1, by one of eight bodies not with 0."""
+"""Radius of the ball that bridges the ground, over a link's length (ours). Steps of 4 cm are passed
+in 41 s with 4, and in 49 s with 1; with 0 one of eight bodies fails."""
 
 _ROLLING_A = 0.3
 """Goal current of pitch joints that roll a body up a slope of 18 degrees (ours, decision 37)."""
@@ -281,14 +281,14 @@ class WalkRun(PathRun):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user would not expect of the path and the shapes, one line each."""
+        """Surprising properties of the path and the shapes, one line each."""
         behaviour, lines = self.run.behaviour, []
         pulse_m_s = behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * self.robot.length_m
         if self.path.length_m > pulse_m_s * self.run.time_limit_s:
             lines.append(
-                f"a path of {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s takes "
-                f"{self.path.length_m / pulse_m_s:.0f} s at least, but time_limit_s is "
-                f"{self.run.time_limit_s:g}: it will not be walked to its end"
+                f"path: {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s need at "
+                f"least {self.path.length_m / pulse_m_s:.0f} s, but time_limit_s is "
+                f"{self.run.time_limit_s:g}; the run will not reach its end"
             )
         if self.run.mapping is not None:
             lines.append(

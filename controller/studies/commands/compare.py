@@ -33,14 +33,14 @@ _LONGEST = 44
     results=("picture",),
 )
 def compare(
-    logs: Annotated[list[Path], typer.Argument(help="log.mcap of two runs or more")],
+    logs: Annotated[list[Path], typer.Argument(help="log.mcap of two or more runs")],
     picture: Annotated[
-        Path | None, typer.Option(help="tracks and curves over each other: .png, .svg or .pdf")
+        Path | None, typer.Option(help="draw tracks and curves over each other: .png, .svg or .pdf")
     ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Put runs side by side: their numbers, and what differs in run, robot and world."""
+    """Compare runs: their numbers, and the differences of run, robot and world."""
     if len(logs) < 2:
         raise InputError(f"{logs[0]}: one log is compared with nothing; give two or more")
     check_picture(picture)
@@ -64,7 +64,7 @@ def compare(
 
 
 def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> None:
-    """What differs in the configurations, then the numbers that at least one run has."""
+    """Print the differences of the configurations, then the numbers that at least one run has."""
     settings = Table(
         "setting", *_columns(runs), box=None, title="What differs", title_justify="left"
     )

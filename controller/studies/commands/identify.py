@@ -52,14 +52,14 @@ if TYPE_CHECKING:
 
 
 class _RobotFile(NamedTuple):
-    """A robot to be written with what is found of it."""
+    """A robot to write with the results."""
 
     before: "RobotConfig"
     out: Path
 
 
 class _Outs(NamedTuple):
-    """Files for what logs of runs tell: of the ground, and of the robot."""
+    """Files for the results from logs of runs: ground and robot."""
 
     world: Path | None
     robot: Path | None
@@ -80,12 +80,12 @@ def identify(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="recordings of one servo with a pendulum (BAM's raw JSON), or logs of one robot's "
-            "runs (.mcap)"
+            help="recordings of one servo with a pendulum (BAM's raw JSON), or logs of one "
+            "robot's runs (.mcap)"
         ),
     ],
     judge: Annotated[
-        list[Path] | None, typer.Option(help="a recording only to be judged on; again for more")
+        list[Path] | None, typer.Option(help="recording used only for judging; may be repeated")
     ] = None,
     start: Annotated[
         Path | None, typer.Option(help="constants to begin with, as BAM writes them")
@@ -93,7 +93,7 @@ def identify(
     fit: Annotated[
         bool, typer.Option("--fit/--no-fit", help="fit, or only judge the constants of --start")
     ] = True,
-    seed: Annotated[int, typer.Option(min=0, help="of the search")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -107,30 +107,33 @@ def identify(
     robot_out: Annotated[
         Path | None,
         typer.Option(
-            help="write the robot with what is found of it, for its next runs: --robot with a "
-            "servo's constants, or the robot of a run's log with its mass"
+            help="write the robot with the results: --robot with a servo's constants, or the "
+            "robot of a run's log with its mass"
         ),
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="processes, for logs of runs")] = 2,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes, for logs of runs")] = 2,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Find a servo's constants from its pendulum, or friction and mass from logs of runs.
 
-    Of a servo: resistance, torque constant, friction, inertia and P unit. Of runs: friction along
-    and across the body, on the ground --world (default: the logs'), and with --robot-out the mass
-    of the links, from gaits that lift them. All with 95 % intervals.
+    Recordings of a servo give resistance, torque constant, friction, inertia and P unit. Logs
+    of runs give the friction along and across the body, on the ground --world (default: that of
+    the logs). With --robot-out, gaits that lift the links also give their mass. All results
+    have 95 % intervals.
     """
     judge = judge or []
     of_runs = [path for path in (*logs, *judge) if _is_run(path)]
     if of_runs:
         if len(of_runs) < len(logs) + len(judge):
             raise InputError(
-                "logs of runs (.mcap) and recordings of a pendulum tell different things: give one "
-                "kind at a time"
+                "logs of runs (.mcap) and recordings of a pendulum cannot be combined; give "
+                "one kind"
             )
         if start is not None or not fit:
-            raise InputError("--start and --no-fit are of pendulums; for a run's log take --world")
+            raise InputError(
+                "--start and --no-fit: are for pendulums; for the log of a run use --world"
+            )
         if robot is not None:
             raise InputError(
                 "--robot is whose servo swings a pendulum; the robot of a run is in its log (.mcap)"
@@ -273,7 +276,7 @@ def _tell_friction(
         return
     table = Table("friction", "value", "95 % interval", "", box=None)
     for key, one in found.found.items():
-        note = "" if one.determined else "these logs do not tell it"
+        note = "" if one.determined else "not identified from these logs"
         interval = f"{one.low:.4g} to {one.high:.4g}"
         table.add_row(key.replace("_", " "), f"{one.value:.4g}", interval, note)
     console.print(table)

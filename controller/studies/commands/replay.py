@@ -20,18 +20,24 @@ from snakewalk.controller.studies import replay as replaying
 
 @command("replay", group=JOB, examples=("replay runs/flat-square-walk-seed0/log.mcap --json",))
 def replay(
-    log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on metal")],
+    log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on servos")],
     tolerance_rad: Annotated[
-        float, typer.Option(min=0.0, help="of a measured joint; default: one encoder step")
+        float,
+        typer.Option(
+            min=0.0, help="tolerance of a measured joint in rad; default: one encoder step"
+        ),
     ] = 0.0016,
     tolerance_m: Annotated[
-        float, typer.Option(min=0.0, help="of the head, where its pose was measured")
+        float,
+        typer.Option(
+            min=0.0, help="tolerance of the head's position in metres, if its pose was measured"
+        ),
     ] = 0.002,
-    out: Annotated[Path | None, typer.Option(help="keep the replay's log here")] = None,
+    out: Annotated[Path | None, typer.Option(help="write the log of the replay here")] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Send a log's commands to simulated servos again; exit code 1 where the answers differ."""
+    """Send a log's commands to simulated servos again; exit code 1 if the replies differ."""
     if out is not None and out.resolve() == log.resolve():
         raise InputError(f"{out}: is the log itself; give another name")
     refuse_to_overwrite([out], force)

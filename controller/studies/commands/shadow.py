@@ -1,4 +1,4 @@
-"""``snakewalk shadow``: what differs between a robot, by its log, and the simulator."""
+"""``snakewalk shadow``: differences between a robot, by its log, and the simulator."""
 
 import json
 from pathlib import Path
@@ -25,12 +25,12 @@ from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of
     ),
 )
 def shadow(
-    log: Annotated[Path, typer.Argument(help="log.mcap of a run, on metal or simulated")],
+    log: Annotated[Path, typer.Argument(help="log.mcap of a run, on servos or simulated")],
     world: World = None,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     as_json: Json = False,
 ) -> None:
-    """Send a log's goals to a simulated robot, and name the cause of what differs; 1 if one is."""
+    """Send a log's goals to a simulated robot; exit code 1 if it names a cause of differences."""
     require_extra("a shadow needs", "mujoco")
     check_files(None, None, world)
     record = read_log(log)

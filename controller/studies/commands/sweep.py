@@ -51,25 +51,32 @@ _HEADS = {
 def sweep(
     gaits: Annotated[
         list[str] | None,
-        typer.Argument(help="default: all", metavar="GAIT", autocompletion=completion.GAITS),
+        typer.Argument(
+            help="gaits to measure; default: all", metavar="GAIT", autocompletion=completion.GAITS
+        ),
     ] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="may be given again; default: yaw16 and alternating16",
+            help="shipped robot, or a TOML file; may be repeated; default: yaw16 and alternating16",
             autocompletion=completion.ROBOTS,
         ),
     ] = None,
     set_: Set = None,
-    points: Annotated[int, typer.Option(min=1, max=100_000, help="of each gait and robot")] = 30,
-    seconds: Annotated[float, typer.Option(min=4.0, max=3600.0, help="of each run")] = 12.0,
-    seed: Annotated[int, typer.Option(min=0, help="of the choice of points")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    points: Annotated[
+        int, typer.Option(min=1, max=100_000, help="number of points per gait and robot")
+    ] = 30,
+    seconds: Annotated[
+        float, typer.Option(min=4.0, max=3600.0, help="duration of each run in seconds")
+    ] = 12.0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the choice of points")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     dask: Annotated[
         str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="table; what it holds is not run again")
+        Path,
+        typer.Option("--out", "-o", help="write the table here; runs that it contains are skipped"),
     ] = Path("sweep.csv"),
     picture: Annotated[
         Path | None, typer.Option(help="draw the table here (.png, .svg, .pdf)")

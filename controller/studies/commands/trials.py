@@ -53,36 +53,44 @@ _HEADS = {
     "cost_of_transport": "cost",
     "in_air": "in\nair",
     "roll_max_deg": "roll\ndeg",
+    "pose": "pose",
     "why": "why",
 }
 """Columns of the table: the units stand under the names, so that the table stays narrow."""
-_TEXT = {"run", "robot", "world", "motion", "compliance", "why"}
+_TEXT = {"run", "robot", "world", "motion", "compliance", "pose", "why"}
 
 
 Over = Annotated[
     list[str] | None,
     typer.Option(
-        help="values that a key of the run, robot or world takes, e.g. "
-        "run.cycle_hz=25,50; given again: every combination",
+        help="values of a key of the run, robot or world, e.g. run.cycle_hz=25,50; if "
+        "repeated, every combination runs",
         metavar="KEY=V1,V2",
     ),
 ]
 StartSpread = Annotated[
-    float, typer.Option(min=0.0, max=1.0, help="of the start in x and y, m; 0: not moved")
+    float,
+    typer.Option(
+        min=0.0,
+        max=1.0,
+        help="spread of the start in x and y in metres; 0: the start does not move",
+    ),
 ]
 Relief = Annotated[
     list[float] | None,
-    typer.Option(min=0.0, max=5.0, help="factor on the ground's heights; may be given again"),
+    typer.Option(min=0.0, max=5.0, help="factor on the ground's heights; may be repeated"),
 ]
 
 
 TrialsPicture = Annotated[
     Path | None,
-    typer.Option(help="draw what was complete and why not (.png, .svg, .pdf)"),
+    typer.Option(help="draw complete and failed runs with reasons (.png, .svg, .pdf)"),
 ]
 TrialsOut = Annotated[
     Path | None,
-    typer.Option("--out", "-o", help="CSV of all runs; what it holds is not run again"),
+    typer.Option(
+        "--out", "-o", help="write a CSV of all runs here; runs that it contains are skipped"
+    ),
 ]
 
 
@@ -97,48 +105,55 @@ def trials(
     runs: Annotated[
         list[str] | None,
         typer.Argument(
-            help=f"shipped runs, RUN.toml, or gaits; default: {DEFAULT_RUN}",
+            help=f"shipped runs, RUN.toml files, or gaits; default: {DEFAULT_RUN}",
             metavar="RUN",
             autocompletion=completion.RUNS_OR_GAITS,
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="runs a row")] = 20,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per row")] = 20,
     first_seed: FirstSeed = 0,
     start_spread: StartSpread = 0.04,
     motion: Annotated[
         list[str] | None,
-        typer.Option(help="may be given again; default: all", autocompletion=completion.MOTIONS),
+        typer.Option(
+            help="kind of motion, or all; may be repeated; default: all",
+            autocompletion=completion.MOTIONS,
+        ),
     ] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option(
-            help="may be given again; default: the run's", autocompletion=completion.ROBOTS
+            help="shipped robot, or a TOML file; may be repeated; default: the run's",
+            autocompletion=completion.ROBOTS,
         ),
     ] = None,
     relief: Relief = None,
     over: Over = None,
     compliance: Annotated[
         list[str] | None,
-        typer.Option(help="on, off: joints yield to current; may be given again"),
+        typer.Option(help="on or off: joints yield to current; may be repeated"),
     ] = None,
-    seconds: Annotated[float | None, typer.Option(min=5.0, help="of a gait; default: 20")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=5.0, help="duration of a gait in seconds; default: 20")
+    ] = None,
     world: Annotated[
         list[str] | None,
         typer.Option(
-            help="may be given again; default: the run's", autocompletion=completion.WORLDS
+            help="shipped world, or a TOML file; may be repeated; default: the run's",
+            autocompletion=completion.WORLDS,
         ),
     ] = None,
     track: TrackFile = None,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     out: TrialsOut = None,
     picture: TrialsPicture = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Simulate runs or gaits over seeds; tabulate what was reached, and why not.
+    """Simulate runs or gaits over seeds; list how many arrived, and why others failed.
 
-    Each seed moves the start, so that its runs differ also where the motion takes no chances. A run
-    is the same for the same files: after an update of the program begin a new --out.
+    Each seed moves the start, so that runs differ even if the motion makes no random choice.
+    The same files give the same run. After an update of the program, begin a new --out.
     """
     check_picture(picture)
     require_extra("trials need", "mujoco")
@@ -245,6 +260,9 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
     shown = [key for key in _HEADS if any(row[key] not in {"", None} for row in rows)]
     if len({row["relief"] for row in rows}) == 1:
         shown.remove("relief")
+    poses = {row["pose"] for row in rows}
+    if len(poses) == 1 and "pose" in shown:
+        shown.remove("pose")
     grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for key in varied:
         grid.add_column("\n".join(key.split(".")[-2:]), justify="right", no_wrap=True)
@@ -257,3 +275,5 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
         values = [row["keys"][key] for key in varied] + [row[key] for key in shown]
         grid.add_row(*["" if value is None else str(value) for value in values])
     console.print(grid)
+    if "pose" not in shown and poses != {""}:
+        console.print(f"pose: {poses.pop()}")

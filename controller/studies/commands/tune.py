@@ -27,22 +27,26 @@ from snakewalk.controller.studies.sweep_points import robot_file
 )
 def tune(
     gait: Annotated[
-        str, typer.Argument(help="one of: snakewalk gait list", autocompletion=completion.GAITS)
+        str,
+        typer.Argument(
+            help="gait to search, from: snakewalk gait list", autocompletion=completion.GAITS
+        ),
     ],
     aim: Annotated[
-        Literal["speed", "efficiency"], typer.Option("--for", help="what to make better")
+        Literal["speed", "efficiency"], typer.Option("--for", help="quantity to improve")
     ] = "speed",
     robot: Robot = None,
     set_: Set = None,
-    budget: Annotated[int, typer.Option(min=16, help="runs of the search")] = 120,
-    seeds: Annotated[int, typer.Option(min=1, help="other grounds to compare on")] = 5,
-    seconds: Annotated[float, typer.Option(min=4.0, help="of each run")] = 10.0,
-    seed: Annotated[int, typer.Option(min=0, help="of the search")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="processes")] = 2,
+    budget: Annotated[int, typer.Option(min=16, help="number of runs of the search")] = 120,
+    seeds: Annotated[int, typer.Option(min=1, help="number of other grounds to compare on")] = 5,
+    seconds: Annotated[float, typer.Option(min=4.0, help="duration of each run in seconds")] = 10.0,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="set of parameters for gait run (.toml)")
+        Path | None,
+        typer.Option("--out", "-o", help="write the set of parameters for gait run here (.toml)"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
     as_json: Json = False,
 ) -> None:
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""

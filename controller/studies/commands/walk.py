@@ -29,26 +29,28 @@ def walk(
     graph: Annotated[
         list[str] | None,
         typer.Option(
-            help="er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED, kp:TRACK[:THRESHOLD] or a file; "
-            "may be given again; default: er:1000:9"
+            help="graph: er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED, kp:TRACK[:THRESHOLD] or a "
+            "file; may be repeated; default: er:1000:9"
         ),
     ] = None,
     rule: Annotated[
         list[str] | None,
         typer.Option(
-            help="snake, snake-printed, frontier, stack, random or degree; may be given again; "
-            "default: all"
+            help="rule: snake, snake-printed, frontier, stack, random or degree; may be "
+            "repeated; default: all"
         ),
     ] = None,
-    repeats: Annotated[int, typer.Option(min=1, max=100_000, help="graphs of each kind")] = 30,
-    seed: Annotated[int, typer.Option(min=0, help="of every random choice")] = 0,
+    repeats: Annotated[
+        int, typer.Option(min=1, max=100_000, help="number of graphs of each kind")
+    ] = 30,
+    seed: Annotated[int, typer.Option(min=0, help="seed of every random choice")] = 0,
     picture: Annotated[
         Path | None, typer.Option(help="draw states seen over steps here (.png, .svg, .pdf)")
     ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Walk graphs of states until all are seen: how many steps, and how soon states come again."""
+    """Walk graphs of states until all are visited: number of steps, and how soon states repeat."""
     check_picture(picture)
 
     graphs, rules = graph or ["er:1000:9"], rule or list(RULES)

@@ -1,14 +1,15 @@
 """Friction of the belly, along and across (and backward), and mass, from logs of a robot's runs.
 
 The simulator follows a log's goals with other frictions until its body goes and turns as the
-measured one did, and its joints need the measured currents. How the body moves on a level floor
-tells the ratio of the frictions alone: without inertia their common factor cancels. The currents
-tell that factor, as well as the servos' torque for a current is known. What robots differ in beside
-(masses, servos, horns) is fitted along, held near the robot's file by priors (Gauss-Newton's steps
-to the most probable values; intervals from the curvature there, by Laplace's approximation).
+measured one did, and its joints need the measured currents. The motion on a level floor depends on
+the ratio of the frictions alone: without inertia their common factor cancels. The currents give
+that factor, as accurately as the servos' torque for a current is known. Other differences of robots
+(masses, servos, horns) are fitted as well, with priors from the robot's file. Gauss-Newton's steps
+give the most probable values, and the curvature there gives the intervals (Laplace's
+approximation).
 
-The mass is fitted on demand, from runs in which pitch joints lift: what they lift they need current
-for, and friction has little part in it. Without lifts weight and friction act together only.
+The mass is fitted on demand, from runs in which pitch joints lift: lifting needs current, and
+friction has little effect on it. Without lifts weight and friction act together only.
 """
 
 import math
@@ -43,10 +44,10 @@ _LIFTED_RAD: Final = 0.1
 WINDOW_S: Final = 1.0
 """The body's motion is compared over this, from the place where each window begins (ours)."""
 MOVED_M: Final = 0.02
-"""A body that goes less than this in all windows tells no friction (ours)."""
+"""A body that moves less than this in all windows does not allow a friction estimate (ours)."""
 _FLOORS: Final = (1.0, 1.0, 1e-3**2, 2e-3**2)
-"""Least variance of what the model misses: of currents and angles (in steps of registers), of a
-window's way (m) and turn (rad) (ours)."""
+"""Least variance of the model error: of currents and angles (in steps of registers), of a window's
+displacement (m) and turn (rad) (ours)."""
 _PER_SAMPLE: Final = (40.0, 40.0, 4.0, 4.0)
 """Values of each kind that count as one: those of 4 s, as what the model misses comes again with
 each cycle of a gait (ours)."""
@@ -61,14 +62,14 @@ _MOST: Final = 0.7
 _ALONE, _TOGETHER = 4, 2
 """Steps with friction alone, then with all that robots differ in (ours)."""
 _DETERMINED: Final = 0.35
-"""Standard deviation of a logarithm from which on a friction counts as not told: 95 % would reach
+"""Standard deviation of a logarithm from which a friction counts as undetermined: 95 % would reach
 from half to twice the value (ours)."""
 _NORMAL_95: Final = 1.96
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionLog:
-    """What a log tells of friction: goals, answers, and where the body went."""
+    """Data of a log for the friction fit: goals, replies, and displacements of the body."""
 
     goals: Goals
     answers: Floats
@@ -78,14 +79,14 @@ class FrictionLog:
 
     @staticmethod
     def of(record: RunRecord, world: WorldConfig | None = None) -> "FrictionLog":
-        """Take what a run's log tells.
+        """Extract the data from a run's log.
 
         Args:
             record: a run with a measured pose.
             world: the ground that it was on; the log's where it is None.
 
         Raises:
-            InputError: the log tells no friction, and why.
+            InputError: the log does not allow a friction estimate, with the reason.
 
         """
         header, pose = record.header, record.pose
@@ -95,8 +96,8 @@ class FrictionLog:
         if not measured:
             way = told or "the IMU or the joints"
             raise InputError(
-                f"the pose of this run was estimated by {way}, which takes friction as known; "
-                "friction needs a pose measured by a camera (or a simulated run)"
+                f"the pose of this run was estimated by {way}, which assumes the friction; use "
+                "a run with a pose measured by a camera, or a simulated run"
             )
         goals, answered = goals_of(record, world)
         cycle = record.cycle
@@ -114,8 +115,8 @@ class FrictionLog:
         motion = _motion(goals, at)
         if np.hypot(motion[:, 0], motion[:, 1]).max() < MOVED_M:
             raise InputError(
-                f"the body goes less than {1e3 * MOVED_M:g} mm in any second of the log: that "
-                "tells no friction; take a log of a run that goes somewhere"
+                f"the body moves less than {1e3 * MOVED_M:g} mm in each second of the log, too "
+                "little to identify friction; use the log of a run that travels"
             )
         return FrictionLog(goals, answered, motion)
 
@@ -141,7 +142,7 @@ class FrictionLog:
         return np.concatenate([features(self.goals, self.answers), self.motion.ravel()])
 
     def check_lifts(self) -> None:
-        """Refuse a log that tells no mass.
+        """Reject a log that does not allow a mass estimate.
 
         Raises:
             InputError: nothing is lifted in it; says what to run instead.
@@ -151,14 +152,14 @@ class FrictionLog:
         joints = list(robot.pitch_joints)
         if not joints:
             raise InputError(
-                f"robot {robot.name} has no pitch joints: on a level floor its weight and the "
-                "friction act together only, so no run of it tells its mass; weigh it"
+                f"robot {robot.name}: has no pitch joints, so runs on a level floor depend on "
+                "the product of weight and friction only; weigh the robot"
             )
         if np.ptp(self.answers[1][:, joints], axis=0).max() < _LIFTED_RAD:
             raise InputError(
-                f"the pitch joints turn less than {_LIFTED_RAD:g} rad: nothing is lifted, which "
-                "tells no mass; take a log of a gait that lifts the body (snakewalk gait run "
-                f"sidewinding --robot {robot.name}, or rectilinear)"
+                f"the pitch joints turn less than {_LIFTED_RAD:g} rad and lift nothing, so the "
+                "mass cannot be identified; use the log of a gait that lifts the body "
+                f"(snakewalk gait run sidewinding --robot {robot.name}, or rectilinear)"
             )
 
     def with_friction(self, friction: FrictionConfig) -> Goals:
@@ -184,7 +185,7 @@ class Found:
 
     @staticmethod
     def of_log(mean: float, deviation: float) -> "Found":
-        """Of a normal distribution of the logarithm."""
+        """Convert a normal distribution of the logarithm."""
         reach = _NORMAL_95 * deviation
         return Found(math.exp(mean), math.exp(mean - reach), math.exp(mean + reach))
 
@@ -206,10 +207,10 @@ class FrictionFit:
     found: dict[str, Found]
     """``along``, ``across``, perhaps ``back``, and the ratio of the first two."""
     mass: Found | None = None
-    """Of the spine's links over the robot's file; None where it was not looked for."""
+    """Mass of the spine's links over the robot's file; None if it was not estimated."""
 
     def world(self, world: WorldConfig) -> WorldConfig:
-        """Return a world with this friction; what the logs do not tell stays."""
+        """Return a world with this friction; undetermined values stay."""
         told = [name for name, one in self.found.items() if one.determined and name != RATIO]
         changes = {name: float(f"{getattr(self.friction, name):.4g}") for name in told}
         friction = world.friction.model_copy(update=changes)
@@ -219,7 +220,7 @@ class FrictionFit:
         """Lines for the head of a world's file."""
         lines = [f"Friction found by `snakewalk identify` from {', '.join(map(str, paths))}:"]
         for name, one in self.found.items():
-            note = "" if one.determined else "; these logs do not tell it"
+            note = "" if one.determined else "; not identified from these logs"
             lines.append(
                 f"{name.replace('_', ' ')} {one.value:.4g}, 95 % of {one.low:.4g} to "
                 f"{one.high:.4g}{note}"
@@ -249,7 +250,7 @@ def fit_friction(
         on_progress: takes simulations done, and of how many.
 
     Raises:
-        InputError: the mass is asked for, and a log does not tell it.
+        InputError: the mass is requested, and a log does not allow it.
 
     """
     if mass:
@@ -278,7 +279,7 @@ class _Fit:
         self._steps = constants.step[2:]
         kinds = np.concatenate([_kinds(log) for log in logs])
         measured = np.concatenate([log.vector() for log in logs])
-        self._known = np.isfinite(measured)  # a servo may not tell its current
+        self._known = np.isfinite(measured)  # a servo may not report its current
         self._measured, self._kinds = measured[self._known], kinds[self._known]
         self._noise = np.array(_FLOORS)
         links, joints = first.robot.link_count, first.robot.joint_count
@@ -361,7 +362,7 @@ class _Fit:
         return curvature, np.asarray(weighed.T @ rest)
 
     def _set_noise(self, rest: Floats, effects: Floats) -> None:
-        """Take the noise of each kind from what is left, less what the fit has taken up."""
+        """Set the noise of each kind from the residual, less the share of the fit."""
         curvature, _ = self._normal(effects, rest)
         taken = np.einsum("ni,ij,nj->n", effects, np.linalg.inv(curvature), effects)
         taken = taken * self._weights()
@@ -372,7 +373,7 @@ class _Fit:
 
 
 def _friction(names: Sequence[str], logs: Floats) -> FrictionConfig:
-    values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # what a world takes
+    values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # range that a world accepts
     found = dict(zip(names, map(float, values), strict=True))
     return FrictionConfig(**{name: value for name, value in found.items() if name != MASS})
 

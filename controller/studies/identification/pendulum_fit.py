@@ -1,8 +1,8 @@
 """Constants of a servo fitted to recordings of a pendulum, each with an interval.
 
-The whole recording is computed from its first angle, and no measured angle helps on the way: what
-fits has the servo's motion, not its next sample. Many starts find the basin, steps from the best
-ones its ground; all chance comes from one seed.
+The whole recording is computed from its first angle, without further measured angles: so a fit
+reproduces the servo's motion, not only its next sample. Many starts find the basin, steps from the
+best ones its ground; all chance comes from one seed.
 """
 
 import math
@@ -38,15 +38,15 @@ _COARSE_S: Final = 2e-3
 _COARSE_TURNS: Final = 25
 _FINE_TURNS: Final = 100
 _SPREAD: Final = 0.4
-"""Of the starts, as a factor's logarithm."""
+"""Spread of the starts, as a factor's logarithm."""
 _FIRST: Final = 4
 """Best fits that hops begin from."""
 _OUTLIER_RAD: Final = 0.02
 """Errors above this count linearly, as in a mean absolute error."""
 _TURN: Final = 1e-3
-"""Of a constant's range: step of the search's derivatives."""
+"""Share of a constant's range: step of the search's derivatives."""
 _FINE_TURN: Final = 1e-4
-"""Of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
+"""Share of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
 constants trade against each other exactly, a long step's error would pass for knowledge."""
 _BLOCK_S: Final = 0.5
 """Errors within this are not independent: they count as one in the intervals (ours)."""
@@ -56,7 +56,7 @@ _LEAST_SHARE: Final = 0.01
 _FACTOR: Final = 1.05
 """Step along constants that move a servo alike (ours)."""
 _CHI_SQUARE: Final = 3.84
-"""Of one constant: what is less likely than 5 %."""
+"""Threshold of one constant: less likely than 5 %."""
 _TORQUE_CONSTANT: Final = NAMES.index("torque_constant_n_m_a")
 _RESISTANCE: Final = NAMES.index("resistance_ohm")
 _P_UNIT: Final = NAMES.index("p_unit_per_rad")
@@ -163,7 +163,7 @@ def _scaled(values: Floats, factor: float) -> Floats:
 
 
 def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
-    """Least and greatest factor of ``_scaled`` that the recordings do not tell from 1."""
+    """Least and greatest factor of ``_scaled`` that the recordings do not separate from 1."""
 
     def cost(of: Floats) -> float:
         errors = _errors(of, logs, squares, FINE_S) / _OUTLIER_RAD
@@ -190,8 +190,8 @@ def _intervals(
     """Ends of the 95 % intervals, by blocks of errors (a sandwich), within the ranges.
 
     A model that is wrong leaves errors that last: within a block they count as one, so that the
-    intervals grow with the blocks' sums, not shrink with the number of samples. What the logs do
-    not tell has an interval as wide as its range.
+    intervals grow with the blocks' sums, not shrink with the number of samples. Values that the
+    logs do not determine have an interval as wide as their range.
     """
     width = _HIGH - _LOW
     steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
@@ -218,7 +218,7 @@ def _intervals(
             for at in (blocks == block for block in np.unique(blocks))
         ]
     )
-    # a prior as wide as the range keeps what the logs do not tell from blowing the rest up
+    # a prior as wide as the range keeps undetermined values from inflating the rest
     curvature = (jacobian * weight[:, None]).T @ jacobian
     noise = float((weight * errors**2).mean())
     bread = np.linalg.inv(curvature + noise * np.eye(len(values)))

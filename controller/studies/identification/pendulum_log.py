@@ -41,7 +41,7 @@ def read_pendulum_log(path: Path) -> PendulumLog:
     """Read a raw log of BAM: mass, length, kp, and entries of position, goal, volts and torque.
 
     Raises:
-        InputError: it is no such file; says what is missing.
+        InputError: it is not such a file, with its missing parts.
 
     """
     data = read_json(path)
@@ -56,7 +56,9 @@ def read_pendulum_log(path: Path) -> PendulumLog:
             np.array([_number(row[key]) for row in rows]) for key in _COLUMNS
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: is no log of a pendulum: {error}") from None
+        raise InputError(
+            f"{path}: is not a log of a pendulum: {error}; choose another file"
+        ) from None
     if len(time_s) < _LEAST_ROWS or not (np.diff(time_s) >= 0.0).all():
         raise InputError(f"{path}: expected at least {_LEAST_ROWS} entries in the order of time")
     if not (mass_kg > 0.0 and arm_m > 0.0 and p_gain >= 0.0):

@@ -1,6 +1,6 @@
 """A servo that swings a weight, computed from its constants: quick enough to be run for a fit.
 
-The same by the simulated servo of a robot's file tells what a run of that robot would do.
+The same with the simulated servo of a robot's file predicts a run of that robot.
 """
 
 import math

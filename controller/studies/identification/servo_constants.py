@@ -1,4 +1,4 @@
-"""What identification finds of a servo, by name, with its BAM name, range and unit; BAM's JSON.
+"""Results of the identification of a servo, with name, BAM name, range and unit; BAM's JSON.
 
 BAM ("Better Actuator Models", Rhoban) writes the constants of a servo with a friction of this form:
 the greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``, and while the shaft
@@ -39,7 +39,7 @@ class Constant(NamedTuple):
     """Where it is looked for (ours)."""
     start: float
     absent: float
-    """What a file of BAM means that does not have it."""
+    """Value for a file of BAM that lacks it."""
 
 
 _XL330: Final = MOTORS["XL330-M288"]
@@ -70,7 +70,8 @@ LOW: Final = np.array([constant.low for constant in CONSTANTS])
 HIGH: Final = np.array([constant.high for constant in CONSTANTS])
 _SQUARES: Final = ("by_motor_square", "by_load_square")
 FITTED: Final = len(CONSTANTS) - len(_SQUARES)
-"""So many a fit looks for, the first; squares stay as given (``docs/identify.md`` says why)."""
+"""Number of constants that a fit estimates, the first; squares stay as given (``docs/identify.md``
+states the reason)."""
 _FORMS: Final = ("m1", "m2", "m3", "m4", "m5", "m6")
 _BOTH_SIDES: Final = {
     "load_friction_base": ("load_friction_motor", "load_friction_external"),
@@ -79,7 +80,7 @@ _BOTH_SIDES: Final = {
         "load_friction_external_stribeck",
     ),
 }
-"""Of BAM's models M3 and M4, which do not ask from which side a torque comes."""
+"""Models M3 and M4 of BAM, which do not depend on the side of a torque."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ class ServoConstants:
 
 
 def bam_text(constants: ServoConstants) -> str:
-    """JSON as BAM writes it: M5, or M6 with squares; the intervals stand beside."""
+    """JSON as BAM writes it: M5, or M6 with squares, and the intervals."""
     data: dict[str, object] = {
         c.bam: float(v) for c, v in zip(CONSTANTS, constants.values, strict=True)
     }
@@ -126,7 +127,7 @@ def read_bam(path: Path) -> ServoConstants:
     that of the XL330.
 
     Raises:
-        InputError: it is no such file, or needs a term that is not modelled here.
+        InputError: it is not such a file, or needs a term that is not modelled here.
 
     """
     data = read_json(path)

@@ -24,13 +24,15 @@ from snakewalk.controller.figures.style import (
 )
 from snakewalk.controller.studies.run_comparison import ComparedRun
 
+_OF_THE_POSE = ("path_error_m", "speed_m_s")
+"""Panels that are dashed where the pose was dead-reckoned."""
 _COLOURS = (BLUE, RED, GREEN, AMBER, PURPLE, SKY, INK, GREY)
 
 
 def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
     """Draw one colour a run; panels that no run has values for are left out."""
     panels = [
-        (title, unit, [getattr(run, key) for run in runs], [getattr(run, at) for run in runs])
+        (title, unit, key, [getattr(run, key) for run in runs], [getattr(run, at) for run in runs])
         for title, unit, key, at in (
             ("Centre of mass from the path", "m", "path_error_m", "pose_s"),
             ("Forward speed", "m/s", "speed_m_s", "pose_s"),
@@ -38,7 +40,7 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
             ("Measured minus sent, RMS of the joints", "rad", "tracking_rms_rad", "cycle_s"),
         )
     ]
-    panels = [panel for panel in panels if any(np.isfinite(v).any() for v in panel[2])]
+    panels = [panel for panel in panels if any(np.isfinite(v).any() for v in panel[3])]
     with style():
         figure = Figure(figsize=(WIDTH_IN, 4.6 + 1.9 * len(panels)), layout="constrained")
         tracks, *rest = figure.subplots(
@@ -46,12 +48,14 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
             gridspec_kw={"height_ratios": [2.4, *([1.0] * len(panels))]},
         )[:, 0]  # fmt: skip
         _draw_tracks(tracks, runs)
-        for axes, (title, unit, values, times) in zip(rest, panels, strict=True):
+        for axes, (title, unit, key, values, times) in zip(rest, panels, strict=True):
             for number, (time_s, value) in enumerate(zip(times, values, strict=True)):
                 if np.isfinite(value).any():
                     at, _, mean, _ = thin(time_s, value)
                     colour = _COLOURS[number % len(_COLOURS)]
-                    axes.plot(at, mean, color=colour, linewidth=1.1)
+                    is_solid = key not in _OF_THE_POSE or runs[number].summary.is_measured
+                    dash = "-" if is_solid else "--"
+                    axes.plot(at, mean, color=colour, linewidth=1.1, linestyle=dash)
             axes.set_title(title)
             axes.set_ylabel(unit)
             axes.set_xlim(left=0.0)
@@ -66,7 +70,11 @@ def _draw_tracks(axes: Axes, runs: Sequence[ComparedRun]) -> None:
     """Tracks from above, and the waypoints where all runs have the same."""
     for number, run in enumerate(runs):
         axes.plot(
-            *run.centre_m.T, color=_COLOURS[number % len(_COLOURS)], label=run.name, linewidth=1.3
+            *run.centre_m.T,
+            color=_COLOURS[number % len(_COLOURS)],
+            label=f"{run.name} ({run.pose})",
+            linewidth=1.3,
+            linestyle="-" if run.summary.is_measured else "--",
         )
     first = runs[0]
     alike = all(np.array_equal(run.waypoints_m, first.waypoints_m) for run in runs)

@@ -17,11 +17,11 @@ matplotlib.use("Agg")
 
 _SHARE = LinearSegmentedColormap.from_list("share", [RED, "#f6e7c8", GREEN])
 _CAUSES = 3
-"""Most that a cell has room for."""
+"""Largest number of causes in a cell."""
 
 
 def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
-    """Draw a map over the first two of what differs between the cases; a panel for all the rest.
+    """Draw a map over the first two varied quantities of the cases; a panel for all the rest.
 
     Keys come first, then relief, world, robot, motion and run.
     """

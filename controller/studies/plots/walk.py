@@ -35,7 +35,7 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
     """Write the picture in the format of its ending.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending is not a picture's.
 
     """
     check_picture(file)

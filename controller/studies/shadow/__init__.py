@@ -1,1 +1,1 @@
-"""The simulator beside the metal on the same goals, and what differs between the two."""
+"""A simulation of the robot with the same goals, and the differences between the two."""

@@ -1,10 +1,10 @@
-"""Which cause explains how a robot's joints differ from those of its shadow.
+"""Cause that explains the differences between a robot's joints and those of its shadow.
 
-Of each thing that may be wrong (the ground's friction, a load on a link, a weaker servo, a slipped
-horn) the simulator tells how angles and currents of all joints would change. A robot that is well
-differs in all of them a little, as no servo is its data sheet; a cause differs much, alone. The
-causes are compared by their evidence, the small differences of all else integrated out (Bayesian
-model comparison: MacKay, "Information Theory, Inference, and Learning Algorithms", ch. 28).
+For each possible fault (friction of the ground, a load on a link, a weaker servo, a slipped horn)
+the simulator computes the change of angles and currents of all joints. A sound robot differs a
+little in all of them, because no servo equals its data sheet; a fault differs much in one. The
+causes are compared by their evidence, with the small differences of all others integrated out
+(MacKay, "Information Theory, Inference, and Learning Algorithms", ch. 28).
 """
 
 import math
@@ -31,18 +31,17 @@ Cause = Literal["friction", "load", "weaker servo", "slipped horn"]
 NAMED_FROM: Final = 3.0
 """Log of the evidence over that of a healthy robot from which on a cause is named (ours)."""
 _BIN_S: Final = 0.1
-"""Angles and currents are averaged over this: their steps average out, and the noise of a bin is
-nearly that of its own (ours)."""
+"""Angles and currents are averaged over this, so that their steps average out (ours)."""
 _CURRENT_STEP_A: Final = 2.69e-3
 _ANGLE_STEP_RAD: Final = 1.5e-3
 """Units of the two: a step of the registers of most models."""
 _CORRELATED: Final = 4.0
-"""Bins of noise that count as one: what the model misses is not white (ours)."""
+"""Bins of noise that count as one: the model error is not white (ours)."""
 _LEAST_NOISE: Final = 1.0 / 12.0
 """Variance of a value that is rounded to whole steps, before averaging."""
 _REFINEMENTS: Final = 4
 _LEAST_STEP: Final = 0.01
-"""Of ``faulty``: less changes nothing (ours)."""
+"""Least change of ``faulty``: smaller ones have no effect (ours)."""
 _REFINED: Final = dict[Cause, int](friction=1, load=2) | {"weaker servo": 1, "slipped horn": 2}
 """How many of each kind, those that explain most at first, are followed on the simulator (ours)."""
 SETTLED_S: Final = 1.0
@@ -50,14 +49,14 @@ SETTLED_S: Final = 1.0
 MOST_S: Final = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
 LEAST_S: Final = 4.0
-"""Less tells too little (ours)."""
+"""A shorter log is not sufficient (ours)."""
 _DELAY_STEP_S, _USUAL_DELAY_S = 0.005, 0.005
 """Simulated delay of the goals, and its usual deviation between a read and a write (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Goals:
-    """What was sent to a chain, and where it was then: what its shadow needs."""
+    """Goals sent to a chain, and its places then: the input of its shadow."""
 
     run: RunConfig
     robot: RobotConfig
@@ -70,7 +69,7 @@ class Goals:
 
 
 def is_gap(pause_s: float, run: RunConfig) -> bool:
-    """Return whether a chain whose cycles pause for so long was stopped by its bus watchdogs."""
+    """Return whether bus watchdogs stop a chain whose cycles pause for this time."""
     return pause_s >= run.safety.watchdog_s and pause_s > 1.5 / run.cycle_hz
 
 
@@ -136,7 +135,7 @@ class NamedCause:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What differs, the best explanation first; one of each kind of cause, and the next joints."""
+    """Causes of the differences, the best first; one of each kind, and the next joints."""
 
     causes: tuple[NamedCause, ...]
     residual_a: Floats
@@ -159,8 +158,8 @@ class Diagnosis:
                 f"does {robot.joint_label(most)}, by {self.residual_a[most]:.3f} A"
             )
         return (
-            f"what differs from the shadow is explained by {named.text(robot)} "
-            f"({self.probability:.0%} of what was looked at)"
+            f"the difference from the shadow is explained by {named.text(robot)} "
+            f"({self.probability:.0%} of the measured values)"
         )
 
     def evidence_over(self, cause: NamedCause) -> float:
@@ -188,7 +187,7 @@ class Diagnosis:
 
     @property
     def probability(self) -> float:
-        """Of the best cause among all that were looked at, equally likely before."""
+        """Probability of the best cause among all that were considered, equally likely before."""
         logs = np.array([each.evidence for each in self.causes])
         return float(1.0 / np.exp(logs - logs[0]).sum())
 
@@ -247,13 +246,12 @@ def check_level(world: WorldConfig) -> None:
     """Refuse ground on which a shadow means nothing.
 
     Raises:
-        InputError: it is no level, open floor.
+        InputError: it is not a level, open floor.
 
     """
     if world.ground.kind != "flat" or world.obstacle is not None:
         raise InputError(
-            f"world {world.name}: a shadow needs a level, open floor: elsewhere its body comes to "
-            "lie beside the robot's, and joints differ by that alone"
+            f"world {world.name}: a shadow needs a level floor without obstacles; use a flat world"
         )
 
 
@@ -281,7 +279,8 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
         if len(goals.since_start_s) >= least:
             return goals, measured
     raise InputError(
-        f"the log has less than {LEAST_S:g} s without a pause: too little to tell what differs"
+        f"the log has less than {LEAST_S:g} s without a pause, too little to find a cause; use "
+        "a longer log"
     )
 
 
@@ -369,7 +368,7 @@ class Signatures:
                 worth = evidence > well
                 parts = constants.causes[k][2]
                 refined[k] = self._refined(likely, apart, parts) if worth else explained
-        # what the best explanation leaves is noise: it judges all of them
+        # the residual of the best explanation is noise: it judges all of them
         likely = self._likelihood([apart, *(rest for _, rest, _ in refined.values())])
         well, named = likely.of(apart), []
         for k, (values, rest, slopes) in refined.items():
@@ -400,7 +399,7 @@ class Signatures:
     def _refined(
         self, likely: "_Likelihood", apart: Floats, parts: list[int]
     ) -> tuple[Floats, Floats, Floats]:
-        """Values of a cause, what they leave, and the slopes there, found on the simulator.
+        """Values of a cause, their residuals, and the slopes there, found on the simulator.
 
         Gauss-Newton's steps; the slopes follow by Broyden's update.
         """

@@ -33,9 +33,9 @@ ALARM_A: Final = 0.03
 ALARM_RAD: Final = 0.02
 """The same of an angle (ours)."""
 _MEMORY_S: Final = 2.0
-"""Time constant of what the alarm looks at (ours)."""
+"""Time constant of the alarm's average (ours)."""
 _SMOOTH_S: Final = 0.1
-"""Time constant that takes the encoder's and the current's steps out of a difference (ours)."""
+"""Time constant that smooths the encoder's and the current's steps in a difference (ours)."""
 
 
 @dataclass
@@ -58,7 +58,7 @@ class ShadowAlarm:
         self._cycles = 0
 
     def update(self, state: JointState, shadow: JointState) -> tuple[str, ...]:
-        """Take a cycle; returns a sentence for each joint that differs from now on."""
+        """Process a cycle; returns a sentence for each joint that begins to differ."""
         now = np.stack(
             [state.current_a - shadow.current_a, state.position_rad - shadow.position_rad]
         )
@@ -83,8 +83,8 @@ class ShadowAlarm:
 class RunShadow:
     """The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.
 
-    Its simulator is built with it, before the robot has torque: that takes longer than the
-    servos' bus watchdog allows.
+    Its simulator is built with it, before the robot has torque: building is slower than the servos'
+    bus watchdog allows.
 
     Args:
         run: the run.
@@ -127,7 +127,7 @@ class RunShadow:
         """Reject ground on which a shadow means nothing.
 
         Raises:
-            InputError: the ground is no level, open floor.
+            InputError: the ground is not a level, open floor.
 
         """
         check_level(world)
@@ -158,7 +158,7 @@ class RunShadow:
             self._on_event("shadow", text)
 
     def end(self, time_s: float) -> None:
-        """Say what explains the difference; torque is off by then, as this takes many seconds."""
+        """Report the explanation of the difference; torque is off, as this needs many seconds."""
         run, robot, world = self._of
         if not self._rows:
             return

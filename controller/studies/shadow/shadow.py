@@ -42,7 +42,6 @@ class Shadow:
         """Pose of its head; a simulated body always has one."""
         self._lay_down = cast(Callable[[InitialPose], None], backend.lay_down)
         self._chain.enable()
-        self._chain.checks_in_read = False  # as in the loop of a run
         self._start_s = self._clock.now_s()
 
     def restart(self, pose: InitialPose) -> None:

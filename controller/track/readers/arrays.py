@@ -4,6 +4,7 @@ import math
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,9 @@ ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "lice
     "rate_assumed",
     "verdict",
     "time_s",
+    "notes",
+    "places_recorded",
+    "head_sure",
 }
 """The arrays that are read of an .npz; others, such as the widths of a body, stay in the file."""
 
@@ -50,6 +54,9 @@ def save_track(path: Path, track: Track) -> None:
         licence=track.licence,
         rate_assumed=track.rate_assumed,
         verdict=np.array([str(one) for one in verdict]),
+        **({"notes": np.array(track.notes)} if track.notes else {}),
+        places_recorded=track.places_recorded,
+        head_sure=np.nan if track.head_sure is None else track.head_sure,
     )
 
 
@@ -136,16 +143,23 @@ def track_from_arrays(
     if bodies and given is not None:
         length_m = _scalar(file, "length_m", held.get("length_m", np.array(np.nan)))
         points = _bodies(file, held, length_m if np.isfinite(length_m) else 1.0)
-        return track_from_points(
+        track = track_from_points(
             _text(held, "name", file.stem),
             _without_unsure(file, points, held, least_score),
             given,
             scale_m=1.0 if np.isfinite(length_m) else None,
             time_s=time_s if time_s is not None and len(time_s) == len(points) else None,
-            rate_assumed=rate_hz is None and _assumed(held),
+            rate_assumed=rate_hz is None and _flag(held, "rate_assumed", default=False),
             status=_status(held, len(points)),
             source=_text(held, "source", "not stated"),
             licence=_text(held, "licence", "not stated"),
+            notes=[str(one) for one in held.get("notes", np.array([])).reshape(-1)],
+        )
+        sure = _scalar(file, "head_sure", held.get("head_sure", np.array(np.nan)))
+        return replace(
+            track,
+            places_recorded=_flag(held, "places_recorded", default=True),
+            head_sure=sure if np.isfinite(sure) else None,
         )
     if "skeletons" in held:
         points = _floats(file, "skeletons", held["skeletons"])
@@ -161,9 +175,11 @@ def track_from_arrays(
     )
 
 
-def _assumed(held: dict[str, NDArray[np.generic]]) -> bool:
-    """Whether the file says that its rate was a guess."""
-    return "rate_assumed" in held and bool(held["rate_assumed"].reshape(-1)[:1].astype(bool).all())
+def _flag(held: dict[str, NDArray[np.generic]], name: str, *, default: bool) -> bool:
+    """A truth value that the file may hold."""
+    if name not in held or not held[name].size:
+        return default
+    return bool(held[name].reshape(-1)[:1].astype(bool).all())
 
 
 def _status(held: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStatus]:

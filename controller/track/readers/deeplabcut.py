@@ -17,6 +17,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.markers import MISSING
 from snakewalk.controller.track.track import frame_numbers
 
 PCUTOFF = 0.6
@@ -58,7 +59,7 @@ def load_rows(
         for k, cell in enumerate(row[first : first + len(columns)]):
             text = cell.strip()
             try:
-                values[line, k] = float(text) if text else np.nan
+                values[line, k] = np.nan if text.lower() in MISSING else float(text)
             except ValueError:
                 raise InputError(
                     f"{file}: line {line + depth + 1}: {columns[k][1]} {columns[k][2]}: expected a "
@@ -117,11 +118,11 @@ def _columns(file: Path, stored: Any, count: int) -> list[Column]:
         names = [tuple(map(str, name)) for name in axes[0][1]]
     except (pickle.UnpicklingError, ValueError, TypeError, LookupError, EOFError, AttributeError):
         raise InputError(
-            f"{file}: the names of its columns cannot be read; take DeepLabCut's CSV instead"
+            f"{file}: the names of its columns cannot be read; use DeepLabCut's CSV instead"
         ) from None
     if len(names) != count or any(len(name) not in (3, 4) for name in names):
         raise InputError(
-            f"{file}: names of {len(names)} columns for {count} columns; take the CSV instead"
+            f"{file}: has {len(names)} column names for {count} columns; use the CSV instead"
         )
     return [("" if len(name) == 3 else name[1], name[-2], name[-1]) for name in names]
 

@@ -2,17 +2,22 @@
 
 from typing import Literal
 
+from snakewalk.controller.track.readers.bvh import is_bvh
+from snakewalk.controller.track.readers.marker_tables import is_trc
 from snakewalk.controller.track.readers.markers import is_qtm
 
 KNOWN = (
     "a CSV of midlines (t, frame, point, x_m, y_m), a SLEAP CSV (frame_idx, <keypoint>.x, "
-    "<keypoint>.y), analysis HDF5 or project (.slp), a DeepLabCut CSV or HDF5, a WCON (JSON), an "
-    ".npz or MATLAB .mat (points or angles_rad or x and y, with rate_hz; or skeletons), an .npy of "
-    "joint angles (frames, joints), or markers as QTM's TSV or a C3D"
+    "<keypoint>.y), analysis HDF5 or project (.slp), a DeepLabCut CSV or HDF5. Also: a WCON "
+    "(JSON), an .npz or MATLAB .mat (points or angles_rad or x and y, with rate_hz; or skeletons), "
+    "an .npy of joint angles (frames, joints). Or markers: QTM's TSV, Vicon's CSV, a TRC or a C3D. "
+    "Or a BVH skeleton"
 )
 """What a file of a recording may be, for faults and help."""
 
-Format = Literal["zip", "npy", "hdf5", "mat", "json", "csv", "qtm", "c3d", "empty", "binary"]
+Format = Literal[
+    "zip", "npy", "hdf5", "mat", "json", "csv", "qtm", "c3d", "trc", "bvh", "empty", "binary"
+]
 """``zip`` is an .npz or a zipped WCON; ``binary`` and ``empty`` are no recordings."""
 
 HEAD_BYTES = 128
@@ -37,4 +42,8 @@ def format_of(head: bytes) -> Format:
         return "binary"
     if is_qtm(head):
         return "qtm"
+    if is_bvh(head):
+        return "bvh"
+    if is_trc(head):
+        return "trc"
     return "json" if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{") else "csv"

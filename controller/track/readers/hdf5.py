@@ -36,7 +36,7 @@ def load_hdf5(
             if tables:
                 return load_group(file, tables[0], rate_hz, least_score, choice)
             if any(isinstance(g, h5py.Group) and "block0_values" in g for g in held.values()):
-                raise InputError(f"{file}: holds hand labels; take DeepLabCut's CSV of them")
+                raise InputError(f"{file}: contains hand labels; use DeepLabCut's CSV of them")
             arrays = {
                 name: _from_matlab(data)
                 for name, data in held.items()

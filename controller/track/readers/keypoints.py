@@ -21,7 +21,7 @@ KEYPOINT_RATE_HZ = 30.0
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 """Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
 _MISSING = 0.25  # of the keypoints, at least one: so many may be missing in a frame
-_FEWEST = 4  # points that a curve goes through
+FEWEST = 4  # points that a curve goes through
 _ZIGZAG = 1.5  # from which the order is none of a body
 _TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
 
@@ -90,9 +90,9 @@ class Choice:
             raise InputError(
                 f"{file}: --keypoints: it has no {', '.join(unknown)}; it has {', '.join(nodes)}"
             )
-        if len(set(self.keypoints)) < len(self.keypoints) or len(self.keypoints) < _FEWEST:
+        if len(set(self.keypoints)) < len(self.keypoints) or len(self.keypoints) < FEWEST:
             raise InputError(
-                f"{file}: --keypoints: expected {_FEWEST} or more names along the midline, head "
+                f"{file}: --keypoints: expected {FEWEST} or more names along the midline, head "
                 f"first, each once; it has {', '.join(nodes)}"
             )
         return [list(nodes).index(name) for name in self.keypoints]
@@ -135,6 +135,8 @@ class Keypoints:
     """(T,) frame numbers; None: 0, 1, 2..."""
     scale_m: float | None = None
     """Metres in a unit of the places; None: not known."""
+    notes: tuple[str, ...] = ()
+    """Lines about parts that the reader left out or changed."""
 
     def sure(self, order: Sequence[int]) -> Floats:
         """(T, N, 2) keypoints by index, NaN where they are missing or not sure.
@@ -191,6 +193,7 @@ class Keypoints:
             scale_m=self.scale_m,
             rate_assumed=self.rate_hz is None,
             status=status,
+            notes=self.notes,
         )
 
 
@@ -218,7 +221,7 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
     """
     lost = np.asarray(~np.isfinite(places).all(axis=2))
     count = places.shape[1]
-    most = min(max(1, int(_MISSING * count)), count - _FEWEST)
+    most = min(max(1, int(_MISSING * count)), count - FEWEST)
     able = lost.any(axis=1) & (lost.sum(axis=1) <= most) & ~(lost[:, 1:] & lost[:, :-1]).any(axis=1)
     step = np.hypot(*np.diff(places, axis=1).transpose(2, 0, 1))
     known = np.isfinite(step).any(axis=0)

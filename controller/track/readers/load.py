@@ -9,9 +9,11 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
+from snakewalk.controller.track.readers.bvh import load_bvh
 from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, format_of
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded, generate
 from snakewalk.controller.track.readers.keypoints import ALL, Choice, Keypoints
+from snakewalk.controller.track.readers.marker_tables import load_trc
 from snakewalk.controller.track.readers.markers import load_c3d, load_qtm
 from snakewalk.controller.track.readers.tables import load_csv
 from snakewalk.controller.track.readers.wcon import load_wcon, zipped_text
@@ -112,7 +114,8 @@ def load_keypoints(
     found = _loaded(Path(path), rate_hz, least_score, choice)
     if not isinstance(found, Keypoints):
         raise InputError(
-            f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM or C3D"
+            f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM, Vicon, TRC "
+            "or C3D"
         )
     return found
 
@@ -156,6 +159,10 @@ def _loaded(
             return load_csv(file, rate_hz, least_score, choice)
         case "qtm":
             return load_qtm(file, rate_hz, choice)
+        case "bvh":
+            return load_bvh(file, rate_hz, choice)
+        case "trc":
+            return load_trc(file, rate_hz, choice)
         case "c3d":
             return load_c3d(file, rate_hz, choice)
         case _:

@@ -2,21 +2,34 @@
 
 A TSV begins with lines of a name and its values (``FREQUENCY``, ``MARKER_NAMES``, ...), a line of
 column names may follow, then rows of x, y, z of each marker, mm; some exports begin rows with frame
-and time. 0, 0, 0 and nothing are missing. C3D is read by ezc3d.
+and time. 0, 0, 0 and nothing are missing. C3D is read by ezc3d. ``marker_tables`` reads Vicon's CSV
+and OpenSim's TRC.
 """
 
 import csv
 import math
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.track.readers.keypoints import PLANES, Choice, Keypoints
+from snakewalk.controller.track.readers.keypoints import FEWEST, PLANES, Choice, Keypoints
 
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+MISSING = {"", "nan", "null", "na", "n/a", "-", "none"}
+_UNLABELLED = re.compile(
+    r"\*\d*|uname\*?\d+|unlabell?ed[ _-]?\d*|unknown[ _-]?\d*|unnamed[ _-]?\d*|new \d{4}",
+)
+"""Names that programs give to markers without a label: ``*17``, ``uname*4``, ``New 0012``."""
+_STILL = 0.02
+"""Part of the others' usual way in which a marker counts as one that does not move (ours)."""
+_JOINED, _NEAR = 0.1, 3.0
+"""Largest change of the distance to a neighbour on a body, and largest distance, in spacings of
+markers (ours)."""
 _FIRST_WORDS = {"NO_OF_FRAMES", "NO_OF_MARKERS", "FREQUENCY", "MARKER_NAMES", "DATA_INCLUDED"}
 
 
@@ -33,29 +46,22 @@ def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     except (UnicodeDecodeError, csv.Error):
         raise InputError(f"{file}: is no TSV in UTF-8") from None
     about: dict[str, list[str]] = {}
-    while lines and lines[0][0].isupper() and not _number(lines[0][0]):
+    while lines and lines[0][0].isupper() and not number_or_none(lines[0][0]):
         row = lines.pop(0)
         about[row[0].strip()] = [cell.strip() for cell in row[1:]]
     names = [name for name in about.get("MARKER_NAMES", []) if name]
     if about.get("DATA_INCLUDED", ["3D"])[0] != "3D" or not names:
         raise InputError(f"{file}: expected QTM's 3D data with MARKER_NAMES")
     before = 0
-    if lines and not any(_number(cell) for cell in lines[0]):
+    if lines and not any(number_or_none(cell) for cell in lines[0]):
         titles = [cell.strip().lower() for cell in lines.pop(0)[:2]]  # of the columns
         before = len([one for one in titles if one in {"frame", "time"}])
     if not lines or min(map(len, lines)) < before + 3:
         raise InputError(f"{file}: expected rows of x, y, z of {len(names)} markers, in mm")
-    places = np.full((len(lines), len(names), 3), np.nan)
-    for k, row in enumerate(lines):
-        for n, cell in enumerate(row[before : before + 3 * len(names)]):
-            text = cell.strip()
-            if text and text.lower() not in {"nan", "null"}:
-                value = _number(text)
-                if value is None:
-                    raise InputError(f"{file}: row {k + 1}: expected a number, found {text!r}")
-                places[k, n // 3, n % 3] = value
-    stated = _number((about.get("FREQUENCY") or [""])[0])
-    return _projected(file, names, places, 1e-3, stated if rate_hz is None else rate_hz, choice)
+    places = marker_places(file, [row[before:] for row in lines], len(names), first_line=None)
+    stated = number_or_none((about.get("FREQUENCY") or [""])[0])
+    rate = stated if rate_hz is None else rate_hz
+    return projected(file, names, places, 1e-3, rate, choice)
 
 
 def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
@@ -73,37 +79,125 @@ def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     except Exception as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(f"{file}: is no C3D that can be read: {reason}") from None
-    if unit not in _UNITS:
-        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(_UNITS)}")
-    return _projected(
-        file, names[: places.shape[1]], places, _UNITS[unit], rate_hz or stated or None, choice
+    if unit not in UNITS:
+        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
+    return projected(
+        file, names[: places.shape[1]], places, UNITS[unit], rate_hz or stated or None, choice
     )
 
 
-def _projected(
+def marker_places(
+    file: Path, rows: Sequence[Sequence[str]], markers: int, *, first_line: int | None
+) -> Floats:
+    """(T, K, 3) cells of rows as places; NaN where a cell says that a marker was not seen.
+
+    Args:
+        file: for faults.
+        rows: of x, y, z of each marker.
+        markers: K.
+        first_line: line of the file in which the rows begin; None: rows are counted from 1.
+
+    Raises:
+        InputError: a cell is not a number.
+
+    """
+    places = np.full((len(rows), markers, 3), np.nan)
+    for k, row in enumerate(rows):
+        for n, cell in enumerate(row[: 3 * markers]):
+            text = cell.strip()
+            if text.lower() in MISSING:
+                continue
+            value = number_or_none(text)
+            if value is None:
+                where = f"row {k + 1}" if first_line is None else f"line {first_line + k}"
+                raise InputError(f"{file}: {where}: expected a number, found {text!r}")
+            places[k, n // 3, n % 3] = value
+    return places
+
+
+def projected(
     file: Path,
     names: list[str],
     places: Floats,
     scale_m: float,
     rate_hz: float | None,
     choice: Choice,
+    frame: Ints | None = None,
 ) -> Keypoints:
-    """Markers (T, K, 3) seen at right angles to a plane."""
+    """Markers (T, K, 3) seen at right angles to a plane.
+
+    Without a choice of keypoints, markers without a label and markers that do not move are left
+    out, and named in the notes.
+    """
     plane = choice.plane or "xy"
     if plane not in PLANES:
         raise InputError(f"{file}: --plane {plane}: expected one of {', '.join(PLANES)}")
     places = np.where((places == 0.0).all(axis=2)[..., None], np.nan, places)
+    notes: list[str] = []
+    if choice.keypoints is None:
+        kept, notes = _labelled_and_moving(names, places)
+        if len(kept) < FEWEST and notes:
+            raise InputError(
+                f"{file}: {len(kept)} markers have a label and move, a body needs {FEWEST}; say "
+                f"--keypoints with those of the midline, head first, of {', '.join(names)}"
+            )
+        names, places = [names[k] for k in kept], places[:, kept]
     return Keypoints(
         file,
         names,
         places[..., list(PLANES[plane])],
         None,
         rate_hz=rate_hz,
+        frame=frame,
         scale_m=scale_m,
+        notes=tuple(notes),
     )
 
 
-def _number(text: str) -> float | None:
+def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int], list[str]]:
+    """Markers with a label that move, and a line about each kind of the others."""
+    every = range(len(names))
+    without = [k for k in every if is_unlabelled(names[k])]
+    rest = [k for k in every if k not in without]
+    seen = [k for k in rest if np.isfinite(places[:, k]).any()]
+    still = _still(places, seen)
+    notes = []
+    for left, why in ((without, "without a label"), (still, "that do not move")):
+        if left:
+            listed = ", ".join(names[k] or "(no name)" for k in left)
+            notes.append(f"{len(left)} markers {why} are left out: {listed}; --keypoints uses them")
+    return [k for k in rest if k not in still], notes
+
+
+def _still(places: Floats, seen: Sequence[int]) -> list[int]:
+    """Markers that do not move and keep a distance to none of those that do.
+
+    A body's head may be held in one place; the marker next to it then stays at one distance.
+    """
+    if len(seen) < FEWEST:
+        return []
+    extent = np.nanmax(places, axis=0) - np.nanmin(places, axis=0)
+    way = np.linalg.norm(extent, axis=1)
+    usual = float(np.median(way[list(seen)]))
+    moving = [k for k in seen if way[k] >= _STILL * usual]
+    spacing = float(np.nanmedian(np.linalg.norm(np.diff(places[:, moving], axis=1), axis=2)))
+    found = []
+    for k in seen:
+        if k not in moving:
+            gap = np.linalg.norm(places[:, moving] - places[:, k, None], axis=2)
+            near = np.nanmean(gap, axis=0) < _NEAR * spacing
+            if not (near & (np.nanstd(gap, axis=0) < _JOINED * spacing)).any():
+                found.append(k)
+    return found
+
+
+def is_unlabelled(name: str) -> bool:
+    """Whether a program made this name for a marker that nobody named."""
+    return not name.strip() or _UNLABELLED.fullmatch(name.strip().lower()) is not None
+
+
+def number_or_none(text: str) -> float | None:
+    """Return the finite number that a text is, or None."""
     try:
         value = float(text)
     except ValueError:

@@ -10,10 +10,16 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.marker_tables import is_vicon, load_vicon
+from snakewalk.controller.track.readers.markers import MISSING
 from snakewalk.controller.track.readers.sleap import load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
-_MIDLINE = {("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0}
+_MIDLINE: dict[tuple[str, str], float | None] = {
+    **{("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0},
+    ("x_lengths", "y_lengths"): None,
+}
+"""Columns of places, and metres in their unit; None: body lengths, without a scale."""
 
 
 def load_csv(
@@ -22,9 +28,12 @@ def load_csv(
     """Load a CSV of any of these kinds; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if row]
+            every = list(csv.reader(stream))
     except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{file}: is no recording; known: {KNOWN}") from None
+        raise InputError(f"{file}: is not a recording; known: {KNOWN}") from None
+    if is_vicon(every):
+        return load_vicon(file, every, rate_hz, choice)
+    rows = [row for row in every if row]
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
     if is_deeplabcut(rows):
@@ -51,7 +60,7 @@ def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     for line, row in enumerate(rows[1:], start=2):
         for k, index in enumerate(columns):
             cell = row[index].strip() if index < len(row) else ""
-            if cell.lower() in {"", "na", "nan"}:
+            if cell.lower() in MISSING:
                 continue
             try:
                 table[line - 2, k] = float(cell)
@@ -63,7 +72,7 @@ def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     return table
 
 
-def _midline(file: Path, table: Floats, scale_m: float, rate_hz: float | None) -> Track:
+def _midline(file: Path, table: Floats, scale_m: float | None, rate_hz: float | None) -> Track:
     """Rows of t (s), frame, point, x, y; point 1 is the head."""
     if not np.isfinite(table[:, :3]).all():
         lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())

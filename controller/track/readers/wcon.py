@@ -62,7 +62,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         raise InputError(f"{file}: a recording needs 2 or more times, found {len(bodies)}")
     lost = sum(not math.isfinite(at) for at, _ in bodies)
     if lost:
-        raise InputError(f"{file}: {lost} of {len(bodies)} times t are no finite numbers")
+        raise InputError(f"{file}: {lost} of {len(bodies)} times t are not finite numbers")
     bodies.sort(key=lambda body: body[0])
     time = second * np.array([at for at, _ in bodies])
     step = float(np.median(np.diff(time)))

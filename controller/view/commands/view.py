@@ -27,7 +27,8 @@ def view(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="LOG [LOG]", help="log.mcap of a run, or the .part of a killed one; or of two"
+            metavar="LOG [LOG]",
+            help="log.mcap of a run, or the .part of a killed one; or of two runs",
         ),
     ],
     view_at: ViewAt = VIEW_AT,
@@ -36,14 +37,14 @@ def view(
 
     Two logs are shown side by side, or over each other if they have the same ground.
 
-    A run is shown while it lasts by --view of run, gait run and play.
+    To watch a run, use --view of run, gait run and play.
     """
     host, port = host_and_port(view_at)
     if len(logs) > _MOST:
         raise InputError(f"{len(logs)} logs: the page shows one or two; more: snakewalk compare")
     records = {}
     for log, name in zip(logs, log_names(logs), strict=True):
-        records[name] = read_log(log)
+        records[name] = read_log(log).from_torque_on()
         if records[name].note:
             LOGGER.warning("%s: %s", log, records[name].note)
     page = LogPage(records, host, port)

@@ -202,7 +202,7 @@ def test_the_surface_through_a_meshs_curves_wears_its_colours(tmp_path: Path) ->
         (("worm-like", "-o", "a.glb", "--frame", "-5"), "--frame: is for --image and --posed"),
         (("shark", "-o", "a.glb", "--fps", "0"), "--fps: is for --animate"),
         (("worm-like", "-o", "a.glb", "--posed", "--animate", "worm-like"), "--posed: --animate"),
-        (("shark", "-o", "a.glb", "--curves", "5"), "curves: a body with round tips takes 12"),
+        (("shark", "-o", "a.glb", "--curves", "5"), "curves: a body with round tips needs 12"),
         (("shark", "-o", "a.glb", "--order", "9"), "order 1 (creased), 2 or 3, not 9"),
         (("none.obj", "-o", "a.glb"), "none.obj: no such file"),
         (("none.toml", "-o", "a.glb"), "none.toml: no such file"),

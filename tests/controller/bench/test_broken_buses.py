@@ -1,6 +1,6 @@
 """Simulated buses, each broken in one way, and what the doctor says of it; healthy ones besides.
 
-The kinds are the rows of the table in `docs/driver.md`.
+The kinds are the rows of the table in `docs/reference/doctor-faults.md`.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ from snakewalk.sim.servo.protection import SupplyAndAmbient
 from snakewalk.sim.servo.supply import Cabling
 
 ROBOT = RobotConfig(name="four", joint_axes="ypyp")
-PAGE = Path(__file__).parents[3] / "docs" / "driver.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "doctor-faults.md"
 Plant = Callable[["TestLine"], None]
 
 

@@ -160,7 +160,7 @@ def test_nobody_answers(line: Recorder) -> None:
 def test_a_rate_that_the_wire_does_not_carry(line: Recorder) -> None:
     assert of(doctor(line, rate_hz=5000.0), "wire budget").grade == "fail"
     longest = chain_budget(4, 1_000_000, fast=True)  # 10 bytes of state, 4 of a check
-    assert f"{longest.cycle_s * 1e3:.2f} ms a cycle" in of(doctor(line), "wire budget").found
+    assert f"{longest.cycle_s * 1e3:.2f} ms per cycle" in of(doctor(line), "wire budget").found
     budget = wire_budget(16, 1_000_000, fast=True)
     assert adapter.wire(budget, 250.0).grade == "warn"
     assert "at most 281 Hz" in adapter.wire(budget, 50.0).found

@@ -1,4 +1,4 @@
-"""Faults beyond the first table of ``docs/driver.md``, and sound buses that give no alarm.
+"""Further faults of ``docs/reference/doctor-faults.md``, and sound buses that give no alarm.
 
 The kinds are the rows of the second table of that page.
 """
@@ -139,7 +139,7 @@ FURTHER = [
         "an adapter slower than configured",
         later([], 0.012),
         "response time",
-        "the driver waits 4 ms: a run takes all of them for lost",
+        "the driver waits 4 ms: a run loses all of them",
         "fail",
     ),
     Kind(
@@ -233,7 +233,7 @@ FURTHER = [
         {"servos": 6, "start_rad": [0.0] * 6},
     ),
     Kind(
-        "a device that is no servo",
+        "a device other than a servo",
         registers(("ID", 4, 9), ("Model Number", 4, 9999)),
         "servo IDs",
         "ID 9 is model number 9999, not a known servo model",

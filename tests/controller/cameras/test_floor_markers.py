@@ -176,7 +176,7 @@ def test_two_markers_tell_nothing_and_markers_that_disagree_stop_the_pose() -> N
     assert found is not None
     assert not found.bump.undone
     lost = replace(DETECTOR, bump=found.bump).track(PICTURE, 0.0, prior(), ROBOT)
-    assert "set the camera up anew" in lost.fault
+    assert "set the camera up again" in lost.fault
 
 
 @pytest.mark.parametrize(

@@ -105,9 +105,8 @@ def test_joints_alone_are_told_to_be_off(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "port", "line"),
     [
-        ({"pose": "camera", "world": "jacksboro-basin"}, None, "needs a bare level floor"),
-        ({"pose": "camera", "world": "pole"}, None, "needs a bare level floor"),
-        ({"pose": "camera", "world": "pool"}, None, "needs a bare level floor"),
+        ({"pose": "camera", "world": "pole"}, None, "dry ground without obstacles"),
+        ({"pose": "camera", "world": "pool"}, None, "dry ground without obstacles"),
         ({"pose": "simulator"}, "/dev/nosuch", "servos on a port have no simulator"),
         ({"pose": "camera"}, "/dev/nosuch", "camera: device: needed with servos on a port"),
         ({"pose": "camera", "camera": {"height_m": 0.25, "field_width_m": 1.0}}, None, "height_m"),
@@ -131,7 +130,7 @@ def test_what_cannot_work_is_refused_before_anything_is_written(
     ("arguments", "line"),
     [
         (("run", "flat-square", "--pose", "sonar"), "pose"),
-        (("run", "jacksboro-traverse", "--pose", "camera"), "bare level floor"),
+        (("run", "flat-square", "--world", "pole", "--pose", "camera"), "without obstacles"),
     ],
 )
 def test_the_command_line_says_what_is_wrong_in_one_line(

@@ -12,8 +12,11 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
+from snakewalk.controller.capture.recording import examine
 from snakewalk.controller.capture.scale import scale_of_marker
 from snakewalk.controller.images.video import open_footage
+from snakewalk.controller.track.analysis import analyse
+from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.load import load_track
 from tests.helpers.command import snakewalk
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
@@ -203,7 +206,7 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
         ({"head": "200,10"}, "outside the images, which have 200 x 160 pixels"),
         ({"head": "10,-1"}, "outside the images"),
         ({"head": "5,5", "roi": "40,30,120,100"}, "outside --roi and --mask"),
-        ({"background": "junk.png"}, "is no image"),
+        ({"background": "junk.png"}, "is not a readable image"),
     ],
 )
 def test_bad_options_are_told_before_any_work(
@@ -218,3 +221,50 @@ def test_bad_options_are_told_before_any_work(
     with pytest.raises(InputError, match=said):
         capture_recording(options)
     assert not (tmp_path / "t.npz").exists()
+
+
+def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path) -> None:
+    """Some frames of a colour film are exactly grey: they become two-dimensional arrays."""
+    folder = tmp_path / "film"
+    folder.mkdir()
+    for number, frame in enumerate(film(SCENE)):
+        coloured = np.dstack([frame] * 3)
+        if number % 2:
+            coloured[0, 0] = (0, 10, 20)
+        cv2.imwrite(str(folder / f"{number}.png"), coloured)
+    options = CaptureOptions(folder, tmp_path / "t.npz", rate_hz=15.0, roi="2,2,190,150")
+    facts = capture_recording(options)
+    assert facts.frames_used == SCENE.frames
+    assert facts.head_by == "travel"
+
+
+def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
+    swim: Path, tmp_path: Path
+) -> None:
+    fixed, cropped = (tmp_path / name for name in ("fixed.npz", "cropped.npz"))
+    assert capture_recording(CaptureOptions(swim, fixed)).places_recorded
+    assert not capture_recording(CaptureOptions(swim, cropped, cropped=True)).places_recorded
+    found = analyse(load_track(str(cropped)))
+    assert found.travel is None
+    assert found.sliding is None
+    assert found.travel_not_told == "places are not recorded"
+    assert analyse(load_track(str(fixed))).travel_not_told != "places are not recorded"
+    again = tmp_path / "again.npz"
+    save_track(again, load_track(str(cropped)))
+    assert not load_track(str(again)).places_recorded
+    assert load_track(str(again)).head_sure == load_track(str(cropped)).head_sure
+
+
+def test_a_head_that_is_not_sure_is_a_warning(
+    swim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(
+        "snakewalk.controller.capture.capture.head_end", lambda *_, **__: (0.19, "taper")
+    )
+    track = tmp_path / "t.npz"
+    facts = capture_recording(CaptureOptions(swim, track))
+    assert facts.head_sure == 0.19
+    assert facts.warning is not None
+    assert facts.warning in caplog.text
+    assert "head and tail may be exchanged" in facts.warning
+    assert examine(str(track)).facts.head_sure == 0.19

@@ -159,7 +159,10 @@ def test_wrong_files_and_options_are_refused(folder: Path, tmp_path: Path) -> No
     for options, said in (
         (CaptureOptions(track, new, corrections=junk), "is no JSON"),
         (CaptureOptions(track, new, corrections=tmp_path / "no.json"), "No such file"),
-        (CaptureOptions(track, new, corrections=junk, roi="1,2,3,4"), "belong to a film"),
+        (
+            CaptureOptions(track, new, corrections=junk, roi="1,2,3,4"),
+            "leave the other options out",
+        ),
         (CaptureOptions(track, track, corrections=junk), "exists; --force"),
         (CaptureOptions(track, tmp_path / "a.csv", corrections=junk), "a track is an .npz"),
     ):
@@ -217,6 +220,9 @@ def test_a_person_flips_drops_drags_and_saves(
         page.keyboard.press("]")
         page.keyboard.press("x")
         page.get_by_text("1 flipped, 3 left out, 1 redrawn, not saved").wait_for()
+        page.get_by_role("button", name="in the whole film").click()
+        page.get_by_text("14 flipped, 3 left out, 1 redrawn, not saved").wait_for()
+        page.keyboard.press("Control+z")
         page.keyboard.press("Control+z")
         page.get_by_text("1 flipped, 1 left out, 1 redrawn, not saved").wait_for()
         with page.expect_download() as waiting:

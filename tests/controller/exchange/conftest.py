@@ -103,7 +103,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.add(PoseSourceTable, 0.3, sequence=4, fault="jump by 0.50 m", **source)
         file.add(WaypointTable, 0.2, waypoints_m=[[2.0, 1.0], [0.0, 3.0]])
         file.add(PathTable, 0.2, points_m=[[0.0, 1.0, 0.5], [2.0, 2.0, 0.4]])
-        walk = {"heading_error_rad": 0.2, "ramp_rad": -0.1, "eta_q": 0.7}
+        walk = {"heading_error_rad": 0.2, "ramp_rad": -0.1, "eta_q": 0.7, "carrier_rad": 1.1}
         file.add(WalkTable, 0.3, state=5, visited=2, candidates=4, **walk)
         friction = {"along_95": (0.11, 0.15), "across_95": (0.5, 0.6)}
         file.add(FrictionTable, 0.3, along=0.13, across=0.56, **friction)

@@ -93,7 +93,7 @@ def test_paths_diagnostics_and_events(bag: Messages) -> None:
     assert [p.pose.position.x for p in first.poses] == [0.0, 2.0]
     assert [p.pose.position.z for p in second.poses] == [0.5, 0.4]
     assert stamp_ns(second.header.stamp) == 200_000_000
-    worst = bag["/diagnostics"][-1][1].status[3]
+    worst = bag["/diagnostics"][-1][1].status[4]
     level = worst.level if isinstance(worst.level, int) else ord(worst.level)
     assert (level, worst.message) == (2, "hardware error 0x20")
     assert {v.key: v.value for v in worst.values} == {"temperature_c": "31", "voltage_v": "12"}

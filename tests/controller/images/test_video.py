@@ -10,6 +10,7 @@ import pytest
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
 from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.image_sequence import frame_numbers_of
 from snakewalk.controller.images.video import frame_times, in_8_bits, open_footage
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_track
@@ -119,3 +120,35 @@ def test_a_film_of_variable_rate_becomes_a_track_with_its_times(tmp_path: Path) 
     assert track.uneven
     assert track.time_s[-1] == pytest.approx(0.245, abs=0.5 / track.rate_hz)
     assert not load_track(str(tmp_path / "t.npz"), 30.0).uneven
+
+
+def test_all_pages_of_a_stack_are_frames(tmp_path: Path) -> None:
+    pages = [np.full((20, 30), value, dtype=np.uint8) for value in (10, 60, 110, 160)]
+    stack = tmp_path / "stack.tif"
+    assert cv2.imwritemulti(str(stack), pages)
+    footage = open_footage(stack, 5.0)
+    assert footage.count == 4
+    assert [int(frame[0, 0]) for frame in footage.read()] == [10, 60, 110, 160]
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for number in (1, 2):
+        cv2.imwritemulti(str(folder / f"{number}.tif"), [p + np.uint8(number) for p in pages])
+    both = open_footage(folder)
+    assert [int(f[0, 0]) for f in both.read()] == [11, 61, 111, 161, 12, 62, 112, 162]
+    assert both.missing == 0
+    deep = tmp_path / "deep.tif"
+    assert cv2.imwritemulti(str(deep), [p.astype(np.uint16) * 16 for p in pages])
+    levels = [float(frame[0, 0]) for frame in open_footage(deep).read()]
+    assert np.allclose(np.diff(levels), levels[1] - levels[0])
+    assert levels[1] > levels[0]
+
+
+def test_missing_numbers_are_counted_and_keep_their_time(tmp_path: Path) -> None:
+    for number in (8, 9, 10, 13, 14):
+        cv2.imwrite(str(tmp_path / f"shot_{number}.png"), np.full((20, 30), number, np.uint8))
+    footage = open_footage(tmp_path, 10.0)
+    assert footage.missing == 2
+    assert [at for _, at in footage.timed()] == pytest.approx([0.0, 0.1, 0.2, 0.5, 0.6])
+    even = [Path(f"{number:03}.png") for number in range(0, 60, 10)]
+    assert frame_numbers_of(even) is None
+    assert frame_numbers_of([*even[:3], Path("other.png")]) is None

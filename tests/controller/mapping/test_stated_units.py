@@ -282,7 +282,7 @@ def test_more_samples_than_a_map_holds_are_not_read(tmp_path: Path) -> None:
         pass  # nothing is written: a sparse file
     with pytest.raises(InputError, match="cells are over 16000000: give a --spacing of 2 cells"):
         read(tmp_path / "a.tif")
-    with pytest.raises(InputError, match=r"samples are over 4000000: take a --spacing of 15 m"):
+    with pytest.raises(InputError, match=r"samples are over 4000000; use a --spacing of 15 m"):
         read(tmp_path / "a.tif", spacing_m=3.0)
     with pytest.raises(InputError, match=r"no cell holds a height|fewer than"):
         read(tmp_path / "a.tif", spacing_m=100.0, crop=(0, 0, 500, 500), no_data=0.0)
@@ -315,7 +315,7 @@ def test_decimal_commas_are_read_where_commas_can_be_nothing_else(tmp_path: Path
 def test_a_cell_that_is_no_number_is_named_by_row_and_column(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text("# of a garden\nx,y,z\n1,2,3\n\n4,five,6\n")
-    with pytest.raises(InputError, match="line 5, column 2: 'five' is no number"):
+    with pytest.raises(InputError, match="line 5, column 2: 'five' is not a number"):
         read_numbers(file)
     file.write_text("1,2,3\n4,5\n")
     with pytest.raises(InputError, match="line 2 holds 2 numbers, line 1 holds 3"):
@@ -343,7 +343,7 @@ def test_points_of_a_depth_camera_are_no_terrain_as_they_are(tmp_path: Path) -> 
     with pytest.raises(InputError, match=r"is a picture of 120 by 120 points, .* add --up -y"):
         read(file)
     loose = pcd(tmp_path / "b.pcd", room(), 120 * 120, 1)
-    with pytest.raises(InputError, match=r"is no ground seen from above: \d+ % .* --up AXIS"):
+    with pytest.raises(InputError, match=r"is not ground seen from above: \d+ % .* --up AXIS"):
         read(loose, spacing_m=0.1)
     turned = read(file, up="-y", spacing_m=0.1, height="highest")
     assert turned.relief_m == pytest.approx(3.0, abs=0.1)  # the wall, up from the floor

@@ -145,7 +145,7 @@ def test_a_plan_on_paper_says_that_it_knows_no_ground() -> None:
         ({"robot": load_robot("alternating16")}, "has no stereo head.*alternating16-stereo"),
         ({"world": load_world("flat")}, "is level; there is nothing to map"),
         ({"pose": "joints"}, "pose joints knows no heights"),
-        ({"motion": "walk-blind"}, "plans once; take walk or serpenoid"),
+        ({"motion": "walk-blind"}, "plans only once; use walk or serpenoid"),
     ],
 )
 def test_what_cannot_map_is_refused(

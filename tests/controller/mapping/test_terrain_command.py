@@ -81,7 +81,7 @@ def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path: Path) -> None:
         (("--cell", 0.1, "--picture", tmp_path / "a.txt"), "a picture ends in"),
         ((), "--cell"),
         (("--cell", 1, "--spacing", 0.001), "are over 4000000"),
-        (("--cell", 0.1, "--unit", "deg"), "says no latitude"),
+        (("--cell", 0.1, "--unit", "deg"), "states no latitude"),
     ):
         assert expected in refused(*words, *more)
     assert "a world's file ends in .toml" in refused("terrain", "from", file, "-o", "w")
@@ -127,7 +127,7 @@ def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path
     for more, expected in (
         (("--unit", "mm", "--height", 1), "--height and --tilt belong together"),
         (("--unit", "mm", "--roll", 3), "--roll belongs to --height and --tilt"),
-        (("--unit", "px"), "is none of m, cm, mm"),
+        (("--unit", "px"), "is unknown; use one of m, cm, mm"),
         (("--unit", "mm", "--error", 0), "--error 0: must be above 0"),
         (("--unit", "mm", "--error", 1e-6), "nothing in the pictures is matched, or all is too"),
     ):

@@ -52,6 +52,19 @@ def test_speed_counts_only_while_the_shape_moves(record: RunRecord) -> None:
     span_s = pose.time_s[moving[-1]] - pose.time_s[moving[0]]
     travelled = travelled_m(pose, moving[0], moving[-1])
     assert summary(record).speed_m_s == pytest.approx(travelled / span_s, rel=1e-5)
+    assert summary(record).travelled_m == pytest.approx(travelled, rel=1e-5)
+
+
+def test_the_start_into_the_first_shape_is_no_distance(record: RunRecord) -> None:
+    pose, moves = record.pose, record.pose.pulse_m_s > 0.0
+    first = int(np.flatnonzero(moves)[0])
+    assert first > 20
+    swung_m = pose.centre_m.copy()
+    rest = np.arange(first - 10)
+    swung_m[rest, 1] += 0.3 * np.sin(0.15 * rest)  # as a delay that is not known yet
+    swung = dataclasses.replace(record, pose=dataclasses.replace(pose, centre_m=swung_m))
+    assert travelled_m(swung.pose) > travelled_m(pose) + 0.2
+    assert summary(swung).travelled_m == pytest.approx(summary(record).travelled_m, rel=0.01)
 
 
 def test_a_trip_is_the_outcome(make: Make, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from snakewalk.controller.motion.command import (
     JointTrajectory,
     Refused,
     StartGait,
+    Velocity,
 )
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
@@ -93,7 +94,7 @@ def test_goals_are_reached_without_overshoot_and_other_joints_keep_theirs() -> N
 @pytest.mark.parametrize(
     ("command", "why"),
     [
-        (JointGoals(["joint3", "elbow"], [0.1, 0.1]), "elbow is no joint of alternating16"),
+        (JointGoals(["joint3", "elbow"], [0.1, 0.1]), "robot alternating16 has no joint elbow"),
         (JointGoals(["joint3", "joint3"], [0.1, 0.2]), "names a joint twice"),
         (JointGoals([], []), "names no joint"),
         (JointGoals(["joint3", "joint4"], [0.1]), "2 names and 1 positions"),
@@ -112,11 +113,14 @@ def test_goals_are_reached_without_overshoot_and_other_joints_keep_theirs() -> N
         (points((1.0, 0.5), velocity_rad_s=np.array([[1.0]])), "velocities there must be 0"),
         (points((1.0, 0.5), velocity_rad_s=np.array([[math.nan]])), "is not a number"),
         (points((1.0, 0.5), velocity_rad_s=np.zeros((2, 1))), "needs 1 positions"),
-        (points((1.0, 0.5), acceleration_rad_s2=np.zeros((1, 1))), "need velocities"),
-        (points((1.0, 0.5), joint="elbow"), "elbow is no joint"),
+        (
+            points((1.0, 0.5), acceleration_rad_s2=np.zeros((1, 1))),
+            "has accelerations but no velocities",
+        ),
+        (points((1.0, 0.5), joint="elbow"), "has no joint elbow"),
         (JointTrajectory(["joint3"], np.arange(1.0, 502.0), np.zeros((501, 1))), "1 to 500"),
         (JointTrajectory(["joint3"], np.zeros(0), np.zeros((0, 1))), "1 to 500"),
-        (StartGait(make_gait("helix-pole")), "takes soft servos"),
+        (StartGait(make_gait("helix-pole")), "needs soft servos"),
         (StartGait(make_gait("trot")), "two pairs of legs"),
     ],
 )
@@ -232,7 +236,11 @@ COMMANDS = st.one_of(
         st.floats(0.05, 2.0),
     ),
     st.sampled_from(
-        [HoldStill(), *(StartGait(make_gait(name)) for name in ("rolling", "sidewinding"))]
+        [
+            HoldStill(),
+            *(Velocity(*pair) for pair in ((0.02, 0.0), (0.1, 0.08), (-0.1, 0.05), (0.0, 0.0))),
+            *(StartGait(make_gait(name)) for name in ("rolling", "sidewinding")),
+        ]
     ),
 )
 

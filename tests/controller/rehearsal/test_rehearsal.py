@@ -13,6 +13,7 @@ from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.rehearsal import rehearsal
 from snakewalk.controller.rehearsal.commands import rehearse as rehearse_command
 from snakewalk.controller.rehearsal.judgement import judge, true_arrivals
+from snakewalk.controller.rehearsal.metric_errors import metric_errors
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
@@ -73,6 +74,19 @@ def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> N
     assert found.is_true
     assert found.pose_error_rms_m is not None
     assert found.pose_error_rms_m < 0.03
+    metrics = metric_errors(truth, first.record, first.summary)
+    assert metrics is not None
+    assert metrics.distance_m == first.summary.travelled_m
+    assert metrics.true_distance_m == pytest.approx(found.travelled_m, abs=0.1)
+    assert metrics.distance_m == pytest.approx(metrics.true_distance_m, abs=0.1)
+    assert metrics.eta == pytest.approx(metrics.true_eta, rel=0.2)
+    assert metrics.alarms == metrics.true_alarms == 0
+    still = replace(truth, head_m=np.tile(truth.head_m[:1], (len(truth.time_s), 1)))
+    lost = metric_errors(still, first.record, first.summary)
+    assert lost is not None
+    assert lost.true_eta is not None
+    assert metrics.true_eta is not None
+    assert lost.true_eta < 0.5 * metrics.true_eta
     moved_m = truth.centre_m + np.array([0.0, 3.0, 0.0])
     wrong = judge(replace(truth, centre_m=moved_m), first.record, None, first.summary.outcome)
     assert (wrong.truly_reached, wrong.claimed) == (0, 1)
@@ -167,7 +181,7 @@ def test_results_are_continued(
         assert len(done) == total
     assert len(out.read_text().splitlines()) == 3
     out.write_text(out.read_text() + "{}\n")
-    with pytest.raises(InputError, match="line 4 is no rehearsal"):
+    with pytest.raises(InputError, match="line 4 is not a rehearsal"):
         rehearse_command.rehearse_runs([str(run_file)], seeds=3, out=out)
 
 

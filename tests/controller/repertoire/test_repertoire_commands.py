@@ -43,7 +43,10 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
     [
         (("plan", "--with", "physics"), "--with physics: unknown; valid: repertoire"),
         (("plan", "flat-slalom", "--with", "repertoire"), "snakewalk repertoire record"),
-        (("plan", "flat-slalom", "--with", "repertoire", "--motion", "walk"), "takes no --motion"),
+        (
+            ("plan", "flat-slalom", "--with", "repertoire", "--motion", "walk"),
+            "does not use --motion",
+        ),
         (("plan", "flat-slalom", "--run"), "belong to --with repertoire"),
         (("repertoire", "record", "--world", "jacksboro-gentle"), "flat one"),
         (("repertoire", "record", "-o", "no/where.npz"), "no such folder"),

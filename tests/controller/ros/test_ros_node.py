@@ -110,7 +110,7 @@ class Graph:
             name="ros",
             keys=keys,
         )
-        with _spinning(self.node, self.robot.reject):
+        with _spinning(self.node, self.robot.commands.reject):
             finished = execute(prepared, folder, port, view=self, on_progress=on_progress)
             self._end.close(1.0)
             with suppress(EOFError):
@@ -147,7 +147,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
     stopped: list[int] = []
 
     def arrived() -> None:
-        client.until(lambda: graph.robot._pending)
+        client.until(lambda: graph.robot.commands.pending)
 
     def says(text: str) -> bool:
         return any(text in status.message for one in told for status in one.status)
@@ -307,29 +307,29 @@ def test_the_path_in_force_waits_for_whoever_comes_late(
 def test_nothing_is_taken_before_the_run_has_begun(graph: Graph, client: Client) -> None:
     stop = client.node.create_client(Trigger, "/snakewalk/stop")
     goals = client.node.create_publisher(JointState, "/robot_joint_command", 10)
-    with _spinning(graph.node, graph.robot.reject):
+    with _spinning(graph.node, graph.robot.commands.reject):
         client.until(lambda: stop.service_is_ready() and goals.get_subscription_count())
         answer = stop.call_async(Trigger.Request())
         goals.publish(JointState(name=["joint0"], position=[0.1]))
-        client.until(lambda: answer.done() and graph.robot._pending)
+        client.until(lambda: answer.done() and graph.robot.commands.pending)
     assert not answer.result().success
-    assert answer.result().message == "there is no run to stop yet"
-    assert graph.robot._pending[0].why == "joint goals: the run has not begun"
+    assert answer.result().message == "no run has begun yet"
+    assert graph.robot.commands.pending[0].why == "joint goals: the run has not begun"
 
 
 def test_of_goals_of_the_same_joints_the_newest_waits_for_the_run(graph: Graph) -> None:
-    graph.robot._cycles = 1
+    graph.robot.commands.has_begun = True
     for k in range(100):
-        graph.robot._goals(JointState(name=["joint0"], position=[0.01 * k]))
-    graph.robot._gait(String(data=""))
+        graph.robot.commands.on_goals(JointState(name=["joint0"], position=[0.01 * k]))
+    graph.robot.commands.on_gait(String(data=""))
     for k in range(100):
-        graph.robot._goals(JointState(name=[f"joint{k % 2}"], position=[0.3]))
-    waiting = list(graph.robot._pending)
+        graph.robot.commands.on_goals(JointState(name=[f"joint{k % 2}"], position=[0.3]))
+    waiting = list(graph.robot.commands.pending)
     assert len(waiting) == 16  # joints in turn are not the same
-    graph.robot._pending.clear()
+    graph.robot.commands.pending.clear()
     for k in range(100):
-        graph.robot._goals(JointState(name=["joint0"], position=[0.01 * k]))
-    assert [list(each.position_rad) for each in graph.robot._pending] == [[0.99]]
+        graph.robot.commands.on_goals(JointState(name=["joint0"], position=[0.01 * k]))
+    assert [list(each.position_rad) for each in graph.robot.commands.pending] == [[0.99]]
 
 
 def test_rows_that_come_late_by_chance_do_not_shift_the_stamps() -> None:
@@ -416,11 +416,11 @@ def test_no_message_ends_the_run_or_silences_the_stop_service(
         client.until(lambda: stop.service_is_ready() and gaits.get_subscription_count())
         client.until(goals.get_subscription_count)
         client.until(trajectories.get_subscription_count)
-        while not graph.robot._cycles:
+        while not graph.robot.commands.has_begun:
             yield
         for publisher, message, _ in hostile:
             publisher.publish(message)
-            client.until(lambda: graph.robot._pending)
+            client.until(lambda: graph.robot.commands.pending)
             yield
             for _ in range(10):  # so that no line is left out
                 yield

@@ -1,6 +1,8 @@
 """Poses of a ROS 2 topic over real DDS."""
 
 from collections.abc import Callable
+from importlib.util import find_spec
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,13 @@ import pytest
 
 pytest.importorskip("rclpy", reason="rclpy is in the extra ros, for Linux on x86-64")
 
-from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import (
+    Pose,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    TransformStamped,
+    Vector3,
+)
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
@@ -16,7 +24,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.pose.datagram import decode_pose
 from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError, turned
 from snakewalk.controller.ros.ros_pose import RosPose, check_topic
-from snakewalk.controller.ros.ros_pose_node import pose_of
+from snakewalk.controller.ros.ros_pose_node import pose_of, poses_of
 from snakewalk.drivers.clock import WallClock
 from tests.helpers.ros_client import DOMAIN, LOOPBACK, Client
 
@@ -95,6 +103,28 @@ def test_poses_arrive_over_dds(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_topics() -> None:
     check_topic("/tracker/pose")
-    for wrong in ("", "pose", "/", "/a b", "/1"):
+    check_topic("/tf:lab/snake_head")
+    with pytest.raises(InputError, match="name the body's frame"):
+        check_topic("/tf")
+    for wrong in ("", "pose", "/", "/a b", "/1", "/tf:", "/tf:a b"):
         with pytest.raises(InputError, match="expected ros:/TOPIC"):
             check_topic(wrong)
+
+
+def test_the_transforms_of_one_frame_become_poses() -> None:
+    head = TransformStamped(header=header(), child_frame_id="snake_head")
+    at = a_pose().position
+    head.transform.translation = Vector3(x=at.x, y=at.y, z=at.z)
+    head.transform.rotation = a_pose().orientation
+    other = TransformStamped(header=header(), child_frame_id="base")
+    message = SimpleNamespace(transforms=[other, head])  # tf2_msgs has no wheel
+    (pose,) = poses_of(message, "snake_head")
+    assert pose_of(pose, 3, has_covariance=False) == pose_of(
+        KINDS[PoseStamped](), 3, has_covariance=False
+    )
+
+
+@pytest.mark.skipif(find_spec("tf2_msgs") is not None, reason="tf2_msgs is installed")
+def test_transforms_without_their_messages_name_the_package() -> None:
+    with pytest.raises(InputError, match="tf2_msgs is not installed; install ros-jazzy-tf2-msgs"):
+        RosPose().open_feed("/tf:snake_head", WallClock())

@@ -50,6 +50,7 @@ class Load:
 
     def __init__(self, current_a: float, winding_c: float) -> None:
         self.current_a, self._winding_c = current_a, winding_c
+        self.hottest_c = max(25.0, winding_c)
 
     def winding_c(self, state: JointState) -> np.ndarray:
         return np.array([25.0, self._winding_c])

@@ -37,6 +37,6 @@ def test_friction_of_a_heavier_body_takes_current_in_proportion(tmp_path: Path) 
 
 
 def test_a_robot_on_a_port_is_as_it_is(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="deviation: a robot on a port is as it is"):
+    with pytest.raises(InputError, match="deviation: changes a simulated robot only"):
         execute(prepared(mass=1.5), tmp_path / "run", port="/dev/nosuch")
     assert not (tmp_path / "run").exists()

@@ -220,5 +220,5 @@ def test_a_named_pipe_is_not_told_to_be_missing(
         main()
     assert end.value.code == 2
     assert capsys.readouterr().err == (
-        f"snakewalk: {pipe}: is no file but a pipe or a device: put what it gives into a file\n"
+        f"snakewalk: {pipe}: is a pipe or a device; copy its contents into a file\n"
     )

@@ -37,9 +37,9 @@ time_limit_s = 8.0
 
 
 def _from_pages() -> dict[str, str]:
-    """Robot files as ``docs/configuration.md`` and ``docs/driver.md`` print them."""
+    """Robot files as ``configuration.md`` and ``how-to/servos-of-other-kinds.md`` print them."""
     found = {}
-    for name, page in (("my-robot", "configuration"), ("my-xl430", "driver")):
+    for name, page in (("my-robot", "configuration"), ("my-xl430", "how-to/servos-of-other-kinds")):
         text = (_DOCS / f"{page}.md").read_text(encoding="utf-8")
         block = re.search(rf"# {name}\.toml\n(.*?)```", text, re.DOTALL)
         assert block is not None

@@ -55,6 +55,18 @@ class Bend:
         return self.goal_rad()
 
 
+class Listed(Bend):
+    """Returns lists, which no compiled loop accepts."""
+
+    def goal_rad(self) -> Floats:
+        return super().goal_rad().tolist()
+
+
+class Whole(Bend):
+    def velocity_rad_s(self) -> Floats:
+        return np.zeros(len(self.bend_rad), dtype=int)
+
+
 class Lifting(Bend):
     needs = Needs(pitch=True)
 
@@ -198,3 +210,17 @@ def test_actions_run_on_a_port_are_replayed(finished: Finished, tmp_path: Path) 
     run = finished.record.header.run.model_copy(update=fields)
     header = replace(finished.record.header, run=run, initial_pose=None)
     replay(replace(finished.record, header=header), tmp_path / "again.mcap")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (Listed, r"^the motion source: goal_rad\(\) returns a list; return an array of float64"),
+        (Whole, r"velocity_rad_s\(\) returns an array of int64; return an array of float64"),
+    ],
+)
+def test_a_source_that_returns_no_array_of_floats_is_rejected(
+    make: Callable[[RobotConfig], MotionSource], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        prepare_source(make, robot="yaw16").check_plan()

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.reader import LogError, read_log
@@ -68,20 +69,35 @@ def test_cut_anywhere_gives_a_prefix_and_says_so(
     assert len(set(sizes)) >= 5, "a chunk a second"
 
 
-def test_a_flipped_bit_is_noticed(whole: tuple[bytes, RunRecord], tmp_path: Path) -> None:
+def holds_only(part: RunRecord, full: RunRecord) -> int:
+    """Compare the rows that are left with those of the whole log; return how many are lost."""
+    kept = np.isin(full.cycle.time_s, part.cycle.time_s)
+    assert np.array_equal(part.cycle.time_s, full.cycle.time_s[kept])
+    assert np.array_equal(part.cycle.measured_rad, full.cycle.measured_rad[kept])
+    gaps = np.flatnonzero(np.diff(np.flatnonzero(~kept)) > 1)
+    assert len(gaps) == 0, "the rows of one chunk"
+    return int((~kept).sum())
+
+
+def test_a_flipped_bit_is_noticed_and_costs_the_rows_of_its_chunk(
+    whole: tuple[bytes, RunRecord], tmp_path: Path
+) -> None:
     data, full = whole
     path = tmp_path / "bad.mcap"
+    lost = []
     for at in np.linspace(len(data) // 3, len(data) * 2 // 3, 20).astype(int):
         bad = bytearray(data)
         bad[at] ^= 0x10
         path.write_bytes(bad)
         part = read_log(path)
-        rows = len(part.cycle.time_s)
-        assert np.array_equal(part.cycle.measured_rad, full.cycle.measured_rad[:rows])
+        lost.append(holds_only(part, full))
         assert not part.complete
+        assert "damaged" in part.note
+    assert max(lost) <= 60, "a chunk a second, of 220 rows at 50 Hz"
+    assert sum(lost) > 0
 
 
-def test_a_flipped_bit_in_the_name_of_a_later_chunks_packing_costs_what_comes_after(
+def test_a_flipped_bit_in_the_name_of_a_later_chunks_packing_costs_that_chunk(
     whole: tuple[bytes, RunRecord], tmp_path: Path
 ) -> None:
     data, full = whole
@@ -90,7 +106,33 @@ def test_a_flipped_bit_in_the_name_of_a_later_chunks_packing_costs_what_comes_af
     path.write_bytes(data[:at] + b"zctd" + data[at + 4 :])
     part = read_log(path)
     assert not part.complete
-    assert 0 < len(part.cycle.time_s) < len(full.cycle.time_s)
+    assert 0 < holds_only(part, full) <= 60
+    assert "1 damaged parts are left out" in part.note
+
+
+@pytest.mark.parametrize(
+    ("topics", "said"),
+    [
+        (("/joint_states", "/tf"), "of profile 'ros2' with topics /joint_states, /tf, but no log"),
+        ((), "of profile 'ros2' without topics, but no log of snakewalk"),
+    ],
+)
+def test_a_complete_mcap_of_another_program_is_named(
+    topics: tuple[str, ...], said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "other.mcap"
+    writer = Writer(str(path))
+    writer.start(profile="ros2")
+    for topic in topics:
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"float64 x")
+        channel = writer.register_channel(topic, "cdr", schema)
+        writer.add_message(channel, 0, b"\x00\x01\x00\x00", 0)
+    writer.finish()
+    with pytest.raises(LogError, match=f"is a complete MCAP {said}"):
+        read_log(path)
+    path.write_bytes(path.read_bytes()[:-60])
+    with pytest.raises(LogError, match="breaks off"):
+        read_log(path)
 
 
 def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:

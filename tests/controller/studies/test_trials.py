@@ -191,7 +191,7 @@ def test_keys_replace_values_of_a_gait_s_files() -> None:
         ("world.ground.slop_deg", 5, "world ramp-10: ground.ramp.slop_rad: unknown key"),
         ("world.ground.slope_deg", -5, "over 0"),
         ("world.ground.slope_rad", "steep", "must be a number"),
-        ("world.name.first", 1, "name.first: name is no table"),
+        ("world.name.first", 1, "name.first: name is not a table"),
         ("ground.slope_deg", 5, "begins with run., robot. or world."),
         ("robot.servo.baud", 57600, "wire"),
     ],

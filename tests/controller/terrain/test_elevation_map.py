@@ -106,7 +106,7 @@ def test_holes_are_known_as_holes_and_only_narrow_ones_are_filled() -> None:
 
 def test_what_is_too_large_too_small_or_empty_is_refused() -> None:
     points = np.array([(0.0, 0.0, 0.0), (5000.0, 5000.0, 0.0)])
-    with pytest.raises(InputError, match=r"are over 4000000: take a spacing of 2\.5 m or more"):
+    with pytest.raises(InputError, match=r"are over 4000000; use a spacing of 2\.5 m or more"):
         ElevationMap.of_points(points, 1.0)
     with pytest.raises(InputError, match="fewer than 2 by 2"):
         ElevationMap.of_points(points, 1e5)

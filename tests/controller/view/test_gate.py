@@ -105,7 +105,7 @@ def served(request: pytest.FixtureRequest) -> Iterator[tuple[int, str]]:
 
 @pytest.mark.parametrize("host", ["192.0.2.1", "[::1", 70 * "x", "a..b"])
 def test_a_host_that_is_not_here_is_refused(host: str) -> None:
-    with pytest.raises(OSError, match="is no address of this machine, which has"):
+    with pytest.raises(OSError, match="is not an address of this machine; use"):
         open_page(host, 0)
 
 

@@ -260,7 +260,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
             clicked(panel, "waypoint", (0.4, 0.2))
             clicked(panel, "", (2.0, 2.0))  # nothing waits for it
             clicked(panel, "", (40.0, 0.0), "shift")
-            assert "there is no ground where you clicked" in panel._text.content
+            assert "you did not click on the ground" in panel._text.content
         if progress.reached == 2 and "reached" not in at:
             at["reached"] = progress.time_s
             view.page._servos_s = -1.0  # not held back

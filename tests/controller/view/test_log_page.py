@@ -14,13 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import water_surface_m
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.kinematics.legs import leg_segments_m
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.view.log_page import LogPage
+from snakewalk.controller.view.scene import contour_step_m, contours_m
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.solids import Solid, solids
 
@@ -172,3 +175,40 @@ def test_the_command_refuses_in_a_line(
             main()
         assert end.value.code == 2
         assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_the_first_camera_frames_the_body(page: LogPage, record: RunRecord) -> None:
+    page.step(0.05, 0.0)
+    camera, length_m = page.server.initial_camera, record.header.robot.length_m
+    centre_m = record.pose.centre_m[0]
+    assert np.linalg.norm(np.array(camera.look_at) - centre_m) < 0.3 * length_m
+    assert np.linalg.norm(np.array(camera.position) - centre_m) < 1.2 * length_m
+    assert camera.position[2] > centre_m[2] + 0.3 * length_m
+
+
+def test_contours_lie_on_the_ground_at_round_heights() -> None:
+    y, x = np.mgrid[0.0:3.0:31j, 0.0:4.0:41j]
+    field = HeightField(0.3 * np.sin(2.0 * x) * np.cos(1.5 * y), 0.1, 0.0, 0.0)
+    step_m = contour_step_m(field)
+    assert step_m == pytest.approx(0.05)
+    pieces_m = contours_m(field, step_m)
+    levels = pieces_m[..., 2] / step_m
+    np.testing.assert_allclose(levels, np.rint(levels), atol=1e-9)
+    assert set(np.rint(levels).astype(int).ravel()) == set(range(-5, 6))
+    middle_m = pieces_m.mean(axis=1)
+    np.testing.assert_allclose(
+        field.elevation_m(middle_m[:, 0], middle_m[:, 1]), middle_m[:, 2], atol=0.006
+    )
+    assert len(contours_m(HeightField(np.zeros((4, 4)), 0.1, 0.0, 0.0), 0.05)) == 0
+
+
+@pytest.mark.parametrize("is_measured", [True, False])
+def test_the_page_states_how_the_pose_is_known(record: RunRecord, is_measured: bool) -> None:
+    evidence = SIMULATED if is_measured else PoseEvidence(Kind.DEAD_RECKONED, "joints")
+    known = replace(record, header=replace(record.header, pose_evidence=evidence))
+    page = LogPage({"log": known}, "127.0.0.1", 0)
+    page.step(0.05, 0.0)
+    assert f"pose: {evidence.text}" in state(page)
+    assert ("believed: waypoint 1 of 4" in state(page)) != is_measured
+    assert {each.wireframe for each in page._shown[0].scene._waypoints} == {not is_measured}
+    page.server.stop()

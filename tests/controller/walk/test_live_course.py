@@ -144,7 +144,7 @@ def test_a_run_takes_so_many_waypoints_and_no_more() -> None:
     live = Live()
     live.walker.course.waypoints_m = np.ones((WAYPOINTS_MAX, 2))
     live.steps(1, "next=3,3")
-    assert live.said == [("refused", "waypoint (3.00, 3.00): a run takes 1000 at most")]
+    assert live.said == [("refused", "waypoint (3.00, 3.00): a run accepts 1000 at most")]
 
 
 def test_it_tells_of_its_path_what_the_motion_does() -> None:

@@ -107,7 +107,7 @@ def test_a_run_out_of_time_is_told_by_its_way_not_by_a_pulse(tmp_path: Path) -> 
         ({"run.gait.parameters.turn": 0.3}, "turn is what steers it along waypoints; leave it out"),
         ({"run.gait.parameters.turn_rad": 0.3} | SWIMS, "turn_rad is what steers it"),
         ({"run.gait.ashore.name": "sidewinding"}, "sidewinding: not steered"),
-        ({"run.gait.look_heading_rad": 0.3}, "takes no then, look_heading_rad"),
+        ({"run.gait.look_heading_rad": 0.3}, "cannot have then, look_heading_rad"),
     ],
 )
 def test_what_cannot_be_steered_is_refused_before_anything_moves(keys, said) -> None:

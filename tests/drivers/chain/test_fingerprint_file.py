@@ -100,7 +100,7 @@ def test_a_broken_file_is_refused_with_its_remedy(
     line: SimLine, file: FingerprintFile, text: str
 ) -> None:
     file.path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"is no fingerprint file: .*; delete it"):
+    with pytest.raises(ConfigError, match=r"is not a fingerprint file: .*; delete it"):
         start(line, file)
 
 

@@ -183,7 +183,7 @@ def test_a_known_reason_is_reported_instead() -> None:
 
 @pytest.mark.parametrize(
     ("value", "cause"),
-    [(FOREIGN, "another program writes goals"), (11, "its servo does not take the goals")],
+    [(FOREIGN, "another program writes goals"), (11, "its servo ignores the goals")],
 )
 def test_an_explanation_names_one_joint_at_once(value: int, cause: str) -> None:
     rig = Rig()

@@ -84,7 +84,7 @@ def test_a_robot_without_one_has_none() -> None:
 
 def test_one_that_does_not_answer_forbids_the_start() -> None:
     bench = Bench(DUCK, there=False)
-    with pytest.raises(ChainError, match=r"imu \(ID 200\): no answer at 1000000 baud"):
+    with pytest.raises(ChainError, match=r"imu \(ID 200\): no reply at 1000000 baud"):
         bench.link.enable()
     assert not bench.line.bank["Torque Enable"].any()
 

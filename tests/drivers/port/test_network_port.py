@@ -226,7 +226,7 @@ def test_doctor_and_torque_off_over_a_network(
         monkeypatch.setattr(torque_off, "open_port", lambda device, baud: port)
         outcome = torque_off.torque_off(far.url, [BAUD])
         assert outcome.safe
-        assert outcome.text == "torque is off: 3 servos confirm it, 57600 baud"
+        assert outcome.text == "3 servos confirm it at 57600 baud"
         assert far.line.shown("Torque Enable").tolist() == [0, 0, 0]
 
 

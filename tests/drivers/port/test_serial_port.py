@@ -4,6 +4,8 @@ import errno
 import fcntl
 import os
 import struct
+import subprocess
+import sys
 import termios
 import threading
 from collections.abc import Iterator
@@ -12,7 +14,7 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.errors import PortError
-from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.port.serial_port import SerialPort, open_fault
 from snakewalk.sim.line.clock import SimClock
 
 
@@ -259,3 +261,22 @@ def test_who_has_the_port_open_is_named(pair: tuple[int, SerialPort]) -> None:
         SerialPort(name, 57_600)
     assert str(caught.value).startswith(f"{name}: another program has it open: ")
     assert f"{own} (process {os.getpid()})" in str(caught.value)
+
+
+def test_a_command_of_snakewalk_that_has_the_port_open_is_named_with_its_run(
+    pair: tuple[int, SerialPort],
+) -> None:
+    name = pair[1].name
+    program = (
+        "import os, sys, time; os.open(sys.argv[-1], os.O_RDWR); print(flush=True); time.sleep(99)"
+    )
+    words = ["snakewalk", "-c", program, "run", "flat-square", name]
+    with subprocess.Popen(words, executable=sys.executable, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            text = open_fault(name, 57_600, OSError(errno.EBUSY, "busy"))
+        finally:
+            process.kill()
+    assert f"run flat-square {name} (process {process.pid})" in text
+    assert text.endswith(f"; stop it by: snakewalk stop --port {name}")

@@ -180,7 +180,7 @@ def test_a_command_that_fails_hangs_or_is_missing_is_an_error(mocker: MockerFixt
     "text", ["rts", "rts:", "cts:/dev/x", "command:", "command:relay off", "--rts:/dev/x", ""]
 )
 def test_other_texts_are_rejected(text: str) -> None:
-    with pytest.raises(ValueError, match=r"absolute path|no stop output"):
+    with pytest.raises(ValueError, match=r"absolute path|not a stop output"):
         parse_stop_output(text)
     with pytest.raises(Exception, match="stop_output"):
         checked(SafetyConfig, {"stop_output": text}, "test")

@@ -6,9 +6,9 @@ import pytest
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.sim.rendering.film import _scale_m
-from snakewalk.sim.rendering.looks import _contours, _legs
+from snakewalk.sim.rendering.looks import REACHED, _contours, _legs, dressed_model, mark_reached
 from snakewalk.sim.rendering.trail import (
     AXES,
     AXES_GEOMS,
@@ -84,9 +84,29 @@ def test_the_rods_show_the_axes_and_are_as_long_as_they_say() -> None:
     assert [geom.label for geom in scene.geoms[: scene.ngeom] if geom.label] == ["0.2 m", "x", "y"]
     for axis, rgba in enumerate(AXES):
         [rod] = [geom for geom in scene.geoms if np.allclose(geom.rgba, rgba)]
-        assert rod.pos[:2] == pytest.approx([1.0, 2.0] + 0.1 * np.eye(3)[axis, :2])
+        assert rod.pos[:2] == pytest.approx([0.9, 1.9] + 0.1 * np.eye(3)[axis, :2])
         assert rod.mat[:, 2] == pytest.approx(np.eye(3)[axis], abs=1e-6)
         assert rod.size[2] == pytest.approx(0.1)  # half
+
+
+def test_no_hill_covers_a_rod() -> None:
+    scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), maxgeom=AXES_GEOMS)
+    add_axes(scene, np.array([0.3, 0.4]), 0.2, SLOPE)
+    for axis, rgba in enumerate(AXES):
+        [rod] = [geom for geom in scene.geoms if np.allclose(geom.rgba, rgba)]
+        along = np.linspace(-1.0, 1.0, 21)[:, None] * rod.size[2] * np.eye(3)[axis]
+        x, y, z = (rod.pos + along).T
+        assert (z - rod.size[0] >= SLOPE.elevation_m(x, y) - 1e-6).all()
+
+
+@pytest.mark.parametrize("hollow", [False, True])
+def test_waypoints_whose_arrival_is_not_measured_are_hollow(hollow: bool) -> None:
+    robot, world = load_robot("yaw16"), load_world("flat")
+    model = dressed_model(robot, world, None, [(1.0, 0.0)], hollow=hollow)
+    mark_reached(model, 0)
+    opacity = {name: model.geom(name).rgba[3] for name in ("waypoint0", "waypoint0ring1")}
+    assert opacity == dict.fromkeys(opacity, 0.0 if hollow else 1.0)
+    assert tuple(model.geom("waypoint0ring0").rgba) == pytest.approx(REACHED)
 
 
 @pytest.mark.parametrize(("length_m", "scale_m"), [(1.2, 0.2), (0.6, 0.1), (0.04, 0.005), (5, 1)])

@@ -148,7 +148,7 @@ def test_the_command_writes_reports_and_does_not_overwrite(tmp_path: Path) -> No
         (["nosuch.npz", "-o", "b.glb"], "nosuch.npz: no such file"),
         (["t.npz", "-o", "b.stl"], "written as .obj or .glb"),
         (["t.npz", "-o", "b.glb", "--image", "none.png"], "none.png: no such file"),
-        (["t.npz", "-o", "b.glb", "--image", "t.npz"], "no picture that can be read"),
+        (["t.npz", "-o", "b.glb", "--image", "t.npz"], "not a readable picture"),
         (["t.npz", "-o", "b.glb", "--image", "small.png"], "does not lie in this picture"),
         (["t.npz", "-o", "b.glb", "--posed", "--frame", "7"], "frame 7 is not in 0..1"),
         (["t.npz", "-o", "b.glb", "--aspect", "0"], "aspect: height over width"),

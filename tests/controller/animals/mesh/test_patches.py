@@ -100,7 +100,7 @@ def test_paired_fins_are_mirror_images() -> None:
 
 
 def test_useless_patches_are_refused() -> None:
-    with pytest.raises(InputError, match="4 curves or more"):
+    with pytest.raises(InputError, match="4 or more at increasing stations"):
         Tube.through(rings()[:3], np.linspace(0, 1, 3))
     with pytest.raises(InputError, match="order 1"):
         Tube.through(rings(), np.linspace(0, 1, 7), order=4)

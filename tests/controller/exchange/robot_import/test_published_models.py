@@ -312,7 +312,7 @@ def test_stated_torque_and_speed_limit_a_plan(tmp_path: Path) -> None:
     assert noted(made, "torque of a plan: the model states 4 N m; a XM430-W350 holds 3.565")
     made = imported(tmp_path, urdf().replace('effort="4"', 'effort="3000000"'))
     assert made.robot.torque_limit_n_m == pytest.approx(4.1 * 2.0 / 2.3, abs=1e-3)
-    assert noted(made, "the model states 3e+06 N m, which is no servo's; a XM430-W350 holds 3.565")
+    assert noted(made, "the model states 3e+06 N m, which no servo has; a XM430-W350 holds 3.565")
 
 
 def test_inertias_that_no_body_has_do_not_matter(tmp_path: Path) -> None:
@@ -357,7 +357,7 @@ def test_legs_come_back_as_limbs(tmp_path: Path, name: str) -> None:
     [
         (('axis="-1.0 0 0"', 'axis="0 1 0"'), "of leg link11: its axis is neither upright nor"),
         (('pos="0.0 -0.035 0"', 'pos="0.02 -0.035 0.02"'), "off the straight leg at zero angles"),
-        (('pos="0.0 -0.035 0"', 'pos="0.0 -0.05 0"'), "are no mirror images of each other"),
+        (('pos="0.0 -0.035 0"', 'pos="0.0 -0.05 0"'), "are not mirror images"),
     ],
 )
 def test_legs_that_a_robot_file_cannot_express_are_named(

@@ -85,7 +85,7 @@ def test_a_body_without_its_currents_still_tells_the_ratio(record: RunRecord) ->
 def test_what_tells_no_friction_is_refused(record: RunRecord, log: Path, tmp_path: Path) -> None:
     header = record.header
     estimated = replace(header, run=header.run.model_copy(update={"pose": "imu"}))
-    with pytest.raises(InputError, match="estimated by imu, which takes friction as known"):
+    with pytest.raises(InputError, match="estimated by imu, which assumes the friction"):
         FrictionLog.of(replace(record, header=estimated))
     on_metal = replace(header, backend="dynamixel")
     with pytest.raises(InputError, match="estimated by the IMU or the joints"):
@@ -100,8 +100,8 @@ def test_what_tells_no_friction_is_refused(record: RunRecord, log: Path, tmp_pat
         FrictionLog.of(replace(record, pose=still))
     recording = tmp_path / "kp200.json"
     recording.write_text("{}")
-    assert "give one kind at a time" in refused(log, recording)
-    assert "--start and --no-fit are of pendulums" in refused(log, "--start", recording)
+    assert "give one kind" in refused(log, recording)
+    assert "--start and --no-fit: are for pendulums" in refused(log, "--start", recording)
     assert "end its name with .toml" in refused(log, "-o", tmp_path / "a.json")
     assert "a pendulum has none" in refused(recording, "--world", "flat")
     assert "No such file" in refused(tmp_path / "none.mcap")

@@ -140,7 +140,7 @@ def test_what_is_refused(files: list[Path], tmp_path: Path) -> None:
     bad.write_text('{"kp": 200, "entries": []}')
     assert "mass: is missing" in refused(bad)
     bad.write_text(json.dumps({"mass": 1, "length": 1, "kp": 1, "entries": [{"position": 1}]}))
-    assert "is no log of a pendulum" in refused(bad)
+    assert "is not a log of a pendulum" in refused(bad)
     bad.write_text(json.dumps(BAM | {"model": "m7"}))
     assert "model is 'm7'" in refused(files[0], "--start", bad)
     bad.write_text(json.dumps(BAM | {"kt": "much"}))

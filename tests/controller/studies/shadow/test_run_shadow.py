@@ -88,6 +88,6 @@ def test_a_robot_as_told_is_its_shadow_and_a_shadow_changes_nothing(tmp_path: Pa
 
 def test_ground_on_which_a_shadow_means_nothing_is_refused(tmp_path: Path) -> None:
     prepared = replace(short_run(1.0), world=load_world("ramp-10"))
-    with pytest.raises(InputError, match="a shadow needs a level, open floor"):
+    with pytest.raises(InputError, match="a shadow needs a level floor without obstacles"):
         execute.execute(prepared, tmp_path / "run", shadow=True, stoppable=False)
     assert not (tmp_path / "run").exists()

@@ -1,0 +1,73 @@
+"""A body at rest on known ground: its height and attitude from its place and its shape."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.links import SpineLinks
+from snakewalk.drivers.attitude import rotation_by
+from snakewalk.drivers.types import BodyPose
+
+Heights = Callable[[Floats], Floats]
+"""Heights (...,) of the ground at places (..., 2)."""
+_ROUNDS: Final = 3
+_LEAST_SPREAD_M2: Final = 4e-4
+"""A body narrower than this across its line tells nothing about the slope across it (ours)."""
+
+
+def heights_of(ground: HeightField | None) -> Heights | None:
+    """Return the heights of known ground, NaN where a place is NaN; None for a level floor."""
+    if ground is None:
+        return None
+
+    def heights(places_m: Floats) -> Floats:
+        known = np.asarray(np.isfinite(places_m).all(axis=-1))
+        at = np.where(known[..., None], places_m, 0.0)
+        return np.where(known, ground.elevation_m(at[..., 0], at[..., 1]), np.nan)
+
+    return heights
+
+
+class GroundRest:
+    """Lays a body on the ground: the plane of its links fits the ground under them."""
+
+    def __init__(self, robot: RobotConfig, heights: Heights | None) -> None:
+        self._spine, self._heights = SpineLinks.of(robot), heights
+        self._radius_m = robot.body_radius_m
+
+    def pose(self, place: Floats, joint_rad: Floats, time_s: float) -> BodyPose:
+        """Return the pose of the head link from its place (3,): x, y, heading."""
+        c, s = np.cos(place[2]), np.sin(place[2])
+        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        head_m = np.array([*place[:2], self._radius_m])
+        if self._heights is None:
+            return BodyPose(time_s, head_m, rotation)
+        for _ in range(_ROUNDS):
+            links_m = self._spine.in_world(BodyPose(time_s, head_m, rotation), joint_rad).link_m
+            above_m = self._heights(links_m[:, :2]) + self._radius_m - links_m[:, 2]
+            lift_m, slope = _plane(links_m[:, :2] - head_m[:2], above_m)
+            head_m[2] += lift_m
+            rotation = rotation_by(np.array([slope[1], -slope[0], 0.0])) @ rotation
+            # tilting turns the head a little about the vertical; its heading is measured
+            turn = place[2] - np.arctan2(rotation[1, 0], rotation[0, 0])
+            rotation = rotation_by(np.array([0.0, 0.0, np.arctan2(np.sin(turn), np.cos(turn))])) @ (
+                rotation
+            )
+        return BodyPose(time_s, head_m, rotation)
+
+
+def _plane(places_m: Floats, values_m: Floats) -> tuple[float, Floats]:
+    """Return height at the origin and slope (2,) of the plane that fits values at places (n, 2).
+
+    A direction along which the places hardly spread has no slope of its own.
+    """
+    middle = places_m.mean(axis=0)
+    off = places_m - middle
+    spread, axes = np.linalg.eigh(off.T @ off / len(off))
+    moment = axes.T @ (off.T @ (values_m - values_m.mean()) / len(off))
+    slope = axes @ np.where(spread > _LEAST_SPREAD_M2, moment / np.maximum(spread, 1e-12), 0.0)
+    return float(values_m.mean() - slope @ middle), slope

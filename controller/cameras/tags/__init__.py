@@ -1,0 +1,1 @@
+"""Printed tags on the links of a robot: a pose source with six degrees of freedom."""

@@ -1,0 +1,79 @@
+"""Printed tags in a picture: the corners of those that a robot or a world has."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
+
+Corners = Mapping[int, Floats]
+"""Corners (4, 2) of each tag by its number, pixels: upper left of the print first, clockwise."""
+_LEAST_PX: Final = 8.0
+"""Tags with a shorter side are left out: their numbers are guesses (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TagPicture:
+    """The tags of one picture."""
+
+    time_s: float
+    """When the picture was taken."""
+    corners_px: Corners
+
+
+def tag_dictionary(name: str) -> Any:
+    """Return OpenCV's dictionary ``DICT_name``.
+
+    Raises:
+        InputError: OpenCV has no such dictionary.
+
+    """
+    number = getattr(cv2.aruco, f"DICT_{name}", None)
+    if not isinstance(number, int):
+        raise InputError(
+            f"tags: dictionary: {name}: OpenCV has no DICT_{name}; use for example 4X4_50 or "
+            "APRILTAG_36h11"
+        )
+    return cv2.aruco.getPredefinedDictionary(number)
+
+
+class TagDetector:
+    """Finds tags in pictures."""
+
+    def __init__(self, dictionary: str, known: Collection[int]) -> None:
+        """Look for the tags with the numbers ``known``.
+
+        Raises:
+            InputError: OpenCV has no such dictionary, or it has no tag with such a number.
+
+        """
+        tags = tag_dictionary(dictionary)
+        beyond = [number for number in known if number >= len(tags.bytesList)]
+        if beyond:
+            raise InputError(
+                f"tags: tag {beyond[0]}: {dictionary} has the numbers 0 to "
+                f"{len(tags.bytesList) - 1}"
+            )
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        self._known = frozenset(known)
+        self._detector = cv2.aruco.ArucoDetector(tags, parameters)
+
+    def find(self, picture: Image) -> dict[int, Floats]:
+        """Return the corners of each tag in a picture (H, W[, 3]) that shows it once."""
+        grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        corners, numbers, _ = self._detector.detectMarkers(grey)
+        found: dict[int, Floats] = {}
+        twice = set()
+        for square, number in zip(corners, () if numbers is None else numbers.ravel(), strict=True):
+            at = np.asarray(square, dtype=float).reshape(4, 2)
+            if number not in self._known or np.hypot(*(at - np.roll(at, 1, 0)).T).min() < _LEAST_PX:
+                continue
+            if int(number) in found:
+                twice.add(int(number))
+            found[int(number)] = at
+        return {number: at for number, at in found.items() if number not in twice}

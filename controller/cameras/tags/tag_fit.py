@@ -1,0 +1,245 @@
+"""The pose of the head from the tags of one picture and the measured joint angles.
+
+The joints turn the tags on all links into one rigid set of corners, in the axes of the head.
+A square alone has two poses with nearly the same picture (IPPE); each of them places the whole
+chain, and the one is taken under which the other tags are seen where they are. If only one tag is
+seen, the pose before decides, and without one the attitude that is nearer to upright. All corners
+then give the pose by least squares, with its covariance.
+
+[IPPE] T. Collins, A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 109, 2014.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.tags import TagMount
+from snakewalk.controller.cameras.tags.tag_detector import Corners
+from snakewalk.controller.cameras.tags.tag_view import TagView, square
+from snakewalk.controller.kinematics.links import SpineLinks
+from snakewalk.controller.pose.sample import turned
+from snakewalk.drivers.attitude import rotation_by
+from snakewalk.drivers.types import BodyPose
+
+_TRIED: Final = 3
+"""Tags whose poses are tried, the largest in the picture first (ours)."""
+_MISFIT: Final = 6.0
+"""A tag farther off than this many standard deviations is left out (ours)."""
+_AMBIGUOUS: Final = 2.0
+"""Poses whose errors differ by a smaller factor are ambiguous (ours)."""
+_ROUNDS: Final = 3
+_ROBUST_ROUNDS: Final = 10
+_NEAR_M: Final = 0.02
+"""Least distance ahead of the lens (ours)."""
+_JOINT_SD_M, _JOINT_SD_RAD = 1e-3, 5e-3
+"""Error of the chain that all corners share: backlash and mounting (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeadFit:
+    """Pose of the head link in the world, from one picture."""
+
+    position_m: Floats
+    """(3,)"""
+    rotation: Floats
+    """(3, 3)"""
+    covariance: Floats
+    """(6, 6) of position (m) and of rotations about the world's axes (rad)."""
+    error_px: float
+    """Root of the mean square distance of the corners from their places."""
+    tags: tuple[int, ...]
+    """Numbers of the tags that were used."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Corners of some tags: in the axes of the head, and in the picture."""
+
+    tags: tuple[int, ...]
+    points_m: Floats
+    """(4 k, 3)"""
+    pixels: Floats
+    """(4 k, 2) without distortion."""
+
+    def only(self, keep: Bools) -> "_Seen":
+        """Return the tags of a mask."""
+        tags = tuple(tag for tag, is_kept in zip(self.tags, keep, strict=True) if is_kept)
+        corners = np.repeat(keep, 4)
+        return _Seen(tags, self.points_m[corners], self.pixels[corners])
+
+
+class TagFit:
+    """Finds the head from the tags on a robot's links."""
+
+    def __init__(self, robot: RobotConfig, view: TagView) -> None:
+        assert robot.tags is not None
+        self._spine, self._tags = SpineLinks.of(robot), robot.tags
+        self._mounts = {tag.id: tag for tag in robot.tags.on}
+        self.view = view
+
+    def fit(
+        self, corners_px: Corners, joint_rad: Floats, before: Floats | None = None
+    ) -> HeadFit | None:
+        """Return the head's pose; None if no tag of the robot is seen, or none fits.
+
+        Args:
+            corners_px: of the tags in the picture.
+            joint_rad: (J,) when it was taken.
+            before: (3, 3) attitude of the head in an earlier picture, if there is one.
+
+        """
+        seen = self._seen(corners_px, joint_rad)
+        while seen.tags:
+            start = self._start(seen, before)
+            if start is None:
+                return None
+            robust = self._refined(seen, *start, weighted=True)
+            good = self._per_tag_px(seen, *robust) <= _MISFIT * self._tags.noise_px
+            if good.all():
+                pose = self._refined(seen, *robust)
+                error_px = float(np.sqrt((self._off_px(seen, *pose) ** 2).mean()))
+                return self._result(seen, *pose, error_px)
+            seen = seen.only(good)
+        return None
+
+    def of_link(self, corners_px: Corners) -> tuple[int, HeadFit] | None:
+        """Return a link and its pose from its largest tag alone; None if no tag is seen.
+
+        A tag has two poses; the one nearer to upright is returned.
+        """
+        for number in self._seen(corners_px, np.zeros(len(self._spine.half_m) - 1)).tags:
+            mount = self._mounts[number]
+            points = tag_corners(mount, self._tags.side_m)
+            pixels = self.view.lens.undistorted(corners_px[number])
+            seen = _Seen((number,), points, pixels)
+            start = self._start(seen, None)
+            if start is not None:
+                return mount.link, self._result(seen, *start, 0.0)
+        return None
+
+    def _seen(self, corners_px: Corners, joint_rad: Floats) -> _Seen:
+        body = self._spine.in_world(BodyPose(0.0, np.zeros(3), np.eye(3)), joint_rad)
+        numbers = [number for number in corners_px if number in self._mounts]
+        area = {number: abs(cv2.contourArea(corners_px[number].astype(np.float32)))
+                for number in numbers}  # fmt: skip
+        numbers.sort(key=lambda number: -area[number])
+        if not numbers:
+            return _Seen((), np.zeros((0, 3)), np.zeros((0, 2)))
+        points = [
+            body.link_m[tag.link] + tag_corners(tag, self._tags.side_m) @ body.rotation[tag.link].T
+            for tag in (self._mounts[number] for number in numbers)
+        ]
+        pixels = self.view.lens.undistorted(np.concatenate([corners_px[n] for n in numbers]))
+        return _Seen(tuple(numbers), np.concatenate(points), pixels)
+
+    def _start(self, seen: _Seen, before: Floats | None) -> tuple[Floats, Floats] | None:
+        """Return the better of the poses that single tags allow, in the axes of the camera."""
+        found = []
+        for turn, at in self._candidates(seen):
+            off = self._off_px(seen, turn, at)
+            found.append((float(np.sqrt((off**2).mean())), turn, at))
+        if not found:
+            return None
+        best = min(error for error, _, _ in found)
+        close = [
+            one for one in found if one[0] <= _AMBIGUOUS * max(best, self._tags.noise_px)
+        ]  # each explains the picture
+        if len(close) == 1:
+            return close[0][1:]
+        in_world = [self.view.rotation @ turn for _, turn, _ in close]
+        # the trace grows as the angle between two attitudes falls
+        likely = [turn[2, 2] if before is None else float(np.trace(before.T @ turn))
+                  for turn in in_world]  # fmt: skip
+        return close[int(np.argmax(likely))][1:]
+
+    def _candidates(self, seen: _Seen) -> Iterator[tuple[Floats, Floats]]:
+        flat = square(self._tags.side_m)
+        for k in range(min(_TRIED, len(seen.tags))):
+            rows = slice(4 * k, 4 * k + 4)
+            count, turns, shifts, _ = cv2.solvePnPGeneric(
+                flat, seen.pixels[rows], self.view.lens.matrix, None,
+                flags=cv2.SOLVEPNP_IPPE_SQUARE,
+            )  # fmt: skip
+            axes, middle = _axes_of(seen.points_m[rows])
+            for turn, shift in zip(turns[:count], shifts[:count], strict=True):
+                rotation = cv2.Rodrigues(turn)[0] @ axes.T
+                yield rotation, shift.ravel() - rotation @ middle
+
+    def _refined(
+        self, seen: _Seen, turn: Floats, at: Floats, *, weighted: bool = False
+    ) -> tuple[Floats, Floats]:
+        """Fit all corners; ``weighted``: tags that are far off count less (Cauchy's weights)."""
+        scale_px = _MISFIT * self._tags.noise_px
+        for _ in range(_ROBUST_ROUNDS if weighted else _ROUNDS):
+            off, slope = self._off_px(seen, turn, at).ravel(), self._slope(seen, turn, at)
+            if weighted:
+                share = 1.0 / (1.0 + (self._per_tag_px(seen, turn, at) / scale_px) ** 2)
+                root = np.sqrt(np.repeat(share, 8))
+                off, slope = root * off, root[:, None] * slope
+            step = np.asarray(np.linalg.lstsq(slope, -off, rcond=None)[0], dtype=float)
+            at, turn = at + step[:3], rotation_by(step[3:]) @ turn
+        return turn, at
+
+    def _per_tag_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
+        """Return the root of the mean square error of each tag's corners."""
+        off = self._off_px(seen, turn, at).reshape(len(seen.tags), 8)
+        return np.asarray(np.sqrt((off**2).mean(axis=1)))
+
+    def _off_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
+        """Return the errors (4 k, 2) of the corners."""
+        places = seen.points_m @ turn.T + at
+        ahead = np.maximum(places[:, 2:], _NEAR_M)
+        shown = places[:, :2] / ahead @ self.view.lens.matrix[:2, :2].T
+        return np.asarray(shown + self.view.lens.matrix[:2, 2] - seen.pixels)
+
+    def _slope(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
+        """Return the derivatives (8 k, 6) by position and by rotation, in the camera's axes."""
+        arm = seen.points_m @ turn.T
+        x, y, z = (arm + at).T
+        z = np.maximum(z, _NEAR_M)
+        zero = np.zeros_like(x)
+        shown = np.stack(
+            [np.stack([1.0 / z, zero, -x / z**2], 1), np.stack([zero, 1.0 / z, -y / z**2], 1)], 1
+        )
+        by_place = self.view.lens.matrix[:2, :2] @ shown
+        a, b, c = arm.T
+        by_turn = np.stack(
+            [np.stack([zero, c, -b], 1), np.stack([-c, zero, a], 1), np.stack([b, -a, zero], 1)], 1
+        )
+        return np.concatenate([by_place, by_place @ by_turn], axis=2).reshape(-1, 6)
+
+    def _result(self, seen: _Seen, turn: Floats, at: Floats, error_px: float) -> HeadFit:
+        slope = self._slope(seen, turn, at)
+        noise_px = max(self._tags.noise_px, error_px)
+        inner = noise_px**2 * np.linalg.inv(slope.T @ slope)
+        axes = self.view.rotation
+        both = np.zeros((6, 6))
+        both[:3, :3] = both[3:, 3:] = axes
+        shared = np.diag([_JOINT_SD_M**2] * 3 + [_JOINT_SD_RAD**2] * 3)
+        covariance = both @ inner @ both.T + shared
+        return HeadFit(
+            self.view.place_m + axes @ at,
+            axes @ turn,
+            0.5 * (covariance + covariance.T),
+            error_px,
+            seen.tags,
+        )
+
+
+def tag_corners(tag: TagMount, side_m: float) -> Floats:
+    """Return the corners (4, 3) of a tag in the axes of its link."""
+    return np.array(tag.offset_m) + square(side_m) @ turned(tag.offset_deg).T
+
+
+def _axes_of(corners: Sequence[Floats] | Floats) -> tuple[Floats, Floats]:
+    """Return axes (3, 3) and middle (3,) of a square from its corners (4, 3)."""
+    upper_left, upper_right, lower_right, lower_left = corners
+    right, top = upper_right - upper_left, upper_left - lower_left
+    right, top = right / np.linalg.norm(right), top / np.linalg.norm(top)
+    middle = 0.25 * (upper_left + upper_right + lower_right + lower_left)
+    return np.column_stack([right, top, np.cross(right, top)]), middle

@@ -1,0 +1,167 @@
+"""A film's skeletons checked against the pixels of their own frames."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.capture.identity import margin_of
+from snakewalk.controller.capture.verification.frame_store import FrameStore
+from snakewalk.controller.capture.verification.lines import possible_form
+from snakewalk.controller.capture.verification.profiles import BodyProfile, body_profile
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
+
+REJECTED = {FrameStatus.EMPTY, FrameStatus.KNOT, FrameStatus.LENGTH}
+"""Statuses of frames whose finished skeleton was rejected here."""
+_SAMPLE = 60  # frames from which the usual contrast is learnt
+_USUAL = 75.0  # percentile of the frames: some may lie on empty ground
+_LEAST_LEVELS = 2.0  # grey levels between the body and the ground on either side, in the mean
+_SHARE = 0.3  # of the usual contrast, in the mean on either side
+_NOISE = 3.0  # standard errors of the ground's noise
+_FAINT = 0.15  # of the usual contrast there: the body does not stand out
+_STRETCH = 5  # stations that are averaged
+_ONE_SIDE, _BOTH_SIDES = 25, 10  # stations of a stretch that does not stand out
+_KNOWN = 0.4  # of the stations: with fewer that show ground a side is not judged
+_BEYOND = 0.5  # of the contrast at a tip: what goes on beyond it is body
+_LENGTH, _SPREADS = 0.08, 6.0  # of the usual length; standard deviations
+_FEWEST = 5
+_CONTRADICTS = 0.2  # margin of the ends from which one frame says which is which
+_NEAR = 3  # frames, at most, between those whose ends are compared
+
+
+@dataclass(frozen=True, slots=True)
+class _Usual:
+    """What the film's bodies usually show."""
+
+    direction: Floats
+    """(C,) how the channels are weighted: the body is above 0."""
+    contrast: Floats
+    """(101,) along the body."""
+
+
+def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]:
+    """The skeletons; without points where the frame contradicts them, the status says why.
+
+    Args:
+        skeletons: (T) head first.
+        store: the frames.
+
+    """
+    out = agreeing_ends(skeletons)
+    used = [k for k, one in enumerate(out) if one.status.has_points]
+    for k in used:
+        if not possible_form(out[k]):
+            out[k] = no_skeleton(FrameStatus.KNOT)
+    _check_lengths(out)
+    used = [k for k, one in enumerate(out) if one.status.has_points]
+    some = used[:: max(1, len(used) // _SAMPLE)]
+    shown = [_profile(out[k], store, k) for k in some]
+    usual = _usual([one for one in shown if one is not None])
+    if usual is None:
+        return out
+    for k in used:
+        profile = _profile(out[k], store, k)
+        if profile is None:
+            continue
+        status = _verdict(profile, usual)
+        if status is not FrameStatus.GOOD:
+            out[k] = no_skeleton(status)
+    return out
+
+
+def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
+    """The skeletons, reversed where head and tail contradict the frame before for sure.
+
+    A body does not change its ends from one frame to the next. Of both directions the one of most
+    frames is kept.
+    """
+    used = [k for k, one in enumerate(skeletons) if one.status.has_points]
+    sign = np.ones(len(skeletons), dtype=int)
+    for before, k in pairwise(used):
+        against = margin_of(skeletons[k], skeletons[before]) < -_CONTRADICTS
+        sign[k] = -sign[before] if against and k - before <= _NEAR else sign[before]
+    wrong = -1 if sign[used].sum() >= 0 else 1
+    return [
+        one.reversed() if one.status.has_points and sign[k] == wrong else one
+        for k, one in enumerate(skeletons)
+    ]
+
+
+def _check_lengths(bodies: list[Skeleton]) -> None:
+    """Reject bodies whose length lies outside the film's range."""
+    length = np.array([one.length_px for one in bodies])
+    good = np.array([one.status is FrameStatus.GOOD for one in bodies])
+    if good.sum() < _FEWEST:
+        return
+    off = length / float(np.median(length[good])) - 1.0
+    spread = 1.4826 * float(np.median(np.abs(off[good])))
+    for k in np.flatnonzero(np.abs(off) > max(_LENGTH, _SPREADS * spread)):
+        bodies[k] = no_skeleton(FrameStatus.LENGTH)
+
+
+def _profile(body: Skeleton, store: FrameStore, number: int) -> BodyProfile | None:
+    cut_out = store.get(number)
+    return None if cut_out is None else body_profile(body, cut_out)
+
+
+def _usual(profiles: Sequence[BodyProfile]) -> _Usual | None:
+    if not profiles:
+        return None
+    mean = np.array([np.nanmean(one.sides, axis=(0, 1)) for one in profiles])
+    mean = mean[np.isfinite(mean).all(axis=1)]
+    if not len(mean):
+        return None
+    strong = mean[np.argsort(np.linalg.norm(mean, axis=1))[len(mean) // 2 :]]
+    direction = np.median(strong, axis=0)
+    direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
+    along = np.array([np.nanmean(one.sides, axis=0) @ direction for one in profiles])
+    level = np.nanmean(along, axis=1)
+    best = along[level >= np.nanpercentile(level, _USUAL) * 0.5]
+    if not len(best):
+        return None
+    contrast = np.nanmedian(best, axis=0)
+    contrast = np.where(np.isfinite(contrast), contrast, np.nanmedian(contrast))
+    return _Usual(direction, contrast)
+
+
+def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
+    sides = profile.sides @ usual.direction
+    expected = float(usual.contrast.mean())
+    for side in sides:
+        known = np.isfinite(side)
+        if known.mean() < _KNOWN:
+            continue
+        standard_error = profile.noise / np.sqrt(max(1.0, 0.25 * known.sum()))
+        least = max(_LEAST_LEVELS, _SHARE * expected, _NOISE * standard_error)
+        if float(side[known].mean()) < least:
+            return FrameStatus.EMPTY
+    seen = np.maximum(usual.contrast, 0.0) > max(_LEAST_LEVELS, 3.0 * profile.noise)
+    faint = [_averaged(side) < _FAINT * usual.contrast for side in sides]
+    if _longest(faint[0] & faint[1] & seen) >= _BOTH_SIDES:
+        return FrameStatus.EMPTY
+    if any(_longest(one & seen) >= _ONE_SIDE for one in faint):
+        return FrameStatus.EMPTY
+    for tip, rings in enumerate(profile.rings @ usual.direction):
+        near = usual.contrast[5:16] if tip == 0 else usual.contrast[-16:-5]
+        strongest = np.nan_to_num(np.nanmax(np.nan_to_num(rings, nan=-np.inf), axis=1), neginf=0.0)
+        if float(strongest.min()) > max(_BEYOND * float(near.mean()), 4.0 * profile.noise):
+            return FrameStatus.PART
+    return FrameStatus.GOOD
+
+
+def _averaged(side: Floats) -> Floats:
+    """(101,) averaged over a few stations; infinite where no ground is seen."""
+    known = np.isfinite(side)
+    weight = uniform_filter1d(known.astype(float), _STRETCH, mode="nearest")
+    total = uniform_filter1d(np.where(known, side, 0.0), _STRETCH, mode="nearest")
+    return np.where(known & (weight > 0.5), total / np.maximum(weight, 1e-9), np.inf)
+
+
+def _longest(mask: Bools) -> int:
+    """Length of the longest run."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -1,0 +1,115 @@
+"""Contrasts of one body in its own frame: along both sides, and beyond both tips."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.verification.frame_store import CutOut
+from snakewalk.controller.images.medial_axis import Skeleton
+
+_ON = 0.5  # of the half width on both sides of the line: the body
+_BESIDE_PX = 1.5  # beside the boundary and half of the half width: the ground begins
+_ACROSS = 6  # samples of the ground on each side
+_OWN_PX = 2.0  # nearer to another part of the body than its half width and this: no ground
+_APART = 3.0  # half widths along the body from which a part is another one
+_RINGS = 6  # distances beyond a tip
+_RING_FROM, _RING_TO = (1.0, 1.5), (2.5, 3.0)  # widths and px from a tip
+_FAN = np.radians(np.linspace(-70.0, 70.0, 29))
+_AT_TIP = slice(5, 16)  # stations that tell a tip's width and contrast
+
+
+@dataclass(frozen=True, slots=True)
+class BodyProfile:
+    """What a frame shows along a line; C channels, NaN where the frame shows no ground."""
+
+    sides: Floats
+    """(2, 101, C) ground minus body on each side."""
+    rings: Floats
+    """(2, rings, angles, C) ground minus picture beyond the first and the last tip."""
+    noise: float
+    """Standard deviation of a pixel of the ground, from neighbouring samples."""
+
+
+def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
+    """Measure a body with points in the part of its frame."""
+    image = np.asarray(cut_out.image, dtype=np.float32)
+    image = image[..., None] if image.ndim == 2 else image
+    line = body.points_px - np.asarray(cut_out.origin_px, dtype=float)
+    half = np.maximum(body.radius_px, 0.5)
+    along = np.gradient(line, axis=0)
+    along = along / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    side = np.column_stack([-along[:, 1], along[:, 0]])
+    inner = np.linspace(-_ON, _ON, 3)
+    on = _seen(image, line[:, None] + (inner * half[:, None])[..., None] * side[:, None]).mean(1)
+    first = 1.5 * half + _BESIDE_PX
+    reach = first[:, None] + np.linspace(0.0, 1.0, _ACROSS) * np.maximum(half, 2.0)[:, None]
+    grounds, noise = [], []
+    for sign in (1.0, -1.0):
+        places = line[:, None] + sign * reach[..., None] * side[:, None]
+        seen = _seen(image, places)
+        seen[_own(places, line, half)] = np.nan
+        noise.append(np.diff(seen, axis=0).ravel())
+        grounds.append(_mean(seen))
+    steps = np.concatenate(noise)
+    steps = steps[np.isfinite(steps)]
+    spread = 1.4826 * float(np.median(np.abs(steps))) / np.sqrt(2.0) if steps.size else 0.0
+    rings = [
+        _rings(image, line[::way], half[::way], -along[0] if way > 0 else along[-1])
+        for way in (1, -1)
+    ]
+    return BodyProfile(np.stack(grounds) - on, np.stack(rings), spread)
+
+
+def _mean(seen: Floats) -> Floats:
+    """(P, C) mean over the samples (P, A, C) that show ground; NaN where fewer than half do."""
+    known = np.isfinite(seen)
+    count = known.sum(axis=1)
+    total = np.where(known, seen, 0.0).sum(axis=1)
+    return np.where(2 * count >= seen.shape[1], total / np.maximum(count, 1), np.nan)
+
+
+def _own(places: Floats, line: Floats, half: Floats) -> Floats:
+    """(P, A) whether places beside the line lie on another part of the same body."""
+    chord = float(np.hypot(*np.diff(line, axis=0).T).mean())
+    away = max(2, int(np.ceil(_APART * float(half.max()) / max(chord, 1e-9))) + 4)
+    square = ((places[:, :, None] - line[None, None]) ** 2).sum(axis=-1)
+    number = np.arange(len(line))
+    other = np.abs(number[:, None] - number) >= away
+    near = square < (half + _OWN_PX) ** 2
+    return np.asarray((near & other[:, None]).any(axis=-1))
+
+
+def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floats) -> Floats:
+    """(rings, angles, C) ground minus picture beyond the first point of a line."""
+    wide = 2.0 * float(half[_AT_TIP].mean())
+    low, high = _RING_FROM[0] * wide + _RING_FROM[1], _RING_TO[0] * wide + _RING_TO[1]
+    away = np.linspace(low, high, _RINGS)
+    angle = np.arctan2(outward[1], outward[0]) + _FAN
+    unit = np.column_stack([np.cos(angle), np.sin(angle)])
+    places = line[0] + away[:, None, None] * unit
+    seen = _seen(image, places)
+    square = ((places[:, :, None] - line[_AT_TIP.stop :][None, None]) ** 2).sum(axis=-1)
+    seen[(square < (half[_AT_TIP.stop :] + _OWN_PX) ** 2).any(axis=-1)] = np.nan
+    known = np.asarray(np.isfinite(seen).all(axis=-1))
+    out = np.full(seen.shape, np.nan)
+    for k, ring in enumerate(seen):
+        if known[k].sum() > len(_FAN) // 2:
+            usual = np.nanmedian(ring, axis=0)
+            whole = np.where(known[k][:, None], ring, usual)
+            out[k] = usual - uniform_filter1d(whole, 3, axis=0, mode="nearest")
+    return out
+
+
+def _seen(image: NDArray[np.float32], places: Floats) -> Floats:
+    """(..., C) grey values at places (A, B, 2); NaN outside the image."""
+    x, y = np.moveaxis(places, -1, 0).astype(np.float32)
+    shown = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    found: Floats = np.asarray(shown, dtype=np.float64).reshape(*places.shape[:-1], image.shape[2])
+    rows, columns = image.shape[:2]
+    outside = (x < 0) | (y < 0) | (x > columns - 1) | (y > rows - 1)
+    found[outside] = np.nan
+    return found

@@ -1,0 +1,1 @@
+"""Readers of joint angles over time: plug-ins of the kind ``joints`` for ``snakewalk play``."""

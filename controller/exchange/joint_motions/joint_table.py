@@ -1,0 +1,111 @@
+"""Joint angles as a CSV: a column of time, then a column for each joint."""
+
+import csv
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.motion.joint_motion import (
+    UNITS,
+    JointMotion,
+    JointRequest,
+    joint_motion,
+)
+
+_TIME: Final = {
+    **dict.fromkeys(("time", "time_s", "t", "t_s", "timestamp", "seconds"), 1.0),
+    **dict.fromkeys(("time_ms", "t_ms"), 1e-3),
+    **dict.fromkeys(("time_ns", "timestamp_ns"), 1e-9),
+}
+_OTHERS: Final = {"frame", "point", "frame_idx", "scorer"}
+_UNIT: Final = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
+_SEPARATORS: Final = (",", ";", "\t")
+_MISSING: Final = {"", "na", "nan", "null", "none"}
+
+
+def _cells(line: str) -> tuple[str, list[str]]:
+    """Separator and cells of the first line."""
+    separator = max(_SEPARATORS, key=line.count)
+    return separator, [cell.strip().strip('"') for cell in line.split(separator)]
+
+
+@plugin("joints", "csv")
+class JointTable:
+    """A CSV with the columns time and one for each joint."""
+
+    def accepts(self, path: Path, head: bytes) -> bool:
+        """Whether the first line names a time and then joints."""
+        try:
+            line = head.decode("utf-8-sig", "strict" if len(head) < 4 else "ignore").splitlines()[0]
+        except (UnicodeDecodeError, IndexError):
+            return False
+        _, cells = _cells(line)
+        names = [_plain(cell) for cell in cells]
+        return (
+            len(cells) > 1 and names[0] in _TIME and not {*names} & _OTHERS and b"\x00" not in head
+        )
+
+    def read(self, path: Path, request: JointRequest) -> JointMotion:
+        """Read the table; see ``JointReader.read``."""
+        try:
+            with path.open(newline="", encoding="utf-8-sig") as stream:
+                separator, cells = _cells(stream.readline())
+                rows = [row for row in csv.reader(stream, delimiter=separator) if any(row)]
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise InputError(f"{path}: is not a CSV in UTF-8: {error}") from None
+        names, units = [], set[str]()
+        for cell in cells[1:]:
+            matched = _UNIT.match(cell)
+            names.append((matched[1] if matched else cell).strip() or cell)
+            units.add("?" if matched is None else matched[2].lower()[:3])
+        values = np.full((len(rows), len(cells)), np.nan)
+        for line, row in enumerate(rows, start=2):
+            if len(row) > len(cells) and any(row[len(cells) :]):
+                raise InputError(
+                    f"{path}: line {line}: {len(row)} cells, the first line names {len(cells)}"
+                )
+            for k, cell in enumerate(row[: len(cells)]):
+                text = cell.strip()
+                if text.lower() in _MISSING:
+                    continue
+                try:
+                    values[line - 2, k] = float(text)
+                except ValueError:
+                    raise InputError(
+                        f"{path}: line {line}: {cells[k]}: expected a number, found {text!r}"
+                    ) from None
+        unit = _unit_of(path, units, request, values[:, 1:])
+        time_s = values[:, 0] * _TIME[_plain(cells[0])]
+        return joint_motion(path, time_s, names, values[:, 1:] * UNITS[unit])
+
+
+def _plain(name: str) -> str:
+    """Return a column's name in lower case, ``time [s]`` as ``time_s``."""
+    return re.sub(r"[\s_]*[\[(](\w+)[\])]", r"_\1", name.strip().lower())
+
+
+def _unit_of(path: Path, stated: set[str], request: JointRequest, angles: Floats) -> str:
+    """Return the unit that all columns state, or that the user gives.
+
+    Raises:
+        InputError: neither does; proposes the likely one.
+
+    """
+    if len(stated) == 1 and "?" not in stated:
+        (unit,) = stated
+        if request.unit not in (None, unit):
+            raise InputError(f"--unit {request.unit}: {path} states {unit}; leave the option out")
+        return unit
+    if request.unit is not None:
+        return request.unit
+    largest = float(np.nanmax(np.abs(angles), initial=0.0))
+    likely = "deg" if largest > 2.0 * np.pi else "rad"
+    raise InputError(
+        f"{path}: does not state the unit of its angles, which go to {largest:.3g}; "
+        f"say --unit {likely} (or name columns as joint_{likely})"
+    )

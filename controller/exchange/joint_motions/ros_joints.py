@@ -1,0 +1,132 @@
+"""Joint angles of a ROS 2 bag or an MCAP: JointState or JointTrajectory messages. Needs rosbags."""
+
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from snakewalk.config.archive import check_expansion
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import plugin
+from snakewalk.controller.motion.joint_motion import (
+    MOST_CELLS,
+    JointMotion,
+    JointRequest,
+    joint_motion,
+)
+
+_STATE: Final = "sensor_msgs/msg/JointState"
+_TRAJECTORY: Final = "trajectory_msgs/msg/JointTrajectory"
+_MAGIC: Final = b"\x89MCAP0\r\n"
+
+
+@plugin("joints", "ros2")
+class RosJoints:
+    """JointState or JointTrajectory messages of a ROS 2 bag or an MCAP."""
+
+    def accepts(self, path: Path, head: bytes) -> bool:
+        """Whether it is the folder of a bag, or an MCAP."""
+        return (path / "metadata.yaml").is_file() or head.startswith(_MAGIC)
+
+    def read(self, path: Path, request: JointRequest) -> JointMotion:
+        """Read the messages of one topic; see ``JointReader.read``."""
+        require_extra(f"{path}: ROS 2 bags need", "rosbags")
+        bags, types = (import_module(f"rosbags.{part}") for part in ("highlevel", "typesys"))
+        store = types.get_typestore(types.Stores.ROS2_JAZZY)
+        try:
+            with bags.AnyReader([path], default_typestore=store) as bag:
+                topic, kind = _topic(path, bag, request)
+                using = [each for each in bag.connections if each.topic == topic]
+                messages = (
+                    (stamp, bag.deserialize(data, one.msgtype))
+                    for one, stamp, data in bag.messages(connections=using)
+                )
+                rows = _states(messages) if kind == _STATE else _points(path, messages)
+                return _motion(path, topic, rows)
+        except InputError:
+            raise
+        except Exception as error:
+            reason = (str(error).splitlines() or [type(error).__name__])[0]
+            raise InputError(f"{path}: cannot be read as a ROS 2 bag: {reason}") from None
+
+
+def _topic(path: Path, bag: Any, request: JointRequest) -> tuple[str, str]:
+    """Topic and type of the messages to be played."""
+    kinds = {each.topic: each.msgtype for each in bag.connections}
+    fit = {topic: kind for topic, kind in kinds.items() if kind in (_STATE, _TRAJECTORY)}
+    if request.topic is not None:
+        if request.topic not in fit:
+            raise InputError(
+                f"--topic {request.topic}: no joint messages there; {path} has "
+                f"{', '.join(fit) or 'none'}"
+            )
+        return request.topic, fit[request.topic]
+    if len(fit) != 1:
+        listed = ", ".join(f"{topic} ({kind})" for topic, kind in (fit or kinds).items()) or "none"
+        raise InputError(
+            f"{path}: {len(fit)} topics of JointState or JointTrajectory"
+            + (f"; say --topic NAME: {listed}" if fit else f"; its topics: {listed}")
+        )
+    return next(iter(fit.items()))
+
+
+Row = tuple[float, tuple[str, ...], Any]
+
+
+def _states(messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
+    """Times, names and positions of JointState messages, by their stamps where they have one."""
+    for received, message in messages:
+        stamp_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        yield stamp_s or 1e-9 * received, tuple(message.name), message.position
+
+
+def _points(path: Path, messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
+    """Times, names and positions of the one JointTrajectory, or of the first points of several."""
+    held = list(messages)
+    if len(held) == 1:
+        ((_, message),) = held
+        for point in message.points:
+            start = point.time_from_start
+            yield start.sec + 1e-9 * start.nanosec, tuple(message.joint_names), point.positions
+        return
+    for received, message in held:
+        if len(message.points) != 1:
+            raise InputError(
+                f"{path}: {len(held)} trajectories of several points; give a bag with one"
+            )
+        yield 1e-9 * received, tuple(message.joint_names), message.points[0].positions
+
+
+def _motion(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
+    """Bring rows into the order of the joints of the first one."""
+    names: tuple[str, ...] = ()
+    times, angles, others, unlike, cells = [], [], 0, set[str](), 0
+    for time_s, row_names, positions in rows:
+        names = names or row_names
+        held = dict(zip(row_names, np.asarray(positions, float).tolist(), strict=False))
+        if not {*names} & {*held}:
+            others += 1  # of another publisher, or without positions
+            unlike |= {*row_names} - {*names}
+            continue
+        unlike |= {*held} - {*names}
+        cells += len(names)
+        check_expansion(path, cells, 8 * cells)
+        if cells > MOST_CELLS:
+            raise InputError(f"{path}: holds more than {MOST_CELLS} angles; give a part of it")
+        times.append(time_s)
+        angles.append([held.get(name, np.nan) for name in names])
+    if not names or not angles:
+        raise InputError(f"{path}: {topic}: no message has names and positions of joints")
+    notes = [f"topic {topic}"]
+    if others or unlike:
+        listed = ", ".join(sorted(unlike)) or "none"
+        notes.append(f"{others} messages are left out; further joints in some messages: {listed}")
+    order = np.argsort(times, kind="stable")
+    time = np.array(times)[order]
+    first = np.concatenate([[True], np.diff(time) > 0.0])
+    if not first.all():
+        notes.append(f"{int((~first).sum())} messages repeat a time and are left out")
+    return joint_motion(path, time[first], names, np.array(angles)[order][first], notes)

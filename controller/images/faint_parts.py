@@ -1,0 +1,83 @@
+"""Parts of a body that are much fainter than the rest: a pale tail, light bands."""
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import DeepImage
+from snakewalk.controller.images.silhouette import (
+    Polarity,
+    Silhouette,
+    connected_parts,
+    cut_out,
+    noise_of,
+    soft_contrast,
+)
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_AWAY = 1.2  # widths from the silhouette: blur and shadow stay nearer
+_MUCH = 0.06  # of the silhouette's area: fewer faint pixels are no part of the body
+_FAINTEST = 0.07  # of the body's contrast: what is fainter is a stain or a trail
+_MARGIN_PX = 20  # of the cut-out, where the body fades out
+_BLUR_PX = 4  # around the silhouette: what goes on further is not its blur
+_TYPICAL = 40.0  # percentile of the contrast along the middle of what goes on: of the faint parts
+
+
+def may_have_faint_parts(body: Silhouette) -> bool:
+    """Whether something fainter than the silhouette goes on beyond its cut-out, or beside it."""
+    if body.status is FrameStatus.SEVERAL:
+        return True
+    if body.status is not FrameStatus.GOOD:
+        return False
+    seen = np.array(cv2.boundingRect((body.level > body.noise_level).astype(np.uint8)))
+    core = np.array(cv2.boundingRect(body.mask.astype(np.uint8)))
+    before, after = core[:2] - seen[:2], (seen[:2] + seen[2:]) - (core[:2] + core[2:])
+    return bool(max(before.max(), after.max()) > _BLUR_PX)
+
+
+def with_faint_parts(
+    image: DeepImage, background: DeepImage, polarity: Polarity, body: Silhouette
+) -> Silhouette | None:
+    """The silhouette with all that is connected to it above the noise; None if that is the same.
+
+    Its contrast is cut at that of the faint part, so that the boundary is at half of it everywhere.
+
+    Args:
+        image: (H, W[, 3]) the frame.
+        background: the same without the animal.
+        polarity: whether the animal is darker or lighter than its ground.
+        body: the part of most contrast.
+
+    """
+    apart = soft_contrast(image, background, polarity)
+    found = connected_parts((apart > body.noise_level).astype(np.uint8))
+    if found is None:
+        return None
+    label, stats = found
+    left, top = (int(v) for v in body.origin_px)
+    rows, columns = body.level.shape
+    inner = label[top : top + rows, left : left + columns]
+    own = int(np.bincount(inner[body.mask & (inner > 0)], minlength=2).argmax())
+    x, y, wide, high, _ = (int(v) for v in stats[own])
+    core_box = cv2.boundingRect(body.mask.astype(np.uint8))
+    if own == 0 or max(wide, high) <= max(core_box[2:]) + _BLUR_PX:
+        return None
+    window = (slice(y, y + high), slice(x, x + wide))
+    joined = label[window] == own
+    core = np.zeros(label.shape, dtype=np.uint8)
+    core[top : top + rows, left : left + columns] = body.mask
+    thick = 2.0 * float(cv2.distanceTransform(core, cv2.DIST_L2, 5).max())
+    away = np.asarray(cv2.distanceTransform(1 - core[window], cv2.DIST_L2, 5))
+    beyond = joined & (away > _AWAY * thick)
+    if np.count_nonzero(beyond) < _MUCH * body.area_px:
+        return None
+    middle, _ = noise_of(apart)
+    depth = np.asarray(cv2.distanceTransform(np.pad(joined, 1).astype(np.uint8), cv2.DIST_L2, 5))
+    ridge = (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)))[1:-1, 1:-1] & beyond
+    if not ridge.any():
+        return None
+    faint = float(np.percentile(apart[window][ridge], _TYPICAL)) - middle
+    threshold = max(middle + 0.5 * faint, body.noise_level)
+    if faint < _FAINTEST * 2.0 * (body.threshold - middle) or threshold > 0.9 * body.threshold:
+        return None
+    flat = np.minimum(apart, 2.0 * threshold).astype(np.float32)
+    return cut_out(flat, threshold, body.noise_level, middle, _MARGIN_PX)

@@ -1,0 +1,97 @@
+"""The ends of a body that taper below the blur of the picture, where half its contrast is too soon.
+
+The contrast summed across the body is its width times its own contrast, whatever the blur; the tip
+is where that profile, carried on, comes to nothing.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.arrays import Floats
+
+_STEP_PX = 0.5
+_LOW, _HIGH = 0.06, 0.12  # of the usual width: the profile between these is carried on to 0
+_BEFORE = 2.0  # widths before the end that is known, from which the profile is looked at
+_BLUR_PX = 2.0  # of filters and image: so far a blunt end's profile reaches beyond it
+_BEYOND = 2.5  # widths beyond the end that is known, at most
+_ACROSS = 0.9  # widths on each side that are summed
+_RIM = 0.7  # widths: what lies further to the side is ground
+_AHEAD = 0.5  # widths over which the direction at the end is taken
+_BLUNT = 0.5  # of the usual width at the end that is known: a wider end is not pointed
+_LONGEST = 0.6  # widths: a longer extension is a trail
+_SLOWER = 1.0  # times as long as the taper before the end lets it expect
+_GROUND = 1.2  # widths beyond the end: from there on is ground
+_SLOW_PX = 1.45  # between both shares: a blunt end's profile falls faster
+_WORTH = 0.15  # widths: less than that is left to the end that is known
+_USUAL = (0.3, 0.6)  # of the length: where the width is the usual one
+
+
+def to_pointed_tips(line: Floats, level: NDArray[np.float32], wide: float, scale: float) -> Floats:
+    """The line (P, 2) lengthened to the tips of ends that taper.
+
+    Args:
+        line: x, y in pixels of ``level``, from tip to tip, as half the contrast shows them.
+        level: (h, w) contrast of one body.
+        wide: width of the body, pixels of ``level``.
+        scale: pixels of ``level`` a pixel of the image.
+
+    """
+    steps = np.hypot(*np.diff(line, axis=0).T)
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    if arc[-1] < 4.0 * wide:
+        return line
+    at = np.arange(0.0, arc[-1], _STEP_PX)
+    even = np.column_stack([np.interp(at, arc, column) for column in line.T])
+    for _ in range(2):
+        even = _lengthened(even, level, wide, scale)[::-1]
+    return np.asarray(even)
+
+
+def _lengthened(line: Floats, level: NDArray[np.float32], wide: float, scale: float) -> Floats:
+    """The line of equal steps with its last end at the tip."""
+    count = len(line)
+    back = max(2, round(_AHEAD * wide / _STEP_PX))
+    ahead = line[-1] - line[-1 - back]
+    ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)
+    beyond = np.arange(1, round(_BEYOND * wide / _STEP_PX) + 1)[:, None] * _STEP_PX * ahead
+    usual = float(np.median(_sums(line, level, wide)[slice(*(round(v * count) for v in _USUAL))]))
+    end = min(round(_BEFORE * wide / _STEP_PX), count - back)
+    path = np.vstack([line[-end:], line[-1] + beyond])
+    sums = gaussian_filter1d(_sums(path, level, wide), 1.0 / _STEP_PX, mode="nearest") / usual
+    high, low = (_crossing(sums, share) for share in (_HIGH, _LOW))
+    if usual <= 0.0 or high is None or low is None or sums[end] > _BLUNT:
+        return line
+    if (low - high) * _STEP_PX < _SLOW_PX * scale:
+        return line
+    tip = low + (low - high) * _LOW / (_HIGH - _LOW) - _BLUR_PX * scale / _STEP_PX
+    longer = round(tip - end)
+    ground = sums[end + round(_GROUND * wide / _STEP_PX) :]
+    taper = float(sums[end - round(wide / _STEP_PX)] - sums[end]) / wide
+    most = round(_SLOWER * float(sums[end]) / max(taper, 1e-9) / _STEP_PX)
+    if not _WORTH * wide < longer * _STEP_PX < _LONGEST * wide or np.abs(ground).max() > _LOW / 2.0:
+        return line
+    longer = min(longer, most)
+    return np.vstack([line, line[-1] + beyond[:longer]])
+
+
+def _crossing(sums: Floats, share: float) -> float | None:
+    """Where the profile falls below a share for good; None where it does not."""
+    above = np.flatnonzero(sums >= share)
+    if not above.size or above[-1] + 1 >= len(sums):
+        return None
+    last = int(above[-1])
+    return last + float((sums[last] - share) / (sums[last] - sums[last + 1]))
+
+
+def _sums(path: Floats, level: NDArray[np.float32], wide: float) -> Floats:
+    """(P,) contrast summed across the path, less that of the ground beside it."""
+    along = np.gradient(path, axis=0)
+    side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    reach = round(_ACROSS * wide)
+    across = np.arange(-reach, reach + 1.0)
+    x, y = np.moveaxis(path[:, None] + across[:, None] * side[:, None], -1, 0).astype(np.float32)
+    seen = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+    ground = np.median(seen[:, np.abs(across) > _RIM * wide])
+    return np.asarray((seen - ground).sum(axis=1), dtype=float)

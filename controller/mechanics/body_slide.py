@@ -1,0 +1,101 @@
+"""Velocity of a planar body from one measured shape to the next, on a level floor."""
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.mechanics.rigid_motion import (
+    FORWARD_X,
+    FORWARD_Y,
+    LANES,
+    NORMAL,
+    OTHERS,
+    POINT_X,
+    POINT_Y,
+    SHAPE_X,
+    SHAPE_Y,
+    balance,
+    link_table,
+)
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+
+class BodySlide:
+    """``rigid_velocity`` of a body on a level floor from one shape to the next, without copies."""
+
+    def __init__(self, normal: Floats, friction: FrictionConfig) -> None:
+        """Begin at rest.
+
+        Args:
+            normal: (L,) load of each link on the ground, in weights of a link.
+            friction: the ellipse.
+
+        """
+        self._normal, self._friction = normal, friction
+        self._table = link_table(len(normal))
+        self._velocity, self._linear = np.zeros(3), np.zeros(3)
+        self._inertia = np.zeros((3, 3))
+        self._work = np.empty((6, 3))
+
+    def set_shapes(self, before: BodyView, after: BodyView, step_s: float) -> float:
+        """Accept two shapes in one frame, ``step_s`` apart; return the speed of the fastest link.
+
+        The speed is the greater one of its two parts in the plane, m/s.
+        """
+        headings_rad = before.headings_rad
+        return float(
+            _fill_slide(
+                *(before.link_m, np.cos(headings_rad), np.sin(headings_rad), after.link_m),
+                *(step_s, self._normal, self._table),
+            )
+        )
+
+    def velocity(self) -> Floats:
+        """Return (3,) the velocity between the shapes, as of ``rigid_velocity``; it is reused."""
+        friction = self._friction
+        balance(
+            *(self._table, OTHERS, len(self._normal), friction.along, friction.across),
+            *(self._linear, self._inertia, self._velocity, self._work),
+        )
+        return self._velocity
+
+
+@compiled(
+    f"float64({readonly_array(dimensions=2)}, {readonly_array()}, {readonly_array()},"
+    f" {readonly_array(dimensions=2)}, float64, {readonly_array()}, float64[::1])",
+    divides_by_zero=True,
+    makes_arrays=False,
+)
+def _fill_slide(
+    before_m: Floats,
+    cosine: Floats,
+    sine: Floats,
+    after_m: Floats,
+    step_s: float,
+    normal: Floats,
+    table: Floats,
+) -> float:
+    """Fill a ``link_table``; return the greatest part of a link's velocity.
+
+    Args:
+        before_m: (L, 3) centres of the links.
+        cosine: (L,) of their headings.
+        sine: likewise.
+        after_m: (L, 3) centres after the step.
+        step_s: of time.
+        normal: (L,) loads.
+        table: of ``link_table``.
+
+    """
+    fastest = 0.0
+    for k in range(len(before_m)):
+        at = k // LANES * OTHERS + k % LANES
+        u = (after_m[k, 0] - before_m[k, 0]) / step_s
+        v = (after_m[k, 1] - before_m[k, 1]) / step_s
+        table[at + POINT_X], table[at + POINT_Y] = before_m[k, 0], before_m[k, 1]
+        table[at + FORWARD_X], table[at + FORWARD_Y] = cosine[k], sine[k]
+        table[at + SHAPE_X], table[at + SHAPE_Y] = u, v
+        table[at + NORMAL] = normal[k]
+        fastest = max(fastest, abs(u), abs(v))
+    return fastest

@@ -1,0 +1,44 @@
+"""Slope of the ground under the body over time."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from snakewalk.controller.figures.style import (
+    AMBER,
+    BLUE,
+    GREY,
+    canvas,
+    legend_above,
+    mark_waypoints,
+    trace,
+)
+from snakewalk.controller.metrics.ground_slope import ground_slope
+from snakewalk.controller.metrics.path_error import waypoint_times_s
+from snakewalk.controller.runlog.record import RunRecord
+
+
+def slope_figure(record: RunRecord) -> Figure | None:
+    """Draw the slope under the body, and where the walk rides on wide waves; None if level."""
+    pose, header, walk = record.pose, record.header, record.walk
+    if header.ground is None or len(pose.time_s) < 2:
+        return None
+    slope = ground_slope(header.ground, pose.links_m)
+    figure, panels = canvas(1, 2.8)
+    axes = panels[0]
+    trace(axes, pose.time_s, np.rad2deg(slope.steepest_rad), AMBER, "steepest")
+    trace(axes, pose.time_s, np.rad2deg(slope.ahead_rad), BLUE, "ahead, uphill positive")
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    is_wide = walk.carrier_rad > 0.0
+    if is_wide.any():
+        axes.fill_between(
+            np.append(walk.time_s, record.end_s), 0.0, 1.0,
+            where=np.append(is_wide, is_wide[-1:]), step="post", color=GREY, alpha=0.25,
+            linewidth=0.0, transform=axes.get_xaxis_transform(), label="walk on wide waves",
+        )  # fmt: skip
+    axes.set_ylabel("slope (degrees)")
+    axes.set_xlabel("time (s)")
+    axes.set_xlim(0.0, max(record.end_s, 1e-3))
+    legend_above(axes)
+    times_s = waypoint_times_s(pose, header.plan)
+    mark_waypoints(panels, times_s, measured=header.pose_evidence.is_measured)
+    return figure

@@ -1,0 +1,252 @@
+"""Commands of a ROS graph: messages that are checked and kept until the run asks for them."""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from typing import Any, Final
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.motion.command import (
+    JOINTS_MAX,
+    POINTS_MAX,
+    TIMEOUT_S,
+    Command,
+    GoTo,
+    HoldStill,
+    JointGoals,
+    JointTrajectory,
+    Refused,
+    StartGait,
+    Velocity,
+)
+from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
+from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.run.factory import gait_by_name, is_gait
+
+_PENDING_MAX: Final = 16
+"""Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that
+newer ones of the same joints follow, and velocities and goal poses that newer ones follow."""
+QUEUE: Final = QoSProfile(depth=10)
+
+
+class CommandTopics:
+    """Subscriptions to the topics with commands."""
+
+    def __init__(self, node: Node, options: RosOptions) -> None:
+        self._node, self._options = node, options
+        self.pending: deque[Command] = deque(maxlen=_PENDING_MAX)
+        self._lock = threading.Lock()
+        self.has_begun = False
+        """Whether the run has begun; commands that come before are rejected."""
+        self.frame = ""
+        """Frame of the run's poses, in which goal poses are accepted."""
+        if options.commands:
+            for kind, topic, take in (
+                ("sensor_msgs/msg/JointState", "robot_joint_command", self.on_goals),
+                (
+                    "trajectory_msgs/msg/JointTrajectory",
+                    "robot_joint_trajectory",
+                    self.on_trajectory,
+                ),
+                ("std_msgs/msg/String", "robot_gait", self.on_gait),
+                ("geometry_msgs/msg/Twist", "cmd_vel", self.on_velocity),
+            ):
+                self._subscribe(kind, topic, take)
+        if options.goals:
+            self._subscribe("geometry_msgs/msg/PoseStamped", "goal_pose", self.on_goal_pose)
+
+    def take(self) -> list[Command]:
+        """Return the commands since the last call."""
+        with self._lock:
+            commands = list(self.pending)
+            self.pending.clear()
+        return commands
+
+    def reject(self, why: str) -> None:
+        """Let the run report why a message was rejected."""
+        with self._lock:
+            self.pending.append(Refused(f"ROS: {why}"))
+
+    def _subscribe(self, kind: str, topic: str, take: Callable[[Any], None]) -> None:
+        callback = self._guarded(topic, take)
+        self._node.create_subscription(message_type(kind), topic, callback, QUEUE)
+
+    def _guarded(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return a callback that rejects a message on which ``take`` fails."""
+
+        def taken(message: Any) -> None:
+            try:
+                take(message)
+            except Exception as fault:  # else the thread ends, and the stop service with it
+                self.reject(f"{topic}: {in_words(fault)}")
+
+        return taken
+
+    def on_goals(self, message: Any) -> None:
+        """Keep joint goals."""
+        if max(len(message.name), len(message.position)) > JOINTS_MAX:
+            why = (
+                f"joint goals: names {len(message.name)} joints; at most {JOINTS_MAX} are accepted"
+            )
+            self._command(Refused(why), message.header.stamp, "joint goals")
+            return
+        if message.name and not message.position:
+            why = "joint goals: no positions; velocities and efforts alone are not taken"
+            self._command(Refused(why), None, "joint goals")
+            return
+        goals = JointGoals(list(message.name), list(message.position))
+        self._command(goals, message.header.stamp, "joint goals")
+
+    def on_trajectory(self, message: Any) -> None:
+        """Keep a trajectory."""
+        stamp, points = message.header.stamp, message.points
+        if not points:
+            self._command(HoldStill(), stamp, "trajectory")
+            return
+        if len(message.joint_names) > JOINTS_MAX:
+            why = (
+                f"trajectory: names {len(message.joint_names)} joints; at most {JOINTS_MAX} are "
+                "accepted"
+            )
+            self._command(Refused(why), stamp, "trajectory")
+            return
+        if len(points) > POINTS_MAX:
+            why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are taken"
+            self._command(Refused(why), stamp, "trajectory")
+            return
+        times = [each.time_from_start for each in points]
+        time_s = np.array([each.sec + 1e-9 * each.nanosec for each in times])
+        try:
+            values = (
+                _rows([each.positions for each in points]),
+                _rows([each.velocities for each in points]),
+                _rows([each.accelerations for each in points]),
+            )
+        except ValueError:
+            why = "trajectory: its points have different numbers of values"
+            self._command(Refused(why), stamp, "trajectory")
+            return
+        positions, velocities, accelerations = values
+        if positions is None:
+            self._command(Refused("trajectory: its points have no positions"), stamp, "trajectory")
+            return
+        names = list(message.joint_names)
+        command = JointTrajectory(names, time_s, positions, velocities, accelerations)
+        self._command(command, stamp, "trajectory")
+
+    def on_gait(self, message: Any) -> None:
+        """Keep a gait, or a hold."""
+        words = message.data.split()
+        if not words:
+            self._command(HoldStill(), None, "gait")
+            return
+
+        command: Command
+        try:
+            if not is_gait(words[0]):
+                raise InputError(f"gait: {words[0][:NAME_MAX]}: no such gait; snakewalk gait list")
+            values: dict[str, Any] = {}
+            for key, value in map(_value, words[1:]):
+                if key in values:
+                    raise InputError(f"gait: {key[:NAME_MAX]} is given twice; give it once")
+                values[key] = value
+            command = StartGait(gait_by_name(words[0], values)[0])
+        except InputError as error:
+            command = Refused(error.faults[0])
+        self._command(command, None, "gait")
+
+    def on_velocity(self, message: Any) -> None:
+        """Keep a velocity along the body and a rate of turn."""
+        linear, angular = message.linear, message.angular
+        others = {
+            "linear.y": linear.y,
+            "linear.z": linear.z,
+            "angular.x": angular.x,
+            "angular.y": angular.y,
+        }
+        wrong = [name for name, value in others.items() if value != 0.0]
+        command: Command = Velocity(linear.x, angular.z)
+        if wrong:
+            command = Refused(
+                f"velocity: {wrong[0]} is not 0; send linear.x and angular.z, and 0 elsewhere"
+            )
+        self._command(command, None, "velocity")
+
+    def on_goal_pose(self, message: Any) -> None:
+        """Keep the place of a goal pose; a walk has no heading at its end."""
+        header, at = message.header, message.pose.position
+        command: Command = GoTo(at.x, at.y)
+        if header.frame_id != self.frame:
+            command = Refused(
+                f"goal pose: frame {header.frame_id[:NAME_MAX]!r}; this run's poses have the "
+                f"frame {self.frame!r}: transform the goal"
+            )
+        elif not (math.isfinite(at.x) and math.isfinite(at.y)):
+            command = Refused("goal pose: x or y is not a number")
+        self._command(command, header.stamp, "goal pose")
+
+    def _command(self, command: Command, stamp: Any, what: str) -> None:
+        """Keep a command for the run; a stamp of 0 says nothing."""
+        if not self.has_begun:
+            command = Refused(f"{what}: the run has not begun")
+        elif stamp is not None and (stamp.sec or stamp.nanosec):
+            age_s = 1e-9 * self._node.get_clock().now().nanoseconds - (
+                stamp.sec + 1e-9 * stamp.nanosec
+            )
+            timeout_s = self._options.timeout_s
+            most_s = timeout_s if age_s > 0.0 else min(timeout_s, TIMEOUT_S)
+            if abs(age_s) > most_s:
+                when = "ago" if age_s > 0.0 else "ahead"
+                command = Refused(
+                    f"{what}: stamped {abs(age_s):.1f} s {when}; at most {most_s:g} s is taken, "
+                    "and 0 for now"
+                )
+        with self._lock:
+            last = self.pending[-1] if self.pending else None
+            if last is not None and _replaces(command, last):
+                self.pending.pop()
+            self.pending.append(command)
+
+
+def _replaces(command: Command, last: Command) -> bool:
+    """Whether a command makes the one before it void."""
+    if isinstance(command, JointGoals) and isinstance(last, JointGoals):
+        return command.joints == last.joints
+    return isinstance(command, Velocity | GoTo) and type(command) is type(last)
+
+
+def _rows(values: list[Any]) -> Floats | None:
+    """(N, K) array of a trajectory's points; None where none has any."""
+    return np.array([list(each) for each in values], dtype=float) if any(values) else None
+
+
+def _value(word: str) -> tuple[str, Any]:
+    key, equals, text = word.partition("=")
+    if not (key and equals and text):
+        raise InputError(f"gait: {word[:NAME_MAX]}: expected PARAM=VALUE")
+    try:
+        return key, parse_json(text)
+    except ValueError:
+        return key, text
+
+
+def in_words(fault: Exception) -> str:
+    """One line that says what failed."""
+    text = " ".join(str(fault).split())
+    return f"it cannot be used ({text[:TEXT_MAX] or type(fault).__name__})"
+
+
+@cache
+def message_type(kind: str) -> Any:
+    """Return the class of a message."""
+    package, folder, name = kind.split("/")
+    return getattr(import_module(f"{package}.{folder}"), name)

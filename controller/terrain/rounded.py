@@ -1,0 +1,68 @@
+"""Rounded polygons: paths that never leave the triangles of their corners.
+
+A cubic through points overshoots: it leaves a line on which it runs exactly. Here each corner is
+replaced by a parabola between points of its two sides, which stays inside of their triangle.
+"""
+
+import itertools
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.terrain.path import SplinePath
+
+_STEP_M: Final = 0.01
+_MOST_M: Final = 1.0
+"""Longest part of a side that a bend uses (ours)."""
+_HALVINGS: Final = 10
+
+
+def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> SplinePath:
+    """Path along a polygon (n, 2) whose free corners are rounded as widely as ``safe`` allows.
+
+    Args:
+        corners_m: (n, 2) distinct points that follow each other.
+        free: (n,) corners that the path need not pass; the others stay sharp.
+        safe: whether each of points (k, 2) is on safe ground.
+
+    """
+    apart = np.concatenate([[True], np.hypot(*np.diff(corners_m, axis=0).T) > 1e-9])
+    corners_m, free = corners_m[apart], free[apart]
+    sides = np.diff(corners_m, axis=0)
+    length = np.hypot(*sides.T)
+    pieces = [corners_m[:1]]
+    for k in range(1, len(corners_m) - 1):
+        pieces.append(corners_m[k : k + 1])
+        if not free[k]:
+            continue
+        back, onward = -sides[k - 1] / length[k - 1], sides[k] / length[k]
+        reach = min(0.5 * length[k - 1], 0.5 * length[k], _MOST_M)
+        for _ in range(_HALVINGS):
+            bend = _bend(corners_m[k], back * reach, onward * reach)
+            if safe(bend).all():
+                pieces[-1] = bend
+                break
+            reach *= 0.5
+    pieces.append(corners_m[-1:])
+    return SplinePath.tabulated(_evenly(np.vstack(pieces)))
+
+
+def _bend(corner: Floats, back: Floats, onward: Floats) -> Floats:
+    """(n, 2) points of the parabola between two points, given from their corner."""
+    count = max(3, round(float(np.hypot(*back) + np.hypot(*onward)) / _STEP_M) + 1)
+    t = np.linspace(0.0, 1.0, count)[:, None]
+    return np.asarray(corner + (1.0 - t) ** 2 * back + t**2 * onward)
+
+
+def _evenly(points: Floats) -> Floats:
+    """Return points (n, 2) and as many between them that none are over a centimetre apart."""
+    out = [points[:1]]
+    for before, point in itertools.pairwise(points):
+        gap = float(np.hypot(*(point - before)))
+        if gap < 1e-9:
+            continue
+        count = max(1, int(np.ceil(gap / _STEP_M - 1e-6)))
+        out.append(before + (np.arange(1, count + 1) / count)[:, None] * (point - before))
+    return np.ascontiguousarray(np.vstack(out))

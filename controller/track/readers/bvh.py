@@ -1,0 +1,174 @@
+"""BVH: a skeleton with offsets and joint rotations; its joints become keypoints by kinematics.
+
+``HIERARCHY`` has joints with an OFFSET from their parent and CHANNELS; a rotation is the product of
+its channels' rotations in their order, in degrees. ``MOTION`` has the number of frames, the time of
+one, and a row of channel values for each. Up is y, and a unit of length is not stated, so the body
+has no scale.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.markers import number_or_none, projected
+
+_MOST_JOINTS: Final = 1000
+_MOST_VALUES: Final = 20_000_000
+_AXES: Final = "XYZ"
+_TO_Z_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+
+@dataclass(slots=True)
+class _Joint:
+    name: str
+    parent: int
+    offset: Floats = field(default_factory=lambda: np.zeros(3))
+    channels: list[str] = field(default_factory=list)
+
+
+def is_bvh(head: bytes) -> bool:
+    """Whether a file that begins so is a BVH."""
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().upper().startswith(b"HIERARCHY")
+
+
+def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
+    """Load the joints of a BVH as keypoints; see ``load.load_file``."""
+    try:
+        words = file.read_text(encoding="utf-8-sig").split()
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: is not a BVH in UTF-8") from None
+    upper = [word.upper() for word in words]
+    if "MOTION" not in upper:
+        raise InputError(f"{file}: has no MOTION; export it with its animation")
+    begin = upper.index("MOTION")
+    joints = _skeleton(file, words[1:begin])
+    frames, step_s, values = _motion(file, words[begin + 1 :], sum(len(j.channels) for j in joints))
+    places = _places(joints, values.reshape(frames, -1)) @ _TO_Z_UP.T
+    longest = _longest(joints)
+    notes = []
+    if choice.keypoints is None and len(longest) < len(joints):
+        beside = [joints[k].name for k in range(len(joints)) if k not in longest]
+        notes.append(f"{len(beside)} joints outside the longest chain are left out: "
+                     f"{', '.join(beside)}; --keypoints uses them")  # fmt: skip
+    kept = longest if choice.keypoints is None else list(range(len(joints)))
+    notes.append(f"{joints[0].name} is taken as the head; --keypoints gives another order")
+    rate = rate_hz if rate_hz is not None else 1.0 / step_s
+    names = [joints[k].name for k in kept]
+    found = projected(file, names, places[:, kept] + 1e-12, 1.0, rate, choice)
+    return Keypoints(
+        file, found.nodes, found.places, None, rate_hz=rate, notes=(*notes, *found.notes)
+    )
+
+
+def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
+    """Joints, parents first; ends of chains count as joints."""
+    joints: list[_Joint] = []
+    above: list[int] = []
+    at = 0
+    try:
+        while at < len(words):
+            word = words[at].upper()
+            if word in {"ROOT", "JOINT", "END"}:
+                parent = above[-1] if above else -1
+                if word == "ROOT" and joints:
+                    raise InputError(f"{file}: has two skeletons; export one")
+                name = words[at + 1] if word != "END" else f"{joints[parent].name}_end"
+                joints.append(_Joint(name, parent))
+                if len(joints) > _MOST_JOINTS:
+                    raise InputError(f"{file}: has more than {_MOST_JOINTS} joints")
+                at += 2
+            elif word == "{":
+                above.append(len(joints) - 1)
+                at += 1
+            elif word == "}":
+                above.pop()
+                at += 1
+            elif word == "OFFSET":
+                joints[above[-1]].offset = np.array([float(one) for one in words[at + 1 : at + 4]])
+                at += 4
+            elif word == "CHANNELS":
+                count = int(words[at + 1])
+                joints[above[-1]].channels = [one.upper() for one in words[at + 2 : at + 2 + count]]
+                at += 2 + count
+            else:
+                raise InputError(f"{file}: unknown word {words[at][:20]!r} in its HIERARCHY")
+    except (IndexError, ValueError):
+        raise InputError(f"{file}: its HIERARCHY is damaged near word {at + 1}") from None
+    known = {f"{axis}{kind}" for axis in _AXES for kind in ("POSITION", "ROTATION")}
+    odd = [each for joint in joints for each in joint.channels if each not in known]
+    if odd or not joints or above:
+        raise InputError(f"{file}: its HIERARCHY {f'has a channel {odd[0]}' if odd else 'is cut'}")
+    return joints
+
+
+def _motion(file: Path, words: list[str], channels: int) -> tuple[int, float, Floats]:
+    """Frames, time of one, and all channel values."""
+    text = [word.rstrip(":").upper() for word in words[:5]]
+    stated = [number_or_none(word) for word in words[1:5]]
+    frames, step_s = stated[0] if stated else None, stated[3] if len(stated) > 3 else None
+    if text[:1] != ["FRAMES"] or frames is None or step_s is None or not step_s > 0.0:
+        raise InputError(f"{file}: expected Frames: N and Frame Time: S above 0 after MOTION")
+    rows = words[5:]
+    if channels * frames > _MOST_VALUES:
+        raise InputError(f"{file}: states {frames:g} frames of {channels} channels; give a part")
+    if len(rows) != frames * channels or frames < 2:
+        raise InputError(
+            f"{file}: states {frames:g} frames of {channels} channels and has {len(rows)} values; "
+            "export it again"
+        )
+    try:
+        return int(frames), step_s, np.array(rows, dtype=float)
+    except ValueError as error:
+        raise InputError(f"{file}: in its MOTION: {error}") from None
+
+
+def _places(joints: list[_Joint], values: Floats) -> Floats:
+    """(T, K, 3) places of the joints for channel values (T, C)."""
+    frames, column = len(values), 0
+    turns = np.empty((len(joints), frames, 3, 3))
+    places = np.empty((frames, len(joints), 3))
+    for k, joint in enumerate(joints):
+        turn = np.tile(np.eye(3), (frames, 1, 1))
+        shift = np.tile(joint.offset, (frames, 1))
+        moved = np.zeros((frames, 3))
+        for channel in joint.channels:
+            axis = _AXES.index(channel[0])
+            if channel.endswith("POSITION"):
+                moved[:, axis] = values[:, column]
+            else:
+                turn = turn @ _about(axis, np.radians(values[:, column]))
+            column += 1
+        if joint.parent < 0:
+            turns[k], places[:, k] = turn, shift + moved
+        else:
+            above = turns[joint.parent]
+            turns[k] = above @ turn
+            offset = (above @ (shift + moved)[:, :, None])[:, :, 0]
+            places[:, k] = places[:, joint.parent] + offset
+    return places
+
+
+def _about(axis: int, angle: Floats) -> Floats:
+    """(T, 3, 3) rotations about an axis."""
+    turn = np.zeros((len(angle), 3, 3))
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    turn[:, axis, axis] = 1.0
+    turn[:, one, one] = turn[:, two, two] = np.cos(angle)
+    turn[:, two, one], turn[:, one, two] = np.sin(angle), -np.sin(angle)
+    return turn
+
+
+def _longest(joints: list[_Joint]) -> list[int]:
+    """Joints of the chain from the root to the end that is most joints away."""
+    depth = [0] * len(joints)
+    for k, joint in enumerate(joints):
+        depth[k] = depth[joint.parent] + 1 if joint.parent >= 0 else 0
+    chain = [int(np.argmax(depth))]
+    while joints[chain[-1]].parent >= 0:
+        chain.append(joints[chain[-1]].parent)
+    return chain[::-1]

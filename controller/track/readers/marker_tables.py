@@ -1,0 +1,122 @@
+"""Marker trajectories as tables: Vicon's CSV and OpenSim's TRC.
+
+Vicon Nexus writes blocks; that of the markers begins with ``Trajectories`` and the frame rate, then
+lines of marker names, of column names (Frame, Sub Frame, X, Y, Z, ...) and of units, then rows up
+to an empty line. A TRC has two lines of names and values (``DataRate``, ``Units``, ...), lines of
+marker and column names, then rows of frame, time and places.
+"""
+
+import csv
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Ints
+from snakewalk.config.errors import InputError
+from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.markers import (
+    UNITS,
+    marker_places,
+    number_or_none,
+    projected,
+)
+from snakewalk.controller.track.track import frame_numbers
+
+VICON_HEAD: Final = "Trajectories"
+_MOST_COLUMNS: Final = 30_000
+
+
+def is_trc(head: bytes) -> bool:
+    """Whether a file that begins so is a TRC."""
+    return head.removeprefix(b"\xef\xbb\xbf").startswith(b"PathFileType")
+
+
+def is_vicon(rows: list[list[str]]) -> bool:
+    """Whether a CSV has a block of Vicon's marker trajectories."""
+    return any(row and row[0].strip() == VICON_HEAD for row in rows)
+
+
+def load_vicon(
+    file: Path, rows: list[list[str]], rate_hz: float | None, choice: Choice
+) -> Keypoints:
+    """Load the marker trajectories of Vicon's CSV; see ``load.load_file``."""
+    begin = next(k for k, row in enumerate(rows) if row and row[0].strip() == VICON_HEAD)
+    block = [(k + 1, row) for k, row in enumerate(rows)][begin + 1 :]
+    if len(block) < 5:
+        raise InputError(f"{file}: its block {VICON_HEAD} ends before its rows; export it again")
+    stated = number_or_none((block[0][1] or [""])[0].strip())
+    names = [cell.strip() for cell in block[1][1][2:] if cell.strip()]
+    units = {cell.strip().lower() for cell in block[3][1][2:] if cell.strip()}
+    if not names:
+        raise InputError(f"{file}: line {block[1][0]}: expected the names of markers")
+    if len(units) != 1 or not units <= UNITS.keys():
+        found = ", ".join(sorted(units)) or "none"
+        raise InputError(
+            f"{file}: line {block[3][0]}: expected one unit of {', '.join(UNITS)} for all markers, "
+            f"found {found}"
+        )
+    data = []
+    for line, row in block[4:]:
+        if not any(cell.strip() for cell in row):
+            break
+        if row[0].strip() in {"Model Outputs", "Devices", "Segments", "Joints", VICON_HEAD}:
+            break
+        data.append((line, row))
+    short = [name.rsplit(":", 1)[-1] for name in names]
+    names = short if len(set(short)) == len(short) else names
+    frame = _frames(file, data)
+    places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=block[4][0])
+    scale_m = UNITS[units.pop()]
+    return projected(file, names, places, scale_m, rate_hz or stated, choice, frame)
+
+
+def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
+    """Load a TRC; see ``load.load_file``."""
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.reader(stream, delimiter="\t"))
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(f"{file}: is not a TRC in UTF-8") from None
+    if len(rows) < 6:
+        raise InputError(f"{file}: expected the five head lines of a TRC, then rows")
+    about = dict(zip((cell.strip() for cell in rows[1]), rows[2], strict=False))
+    unit, stated = about.get("Units", "").strip().lower(), number_or_none(about.get("DataRate", ""))
+    if unit not in UNITS:
+        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
+    names = [cell.strip() for cell in rows[3][2:] if cell.strip()]
+    if not names or len(names) > _MOST_COLUMNS // 3:
+        raise InputError(f"{file}: line 4: expected Frame#, Time and the names of markers")
+    data = [
+        (line, row)
+        for line, row in enumerate(rows[4:], start=5)
+        if row and number_or_none(row[0].strip()) is not None
+    ]
+    frame = _frames(file, data)
+    first = data[0][0]
+    places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=first)
+    if not stated and rate_hz is None:
+        raise InputError(f"{file}: states no DataRate; say --rate with frames a second")
+    found = projected(file, names, places, UNITS[unit], rate_hz or stated, choice, frame)
+    _check_count(file, "NumFrames", about, len(data))
+    return found
+
+
+def _check_count(file: Path, key: str, about: dict[str, str], rows: int) -> None:
+    """Reject a file that has fewer rows than its head states."""
+    stated = number_or_none(about.get(key, ""))
+    if stated is not None and rows < stated:
+        raise InputError(f"{file}: states {key} {stated:g} and has {rows} rows; copy it again")
+
+
+def _frames(file: Path, data: list[tuple[int, list[str]]]) -> Ints:
+    """(T,) frame numbers of numbered rows."""
+    if len(data) < 2:
+        raise InputError(f"{file}: holds {len(data)} frames; a motion needs at least 2")
+    numbers = []
+    for line, row in data:
+        number = number_or_none(row[0].strip())
+        if number is None:
+            raise InputError(f"{file}: line {line}: expected a frame number, found {row[0]!r}")
+        numbers.append(number)
+    return frame_numbers(str(file), np.array(numbers))

@@ -1,0 +1,259 @@
+"""Joint angles of CSV tables, ROS 2 bags and LeRobot datasets play on a robot's joints."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.console.plugins import names
+from snakewalk.controller.motion.joint_motion import joint_motion, onto_robot
+from snakewalk.controller.run.factory import prepare_playback
+from tests.helpers.command import snakewalk
+
+ROBOT = load_robot("yaw16")
+NAMES = ROBOT.joint_names
+RATE_HZ, ROWS = 20.0, 60
+TIME_S = np.arange(ROWS) / RATE_HZ
+ANGLES = 0.3 * np.sin(2.0 * np.pi * (0.5 * TIME_S[:, None] - np.arange(len(NAMES)) / 10.0))
+
+
+def table(path: Path, header: list[str], values: np.ndarray = ANGLES, separator: str = ",") -> None:
+    rows = [separator.join(header)]
+    rows += [separator.join([f"{at:.4f}", *(f"{v:.6f}" for v in row)])
+             for at, row in zip(TIME_S, values, strict=True)]  # fmt: skip
+    path.write_text("\n".join(rows) + "\n")
+
+
+def bag(path: Path, joints: tuple[str, ...] = NAMES, *, trajectory: bool = False) -> None:
+    from mcap.writer import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = store.types
+    time, duration = types["builtin_interfaces/msg/Time"], types["builtin_interfaces/msg/Duration"]
+    header = types["std_msgs/msg/Header"]
+    none = np.zeros(0)
+
+    def parts(at: float) -> tuple[int, int]:
+        return int(at), round(1e9 * (at - int(at)))
+
+    writer = Writer(str(path))
+    writer.start(profile="ros2")
+
+    def send(topic: str, kind: str, at: float, message: object) -> None:
+        text = store.generate_msgdef(kind, ros_version=2)[0]
+        schema = writer.register_schema(kind, "ros2msg", text.encode())
+        channel = writer.register_channel(topic, "cdr", schema)
+        writer.add_message(channel, round(at * 1e9), bytes(store.serialize_cdr(message, kind)), 0)
+
+    if trajectory:
+        kind = "trajectory_msgs/msg/JointTrajectory"
+        point = types["trajectory_msgs/msg/JointTrajectoryPoint"]
+        points = [point(row, none, none, none, duration(*parts(at)))
+                  for at, row in zip(TIME_S, ANGLES, strict=True)]  # fmt: skip
+        send("/goal", kind, 1.0, types[kind](header(time(1, 0), ""), list(joints), points))
+    else:
+        kind = "sensor_msgs/msg/JointState"
+        for k, (at, row) in enumerate(zip(TIME_S, ANGLES, strict=True)):
+            order = np.roll(np.arange(len(joints)), k % 2)  # publishers may change the order
+            named = [joints[n] for n in order]
+            stamp = header(time(*parts(7.0 + at)), "")
+            send("/joint_states", kind, 7.0 + at, types[kind](stamp, named, row[order], none, none))
+    writer.finish()
+
+
+def dataset(path: Path, version: str = "v2.1", unit: float = 1.0) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    feature = {"dtype": "float32", "names": {"motors": [f"{name}.pos" for name in NAMES]}}
+    about = {"codebase_version": version, "fps": RATE_HZ, "total_episodes": 2}
+    (path / "meta").mkdir(parents=True)
+    (path / "meta" / "info.json").write_text(
+        json.dumps(about | {"features": {"observation.state": feature}})
+    )
+    folder = path / "data" / "chunk-000"
+    folder.mkdir(parents=True)
+    tables = [
+        pyarrow.table({
+            "timestamp": TIME_S,
+            "episode_index": np.full(ROWS, episode),
+            "observation.state": list(unit * ANGLES * (1.0 - 0.5 * episode)),
+        })
+        for episode in (0, 1)
+    ]  # fmt: skip
+    if version == "v3.0":
+        pyarrow.parquet.write_table(pyarrow.concat_tables(tables), folder / "file-000.parquet")
+        return
+    for episode, held in enumerate(tables):
+        pyarrow.parquet.write_table(held, folder / f"episode_{episode:06d}.parquet")
+
+
+def plays(path: Path, expected: np.ndarray = ANGLES, **options: object) -> tuple[str, ...]:
+    """Prepare the file, compare the joints, and return the notes."""
+    prepared = prepare_playback(str(path), **options)
+    time_s, joints = prepared.joint_track
+    np.testing.assert_allclose(time_s, TIME_S, atol=1e-6)
+    np.testing.assert_allclose(joints, expected, atol=1e-5)
+    return prepared.notes
+
+
+def test_readers_are_plug_ins() -> None:
+    assert {"csv", "lerobot", "ros2"} <= set(names("joints"))
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "unit"),
+    [
+        (["time", *NAMES], 1.0, "rad"),
+        (["time [s]", *(f"{name}_deg" for name in NAMES)], 180.0 / np.pi, None),
+        (["t", *(f"{name} [rad]" for name in NAMES)], 1.0, None),
+        (["time_s", *NAMES], 180.0 / np.pi, "deg"),
+    ],
+)
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_table_of_joint_angles(
+    header: list[str], factor: float, unit: str | None, separator: str, tmp_path: Path
+) -> None:
+    table(tmp_path / "a.csv", header, factor * ANGLES, separator)
+    (mapping,) = plays(tmp_path / "a.csv", unit=unit)
+    assert mapping.startswith(f"joints by name: {NAMES[0]} = {NAMES[0]}")
+
+
+def test_a_table_that_states_no_unit_is_asked_about_with_the_likely_one(tmp_path: Path) -> None:
+    table(tmp_path / "a.csv", ["time", *NAMES])
+    with pytest.raises(InputError, match=r"does not state the unit.*say --unit rad"):
+        plays(tmp_path / "a.csv")
+    table(tmp_path / "a.csv", ["time", *NAMES], 180.0 / np.pi * ANGLES)
+    with pytest.raises(InputError, match=r"go to 17\.2; say --unit deg"):
+        plays(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("trajectory", [False, True])
+def test_a_bag_of_joint_states_or_of_a_trajectory(trajectory: bool, tmp_path: Path) -> None:
+    bag(tmp_path / "b.mcap", trajectory=trajectory)
+    notes = plays(tmp_path / "b.mcap")
+    assert notes[0].startswith("joints by name")
+    assert notes[1] == f"topic {'/goal' if trajectory else '/joint_states'}"
+
+
+def test_a_bag_without_joints_or_that_is_cut_is_one_line(tmp_path: Path) -> None:
+    bag(tmp_path / "b.mcap")
+    data = (tmp_path / "b.mcap").read_bytes()
+    with pytest.raises(InputError, match=r"--topic /tf: no joint messages there.*/joint_states"):
+        plays(tmp_path / "b.mcap", topic="/tf")
+    (tmp_path / "b.mcap").write_bytes(data[: len(data) // 2])
+    with pytest.raises(InputError, match="cannot be read as a ROS 2 bag"):
+        plays(tmp_path / "b.mcap")
+
+
+@pytest.mark.parametrize("version", ["v2.1", "v3.0"])
+def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
+    dataset(tmp_path / "set", version, 180.0 / np.pi)
+    with pytest.raises(InputError, match="has 2 episodes; say --episode 0 to 1"):
+        plays(tmp_path / "set")
+    with pytest.raises(InputError, match=r"does not state its unit.*--unit deg"):
+        plays(tmp_path / "set", episode=1)
+    joints = {name: f"{name}.pos" for name in NAMES}
+    notes = plays(tmp_path / "set", 0.5 * ANGLES, episode=1, unit="deg", joints=joints)
+    assert f"{NAMES[0]} = {NAMES[0]}.pos" in notes[0]
+    assert notes[1] == f"episode 1 of 2, observation.state, LeRobot {version}"
+    assert plays(tmp_path / "set", episode=0, unit="deg")[0].startswith("joints by their order")
+
+
+def test_joints_are_mapped_by_request_and_the_rest_is_reported() -> None:
+    motion = joint_motion(Path("a"), TIME_S, [f"m{k}" for k in range(17)],
+                          np.column_stack([ANGLES, TIME_S]))  # fmt: skip
+    with pytest.raises(InputError, match=f"a: no joint for {NAMES[0]},.*--joint {NAMES[0]}=NAME"):
+        onto_robot(motion, ROBOT, {}, "a")
+    asked = {name: f"m{k}" for k, name in enumerate(NAMES)} | {NAMES[3]: "rest"}
+    joints, lines = onto_robot(motion, ROBOT, asked, "a")
+    assert not joints[:, 3].any()
+    np.testing.assert_array_equal(joints[:, 4], ANGLES[:, 4])
+    assert lines[1] == "2 joints of the file are not used, 2 of them move: m3, m16"
+    with pytest.raises(InputError, match="--joint tail=m1: yaw16 has"):
+        onto_robot(motion, ROBOT, {"tail": "m1"}, "a")
+    with pytest.raises(InputError, match=f"--joint {NAMES[0]}=x: a has m0"):
+        onto_robot(motion, ROBOT, {NAMES[0]: "x"}, "a")
+
+
+def test_gaps_and_rows_without_a_value_are_counted() -> None:
+    kept = np.setdiff1d(np.arange(ROWS), np.arange(20, 29))
+    angles = ANGLES[kept].copy()
+    angles[5, 2] = np.nan
+    motion = joint_motion(Path("a"), TIME_S[kept], NAMES, angles)
+    assert motion.notes == (
+        "1 of 51 rows lack a value and are left out",
+        "10 rows are missing in 2 gaps of up to 0.5 s; the joints move evenly over them",
+    )
+
+
+def broken(change: Callable[[str], str]) -> Callable[[Path], None]:
+    def make(path: Path) -> None:
+        table(path, ["time", *NAMES])
+        path.write_text(change(path.read_text()))
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (broken(lambda text: text.replace("0.0500,", "0.0000,", 1)), "time must increase"),
+        (broken(lambda text: text.replace("0.1000,", "0.1000,left,", 1)), "line 4: 17 cells|18"),
+        (broken(lambda text: text.replace(f",{NAMES[1]},", f",{NAMES[0]},", 1)), "is there twice"),
+        (broken(lambda text: "\n".join(text.splitlines()[:2])), "1 whole rows"),
+    ],
+)
+def test_faults_of_a_table(make: Callable[[Path], None], said: str, tmp_path: Path) -> None:
+    make(tmp_path / "a.csv")
+    with pytest.raises(InputError, match=said):
+        plays(tmp_path / "a.csv", unit="rad")
+
+
+def test_options_of_joint_files_are_rejected_for_midlines() -> None:
+    with pytest.raises(InputError, match="--unit: worm-like has no joint angles with names"):
+        prepare_playback("worm-like", unit="rad")
+    assert snakewalk("play", "worm-like", "--unit", "grad").stderr.count("expected rad or deg") == 1
+
+
+def test_a_run_logs_the_mapping(tmp_path: Path) -> None:
+    table(tmp_path / "a.csv", ["time", *(f"{name}_rad" for name in NAMES)])
+    events: list[tuple[str, str]] = []
+    prepared = prepare_playback(str(tmp_path / "a.csv"))
+    prepared.make_source(lambda kind, text, *_: events.append((kind, text)))
+    assert ("recording", prepared.notes[0]) in events
+
+
+def test_damaged_files_of_each_reader_end_in_one_line(tmp_path: Path) -> None:
+    table(tmp_path / "a.csv", ["time", *(f"{name}_rad" for name in NAMES)])
+    bag(tmp_path / "b.mcap")
+    dataset(tmp_path / "set", "v3.0")
+    parquet = tmp_path / "set" / "data" / "chunk-000" / "file-000.parquet"
+    info = tmp_path / "set" / "meta" / "info.json"
+    rng = np.random.default_rng(0)
+    answers = {"episode": 0, "unit": "rad"}
+    for file, given in (
+        (tmp_path / "a.csv", {}),
+        (tmp_path / "b.mcap", {}),
+        (parquet, answers),
+        (info, answers),
+    ):
+        whole = file.read_bytes()
+        played = str(tmp_path / "set") if given else str(file)
+        for _ in range(25):
+            data = bytearray(whole)
+            for at in rng.integers(0, len(data), 3):
+                data[at] = rng.integers(0, 256)
+            file.write_bytes(data[: rng.integers(1, len(data))] if rng.random() < 0.3 else data)
+            faults: tuple[str, ...] = ("",)
+            try:
+                prepare_playback(played, **given)
+            except InputError as error:
+                faults = error.faults
+            assert len(faults) == 1
+        file.write_bytes(whole)

@@ -1,0 +1,41 @@
+"""Unclear sentences in pages, help, messages and docstrings become fewer."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.prose.findings import LONG, count
+from tests.prose.patterns import EXAMPLES, PATTERNS
+from tests.prose.texts import KINDS, page_paragraphs, sentences
+
+MOST = json.loads((Path(__file__).parent / "most_findings.json").read_text(encoding="utf-8"))
+"""Findings that are left by kind and pattern. A count that falls is lowered here; none rises."""
+LONG_SHARE = 0.02
+"""Largest share of long sentences."""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_pattern_becomes_more_frequent(kind: str) -> None:
+    counts = count(kind)
+    more = {name: (counts[name], most) for name, most in MOST[kind].items() if counts[name] > most}
+    assert not more, f"list them: python -m tests.prose {kind}"
+
+
+@pytest.mark.parametrize("kind", ["help", "messages", "pages"])
+def test_few_sentences_are_long(kind: str) -> None:
+    counts = count(kind)
+    assert counts[LONG] < LONG_SHARE * counts["sentences"]
+
+
+def test_the_patterns_find_their_examples() -> None:
+    for pattern, example in zip(PATTERNS.values(), EXAMPLES, strict=True):
+        assert re.search(pattern, example), example
+
+
+def test_a_page_is_divided_into_its_sentences() -> None:
+    page = "# A title\n\nOne. Two\nlines.\n\n```\nnot this\n```\n- item\n\n| a | b |\n| - | - |\n"
+    assert [one for text in page_paragraphs(page) for one in sentences(text)] == [
+        "A title", "One.", "Two lines.", "item", "a", "b",
+    ]  # fmt: skip

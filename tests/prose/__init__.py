@@ -1,0 +1,1 @@
+"""Check of sentences: patterns, texts and findings."""

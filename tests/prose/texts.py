@@ -1,0 +1,133 @@
+"""Sentences of pages, help texts, messages and docstrings."""
+
+import ast
+import io
+import re
+import tokenize
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import typer
+
+from tests.architecture.layout import TOPS
+
+ROOT = Path(__file__).resolve().parents[2]
+NOT_PROSE = ("CHANGELOG.md", "docs/decisions/")
+"""Pages whose text is history."""
+
+
+def sentences(text: str) -> list[str]:
+    """Sentences of one paragraph, without code spans and link targets."""
+    plain = re.sub(r"`[^`]*`", "CODE", re.sub(r"\]\([^)]*\)", "]", text))
+    plain = re.sub(r"[*_]{1,2}(\S[^*_]*?)[*_]{1,2}", r"\1", " ".join(plain.split()))
+    return [part for part in re.split(r"(?<=[.!?])\s+(?=[A-Z*`(\[])", plain) if part]
+
+
+def page_paragraphs(text: str) -> Iterator[str]:
+    """Paragraphs, list items, headings and table cells of a Markdown page, without code blocks."""
+    text = re.sub(r"^(```|~~~).*?^\1", "", text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^\|[ :|-]+\|$", "", text, flags=re.MULTILINE)
+    block: list[str] = []
+    for line in [*text.splitlines(), ""]:
+        starts = re.match(r"\s*(?:[-*] |\d+\. |#+ |>|\|)", line)
+        if starts or not line.strip() or line.startswith("    "):
+            if block:
+                yield " ".join(block)
+            block = []
+        if line.startswith("    ") and not starts:
+            continue
+        if line.startswith("|"):
+            yield from (cell.strip() for cell in line.strip("|").split("|"))
+        elif line.strip():
+            block.append(line.strip().lstrip("#->* "))
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """Place and paragraph of the README, CONTRIBUTING and every page of the site."""
+    files = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    for file in files:
+        name = file.relative_to(ROOT).as_posix()
+        if not name.startswith(NOT_PROSE):
+            for paragraph in page_paragraphs(file.read_text(encoding="utf-8")):
+                yield name, paragraph
+
+
+@cache
+def sources() -> tuple[tuple[str, str, list[ast.AST]], ...]:
+    """Name, text and nodes of every file of the library."""
+    return tuple(
+        (file.relative_to(ROOT).as_posix(), text, list(ast.walk(ast.parse(text))))
+        for top in TOPS
+        for file in sorted((ROOT / top).rglob("*.py"))
+        for text in [file.read_text(encoding="utf-8")]
+    )
+
+
+def docstrings() -> Iterator[tuple[str, str]]:
+    """Place and paragraph of docstrings, strings below attributes, and comments."""
+    for name, source, nodes in sources():
+        for node in nodes:
+            value = node.value if isinstance(node, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                for paragraph in re.split(r"\n\s*\n", value.value):
+                    yield f"{name}:{value.lineno}", " ".join(paragraph.split())
+        for token in tokenize.generate_tokens(io.StringIO(source).readline):
+            if token.type == tokenize.COMMENT and "noqa" not in token.string:
+                yield f"{name}:{token.start[0]}", token.string.lstrip("#: ")
+
+
+def messages() -> Iterator[tuple[str, str]]:
+    """Place and text of the other strings of the library that have four words or more."""
+    for name, _, nodes in sources():
+        skipped = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        for node in nodes:
+            if isinstance(node, ast.JoinedStr):
+                skipped |= {id(part) for part in node.values}
+        for node in nodes:
+            if id(node) in skipped:
+                continue
+            if isinstance(node, ast.JoinedStr):
+                text = "".join(
+                    str(part.value) if isinstance(part, ast.Constant) else "VALUE"
+                    for part in node.values
+                )
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                text = node.value
+            else:
+                continue
+            if len(re.findall(r"\b[a-z]{2,}\b", text)) > 3 and "\n" not in text.strip():
+                yield f"{name}:{node.lineno}", " ".join(text.split())
+
+
+def help_texts() -> Iterator[tuple[str, str]]:
+    """Command and text of every help, argument and option."""
+    from snakewalk.controller.cli.command_line import app
+
+    def walk(command: Any, words: str) -> Iterator[tuple[str, str]]:
+        for paragraph in re.split(r"\n\s*\n", command.help or ""):
+            yield words, " ".join(paragraph.split())
+        for parameter in command.params:
+            if text := getattr(parameter, "help", None):
+                yield f"{words} {parameter.name}", text
+        if hasattr(command, "list_commands"):
+            context = command.make_context(words, [], resilient_parsing=True)
+            for name in command.list_commands(context):
+                yield from walk(command.get_command(context, name), f"{words} {name}")
+
+    yield from walk(typer.main.get_command(app), "snakewalk")
+
+
+KINDS: Final[dict[str, Callable[[], Iterator[tuple[str, str]]]]] = {
+    "pages": pages,
+    "help": help_texts,
+    "messages": messages,
+    "docstrings": docstrings,
+}
+
+
+@cache
+def read(kind: str) -> tuple[tuple[str, str], ...]:
+    """Place and sentence of all texts of a kind."""
+    return tuple((place, one) for place, text in KINDS[kind]() for one in sentences(text))
