@@ -1,9 +1,8 @@
 """Carry out a prepared run: folder, log, link, loop, summary."""
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, cast
 
@@ -11,7 +10,6 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig, RunConfig, SafetyConfig
-from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
@@ -31,6 +29,7 @@ from snakewalk.controller.run.backend import (
     simulated,
     split,
 )
+from snakewalk.controller.run.external.second_body import second_body, use_worker
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.run.observer_watch import ObserverWatch, Watcher
 from snakewalk.controller.run.pose_provider import (
@@ -53,16 +52,8 @@ from snakewalk.controller.runtime.drive import (
     Outcome,
     Sensors,
 )
-from snakewalk.controller.runtime.friction_monitor import (
-    FrictionMonitor,
-    OnPaper,
-    OnTwin,
-    SlideModel,
-)
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
-from snakewalk.controller.walk.pilot import UsesFriction
-from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
 from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError
@@ -250,9 +241,13 @@ class _Execution:
             pose_provider(prepared, backend, log_event, **shown) as pose,
             map_provider(prepared, backend, pose.measure, self.folder, log_event) as mapped,
             _stop_output(safety, backend) as output,
+            ExitStack() as workers,
         ):
             source = prepared.make_source(log_event)
-            friction = _second_body(prepared, source, backend)
+            friction = second_body(prepared, source, backend)
+            if self.port is not None and pose_evidence(prepared, backend).is_measured:
+                now_s = None if self.rehearsed is None else clock.now_s
+                use_worker(prepared, source, now_s, workers)
             if self.waypoint_commands is not None:
                 source = _live(prepared, source, self.waypoint_commands, log_event)
             link = SafeLink(
@@ -329,38 +324,6 @@ def _live(
     if not isinstance(prepared, PathRun) or not isinstance(source, OnCourse):
         raise InputError(f"run {prepared.run.name}: its motion has no waypoints that can be set")
     return LiveCourse(cast(MotionOnCourse, source), commands, prepared.check_waypoint, on_event)
-
-
-def _second_body(
-    prepared: PreparedRun, source: MotionSource, backend: Backend
-) -> FrictionMonitor | None:
-    """Let a bare snake that walks ground that is known use a second body, where there is one.
-
-    Returns:
-        The estimator of the friction under a walk: on a level floor on paper, elsewhere on that
-            body.
-        None if the pose does not depend on it: the joints or an IMU assume the friction.
-
-    """
-    run, world, robot = prepared.run, prepared.world, prepared.robot
-    if run.mapping is not None or robot.limb_joints:
-        return None
-    twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None
-    tries = run.walk.tries > 0 and prepared.ground is not None
-    if twin is not None and tries and isinstance(source, UsesTwin):
-        source.use_twin(TwinRollout(robot, twin, world.friction))
-    finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
-    measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
-    if not finds or not measured or isinstance(world.ground, WaterGround):
-        return None
-    if isinstance(world.ground, FlatGround) and world.obstacle is None:
-        model: SlideModel = OnPaper()  # moves no second body in every walk
-    elif twin is not None:
-        model = OnTwin(robot, twin)
-    else:
-        return None
-    use = cast(UsesFriction, source).use_friction
-    return FrictionMonitor(world.friction, model, 1.0 / run.cycle_hz, use)
 
 
 @contextmanager

@@ -44,6 +44,12 @@ class AngleTrack:
         other.append(piece_rad)
         return other
 
+    def without(self, count: int) -> "AngleTrack":
+        """Return a copy without the oldest ``count`` samples."""
+        other = copy.copy(self)
+        other._samples = self._samples[count:].copy()
+        return other
+
     def restart(self, body_rad: Floats) -> None:
         """Go on from a body (N,), head first, that came about otherwise: its head is at the end."""
         self.append(body_rad[::-1])

@@ -52,6 +52,17 @@ class JointTrack:
         other.track = track
         return other
 
+    def recent(self, first: int) -> tuple["JointTrack", int]:
+        """Return a copy whose tables begin at a head, and the number of samples left out.
+
+        Its heads count from the begin of the track that is left.
+        """
+        other, first = copy.copy(self), max(first, self.first)
+        left_out = first - self.track.points
+        other.track = self.track.without(left_out)
+        other._q, other.first = self._q[first - self.first :].copy(), first - left_out
+        return other, left_out
+
     def restart(self) -> None:
         """Begin again at the end of the track, where the body lies now."""
         self.first = self.track.end

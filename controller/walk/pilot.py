@@ -8,7 +8,7 @@ method, kept to show what a body with friction makes of it.
 """
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -34,12 +34,15 @@ from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
+from snakewalk.controller.walk.twin_answers import Coasting, TwinAsker
 from snakewalk.controller.walk.twin_rollout import LENGTH_BODIES, TwinRollout
 
 # Segments of track that remain when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
 _THINK_SEGMENTS = 9.0
 """Track on which a decision is thought about, a little in each cycle, before it is needed."""
+_RECENT_SEGMENTS = 30
+"""Track behind the head, besides the body, that a twin elsewhere is sent."""
 _PITCH_SMOOTHING_S = 0.1
 
 # Shorter steps are saved up: they are too short to measure a speed.
@@ -99,6 +102,14 @@ class TriesPieces(Protocol):
 
 
 @runtime_checkable
+class AsksAboutPieces(Protocol):
+    """A ``ShapeChooser`` that asks about pieces, and may get answers before it decides."""
+
+    ask: Callable[[PathPose, Sequence[Floats]], None] | None
+    answers: Callable[[], Mapping[int, Rolled | None]]
+
+
+@runtime_checkable
 class UsesFriction(Protocol):
     """A motion, or a ``ShapeChooser``, that reckons with friction."""
 
@@ -154,6 +165,7 @@ class Pilot(OnCourse):
         self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._twin: TwinRollout | None = None
+        self._asker: TwinAsker | None = None
         self._start: tuple[Floats, float] | None = None
         self._at_rest = True
         self._decides = True
@@ -228,6 +240,8 @@ class Pilot(OnCourse):
         restart(np.interp(at, np.arange(self._links), view.headings_rad))
         if self._twin is not None:
             self._twin.forget()
+        if self._asker is not None:
+            self._asker.forget()
         self._time_law.restart()
         self._pitch_rad, self._at_rest, self._decides = None, True, True
         self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
@@ -248,6 +262,8 @@ class Pilot(OnCourse):
     def _steer(self, dt_s: float, view: BodyView) -> Floats:
         if self._twin is not None:
             self._twin.observe(view, dt_s)
+        if self._asker is not None:
+            self._asker.observe(view, dt_s)
         self.course.follow(
             view.centre_m[:2],
             view.link_m[0, :2],
@@ -297,12 +313,20 @@ class Pilot(OnCourse):
             self._twin = twin
             self._chooser.try_piece = self._try_piece
 
+    def use_asker(self, asker: TwinAsker) -> None:
+        """Let the chooser ask a twin elsewhere about pieces of track."""
+        if isinstance(self._chooser, AsksAboutPieces):
+            self._asker = asker
+            self._chooser.ask, self._chooser.answers = self._ask, asker.results
+
     def use_friction(self, friction: FrictionConfig) -> None:
         """Reckon with this friction from now on: the chooser, and the twin."""
         if isinstance(self._chooser, UsesFriction):
             self._chooser.use_friction(friction)
         if self._twin is not None:
             self._twin.friction = friction
+        if self._asker is not None:
+            self._asker.friction = friction
 
     @property
     def twin(self) -> TwinRollout | None:
@@ -311,17 +335,38 @@ class Pilot(OnCourse):
 
     def coasting(self, piece_rad: Floats) -> "Pilot":
         """Return a copy that goes on by itself to the end of the track and a piece (n,) more."""
-        other, track = copy.copy(self), self._chooser.track.with_piece(piece_rad)
-        other._time_law, other._roll = self._time_law.on(track), copy.copy(self._roll)
-        other._coasts = True
+        now = Coasting(self._time_law, self._roll, self._pitch_rad)
+        return self._coasting_from(now, piece_rad)
+
+    def _coasting_from(self, state: Coasting, piece_rad: Floats) -> "Pilot":
+        other, track = copy.copy(self), state.time_law.joints.track.with_piece(piece_rad)
+        other._time_law, other._roll = state.time_law.on(track), copy.copy(state.roll)
+        other._pitch_rad, other._coasts = state.pitch_rad, True
         return other
 
     def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
         """What becomes of the body on a piece (n,) that would be appended to the track."""
+        return self.tried_from(
+            Coasting(self._time_law, self._roll, self._pitch_rad), pose, piece_rad
+        )
+
+    def _ask(self, pose: PathPose, pieces_rad: Sequence[Floats]) -> None:
+        """Ask what becomes of the body on pieces (n,) that would be appended to the track."""
+        assert self._asker is not None
+        recent = self._time_law.recent(_RECENT_SEGMENTS)
+        self._asker.ask(pose, Coasting(recent, self._roll, self._pitch_rad), pieces_rad)
+
+    def tried_from(self, state: Coasting, pose: PathPose, piece_rad: Floats) -> Rolled:
+        """Return what becomes of a body that goes on so, on a piece (n,) more of track.
+
+        Raises:
+            PhysicsError: the twin diverged.
+
+        """
         assert self._twin is not None
-        other = self.coasting(piece_rad)
+        other = self._coasting_from(state, piece_rad)
         track = other._time_law.joints.track
-        end = min(self.head + LENGTH_BODIES * track.points, track.end - _LOOKAHEAD_SEGMENTS)
+        end = min(other.head + LENGTH_BODIES * track.points, track.end - _LOOKAHEAD_SEGMENTS)
         return self._twin.roll(pose, lambda: other.head >= end, other._move)
 
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:

@@ -6,7 +6,7 @@ are judged by ``Steering``. W orders the states, so that the walk never repeats 
 chooses among the first of them.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -118,6 +118,12 @@ class PredictiveWalker:
         self._lost = False
         self.try_piece: Callable[[PathPose, Floats], Rolled] | None = None
         """Tries a piece (n,) on a simulated body; None where there is none."""
+        self.ask: Callable[[PathPose, Sequence[Floats]], None] | None = None
+        """Asks a simulated body elsewhere about pieces (n,); None without one."""
+        self.answers: Callable[[], Mapping[int, Rolled | None]] = dict
+        """Returns the results that have arrived, by the number of the piece."""
+        self._asked: list[_Tried] = []
+        self._in_trouble = False
         self.outlook = 1.0
         """Predicted of the last decision: progress over that at the wanted pulse without slip.
 
@@ -155,7 +161,7 @@ class PredictiveWalker:
         if self._thinking is None:
             pose = look()
             self.steering.observe(pose)
-            self._tried = []
+            self._tried, self._asked = [], []
             self._thinking = self._judge(pose)
         return next(self._thinking, False)
 
@@ -166,7 +172,7 @@ class PredictiveWalker:
         while self.track.end == self.track.points and self.think(lambda: pose):
             pass
         self._thinking = None
-        best = self._tried_best(pose, self._best())
+        best = self._answered_best(self._tried_best(pose, self._best()))
         self.outlook = best.progress
         option, keep = best.option, self._keep
         if self._is_new:
@@ -221,6 +227,44 @@ class PredictiveWalker:
         cost_m2, progress = self.steering.cost(self.try_piece(pose, piece.piece_rad))
         return piece._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
 
+    def _answered_best(self, best: _Tried) -> _Tried:
+        """Return the piece that is best on a simulated body elsewhere, of those answered in time.
+
+        Without an answer about the best piece on paper, another one has to be good.
+        """
+        found: _Tried | None = None
+        is_best_known = False
+        for number, rolled in self.answers().items():
+            if rolled is not None and number < len(self._asked):
+                cost_m2, progress = self.steering.cost(rolled)
+                tried = self._asked[number]
+                tried = tried._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
+                is_best_known = is_best_known or tried.piece_rad is best.piece_rad
+                if found is None or tried.cost_m2 < found.cost_m2:
+                    found = tried
+        self._asked = []
+        if found is None:
+            return best
+        self._in_trouble = found.cost_m2 > _TROUBLE_M2
+        if self._in_trouble and not is_best_known:
+            return best
+        if found.option is not best.option:
+            self._until = self._at  # another state begins here
+        return found
+
+    def _ask_about(self, pose: PathPose) -> Iterator[bool]:
+        """Ask about the best piece and others, in trouble about the others first."""
+        best = self._best()
+        if self.ask is None or self._lost or self._walk.tries == 0 or not best.cost_m2 < np.inf:
+            return
+        if not self.steering.is_steep(pose):
+            return
+        if self._in_trouble:
+            yield from self._screen(pose, [best.option], FAR)
+        chosen = [best, *self._unlike(best)]
+        self._asked = [*chosen[1:2], best, *chosen[2:]] if self._in_trouble else chosen
+        self.ask(pose, [each.piece_rad for each in self._asked])
+
     def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
         """Pieces unlike each other, the cheapest first: of the state under way, and of others."""
         self._roll(pose, [(best.option, bends) for bends in FAR])
@@ -230,6 +274,10 @@ class PredictiveWalker:
                 options += self._new_options(pose, carrier)[:3]
             for option in options:
                 self._roll(pose, [(option, bends) for bends in UNLIKE])
+        return self._unlike(best)
+
+    def _unlike(self, best: _Tried) -> list[_Tried]:
+        """Return judged pieces that are unlike the best and each other, the cheapest first."""
         chosen = [best]
         for each in sorted(self._tried, key=lambda each: each.cost_m2):
             if len(chosen) == self._walk.tries:
@@ -261,6 +309,7 @@ class PredictiveWalker:
         if best.cost_m2 > _ASTRAY_M2:
             yield from self._screen(pose, [best.option], FAR)
             yield from self._narrow(pose)
+        yield from self._ask_about(pose)
 
     def _narrow(self, pose: PathPose) -> Iterator[bool]:
         """Judge bends about the best, and where a parabola through them is least.

@@ -38,6 +38,7 @@ from snakewalk.controller.walk.roll_planner import (
     RollPlan,
     RollPlanner,
 )
+from snakewalk.controller.walk.twin_answers import TwinAsker
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
 LEAST_SPEED_M_S = 0.04
@@ -136,6 +137,10 @@ class SideRolls(MotionWrapper, OnCourse):
     def use_twin(self, twin: TwinRollout) -> None:
         """Let the walk try pieces of track on a twin of the robot."""
         self._pilot.use_twin(twin)
+
+    def use_asker(self, asker: TwinAsker) -> None:
+        """Let the walk ask a twin elsewhere about pieces of track."""
+        self._pilot.use_asker(asker)
 
     def use_friction(self, friction: FrictionConfig) -> None:
         """Let the walk reckon with this friction from now on."""

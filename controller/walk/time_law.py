@@ -55,6 +55,16 @@ class TimeLaw:
         other.joints = self.joints.on(track)
         return other
 
+    def recent(self, segments: int) -> "TimeLaw":
+        """Return a copy that goes on by itself, without the track ``segments`` behind the head.
+
+        Its heads count from the begin of the track that is left.
+        """
+        other = copy.copy(self)
+        other.joints, left_out = self.joints.recent(int(self.head) - segments)
+        other.head, other._first = self.head - left_out, self._first - left_out
+        return other
+
     def restart(self) -> None:
         """Begin again, at rest, at the end of the track, where the body lies now."""
         self.joints.restart()

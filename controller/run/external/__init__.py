@@ -1,1 +1,1 @@
-"""Robots and poses outside of the program: external pose sources, and robots that are served."""
+"""Parts outside of the control loop: pose sources, served robots, and the second body."""

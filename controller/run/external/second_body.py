@@ -1,0 +1,87 @@
+"""The second body of a run: in this process beside a simulated robot, in a worker for a port."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import cache
+from importlib.util import find_spec
+from typing import cast
+
+from snakewalk.config.world import FlatGround, WaterGround
+from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.run.backend import Backend
+from snakewalk.controller.run.external.twin_worker import ProcessTwin, RehearsedTwin, TwinTrial
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.runtime.friction_monitor import (
+    FrictionMonitor,
+    OnPaper,
+    OnTwin,
+    SlideModel,
+)
+from snakewalk.controller.walk.pilot import UsesFriction
+from snakewalk.controller.walk.twin_answers import AsksTwin, TwinAsker
+from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
+
+
+def use_worker(
+    prepared: PreparedRun,
+    source: MotionSource,
+    now_s: Callable[[], float] | None,
+    until: ExitStack,
+) -> None:
+    """Let a walk over known hills ask a second body in another process.
+
+    Without MuJoCo the walk decides on paper.
+
+    Args:
+        prepared: run on a port, with a measured pose.
+        source: its motion.
+        now_s: simulated time of a rehearsal; None: a worker process answers when it can.
+        until: ends the worker.
+
+    """
+    run, robot, world = prepared.run, prepared.robot, prepared.world
+    if not isinstance(prepared, WalkRun) or not isinstance(source, AsksTwin):
+        return
+    tries = run.walk.tries > 0 and prepared.ground is not None and run.mapping is None
+    if not tries or run.motion != "walk" or robot.limb_joints or find_spec("mujoco") is None:
+        return
+    twin: RehearsedTwin | ProcessTwin
+    if now_s is None:
+        twin = ProcessTwin(run, robot, world)
+    else:
+        twin = RehearsedTwin(TwinTrial(run, robot, world), now_s)
+    until.callback(twin.close)
+    source.use_asker(TwinAsker(robot, twin, world.friction))
+
+
+def second_body(
+    prepared: PreparedRun, source: MotionSource, backend: Backend
+) -> FrictionMonitor | None:
+    """Let a bare snake that walks ground that is known use a second body, where there is one.
+
+    Returns:
+        The estimator of the friction under a walk: on a level floor on paper, elsewhere on that
+            body.
+        None if the pose does not depend on it: the joints or an IMU assume the friction.
+
+    """
+    run, world, robot = prepared.run, prepared.world, prepared.robot
+    if run.mapping is not None or robot.limb_joints:
+        return None
+    twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None
+    tries = run.walk.tries > 0 and prepared.ground is not None
+    if twin is not None and tries and isinstance(source, UsesTwin):
+        source.use_twin(TwinRollout(robot, twin, world.friction))
+    finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
+    measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
+    if not finds or not measured or isinstance(world.ground, WaterGround):
+        return None
+    if isinstance(world.ground, FlatGround) and world.obstacle is None:
+        model: SlideModel = OnPaper()  # moves no second body in every walk
+    elif twin is not None:
+        model = OnTwin(robot, twin)
+    else:
+        return None
+    use = cast(UsesFriction, source).use_friction
+    return FrictionMonitor(world.friction, model, 1.0 / run.cycle_hz, use)

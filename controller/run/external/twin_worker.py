@@ -1,0 +1,154 @@
+"""A twin for a robot on a port: in another process, or for a rehearsal in simulated time."""
+
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Final
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.child_process import pipe, start
+from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.run.external.served_robot import physics_modules
+from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.walk.pilot import Pilot
+from snakewalk.controller.walk.twin_answers import TwinAnswer, TwinQuestion
+from snakewalk.controller.walk.twin_rollout import TwinRollout
+
+PIECE_S: Final = 0.12
+"""Time that a twin needs for a piece in a rehearsal (ours): CPU time on one core of an EPYC."""
+LARGEST_BYTES: Final = 60_000
+"""Size of a question that a pipe accepts at once; a larger one is not asked."""
+
+
+class TwinTrial:
+    """Tries the pieces of a question, one after the other."""
+
+    def __init__(self, run: RunConfig, robot: RobotConfig, world: WorldConfig) -> None:
+        self._prepared = WalkRun(run, robot, world)
+
+    @cached_property
+    def _pilot(self) -> Pilot:
+        """A pilot that follows what it is sent, with a twin."""
+        prepared = self._prepared
+        pilot = prepared.pilot()
+        _, twins = physics_modules()
+        twin = twins.PlantTwin(prepared.robot, prepared.world, prepared.ground)
+        pilot.use_twin(TwinRollout(prepared.robot, lambda: twin, prepared.world.friction))
+        return pilot
+
+    def prepare(self) -> None:
+        """Make the pilot and its twin within seconds."""
+        assert self._pilot.twin is not None
+
+    def answers(self, question: TwinQuestion) -> Iterator[TwinAnswer]:
+        """Yield the answers, each when it is known."""
+        pilot, robot = self._pilot, self._prepared.robot
+        twin = pilot.twin
+        assert twin is not None
+        twin.friction = question.friction
+        twin.forget()
+        for pose, joint_rad in question.bodies:
+            twin.observe(body_in_world(robot, pose, joint_rad), question.cycle_s)
+        for piece, piece_rad in enumerate(question.pieces_rad):
+            try:
+                rolled = pilot.tried_from(question.coasting, question.pose, piece_rad)
+            except RuntimeError:  # it has diverged
+                yield TwinAnswer(question.number, piece, None)
+            else:
+                yield TwinAnswer(question.number, piece, rolled.columns)
+
+
+class RehearsedTwin:
+    """A ``TwinAnswers`` in simulated time: an answer needs ``PIECE_S``."""
+
+    def __init__(self, trial: TwinTrial, now_s: Callable[[], float]) -> None:
+        self._trial, self._now_s = trial, now_s
+        self._pieces: Iterator[TwinAnswer] = iter(())
+        self._due_s = 0.0
+
+    def ask(self, question: TwinQuestion) -> None:
+        """Ask; a piece that is being tried is tried to its end first."""
+        now_s = self._now_s()
+        begin_s = max(now_s, min(self._due_s, now_s + PIECE_S))
+        self._pieces, self._due_s = self._trial.answers(question), begin_s + PIECE_S
+
+    def arrived(self) -> Sequence[TwinAnswer]:
+        """Return the answers that are due."""
+        found = list[TwinAnswer]()
+        while self._due_s <= self._now_s():
+            answer = next(self._pieces, None)
+            if answer is None:
+                break
+            found.append(answer)
+            self._due_s += PIECE_S
+        return found
+
+    def close(self) -> None:
+        """Do nothing: nothing has to be ended."""
+
+
+class ProcessTwin:
+    """A ``TwinAnswers`` in a worker process; use ``close``."""
+
+    def __init__(self, run: RunConfig, robot: RobotConfig, world: WorldConfig) -> None:
+        self._line, other = pipe()
+        self._process: SpawnProcess = start(_serve, other, run, robot, world, daemon=True)
+        other.close()
+        self._listens = False
+        self._kept = list[TwinAnswer]()
+
+    def ask(self, question: TwinQuestion) -> None:
+        """Ask if the worker has begun with the question before."""
+        self._kept = self._receive()
+        data = pickle.dumps(question)
+        if self._listens and len(data) <= LARGEST_BYTES:
+            self._listens = False
+            try:
+                self._line.send_bytes(data)
+            except OSError:  # it has ended
+                return
+
+    def arrived(self) -> Sequence[TwinAnswer]:
+        """Return the answers that have arrived."""
+        return self._receive()
+
+    def _receive(self) -> list[TwinAnswer]:
+        found = self._kept
+        self._kept = []
+        try:
+            while self._line.poll():
+                message = self._line.recv()
+                if message is None:
+                    self._listens = True
+                else:
+                    found.append(message)
+        except (EOFError, OSError):  # it has ended
+            self._listens = False
+        return found
+
+    def close(self) -> None:
+        """End the worker."""
+        self._line.close()
+        self._process.terminate()
+        self._process.join()
+
+
+def _serve(line: Connection, run: RunConfig, robot: RobotConfig, world: WorldConfig) -> None:
+    """Answer questions until the line is closed; None says that the worker listens."""
+    trial = TwinTrial(run, robot, world)
+    trial.prepare()
+    try:
+        line.send(None)
+        while True:
+            question = pickle.loads(line.recv_bytes())
+            line.send(None)
+            for answer in trial.answers(question):
+                line.send(answer)
+                if line.poll():  # another question
+                    break
+    except (EOFError, OSError):
+        return
