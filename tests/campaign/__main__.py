@@ -1,4 +1,4 @@
-"""``python -m tests.campaign``: all of it; writes the table in ``docs/campaign.md``."""
+"""``python -m tests.campaign``: all scenarios; writes the table of docs/benchmarks/campaign.md."""
 
 import argparse
 import shlex
@@ -13,7 +13,7 @@ from .campaign import campaign
 from .report import BEGIN, END, table
 from .scenarios import SCENARIOS
 
-DOC = Path(__file__).resolve().parents[2] / "docs" / "campaign.md"
+DOC = Path(__file__).resolve().parents[2] / "docs" / "benchmarks" / "campaign.md"
 
 
 def main() -> None:
