@@ -91,7 +91,7 @@ def main() -> None:
         known = explained.get(module, {})
         for mutant in left:
             reason = known.get(mutant.name)
-            reasons.append(f"- `{module}`, {mutant.name.replace('|', '&#124;')}: {reason}")
+            reasons.append(f"- `{module}`: `{mutant.name}`: {reason}")
             if reason is None:
                 unexplained.append(f"{module}:{mutant.line}: {mutant.name}")
         rows.append(f"| `{module}` | {len(every)} | {len(every) - len(left)} | {len(left)} |")
