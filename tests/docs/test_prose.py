@@ -50,6 +50,8 @@ def test_each_item_of_a_docstring_is_a_text() -> None:
       of two lines
     - another
 
+        a = code
+
     Args:
         beside: folder of
             the file.

@@ -1,6 +1,7 @@
 """Sentences of pages, help texts, messages and docstrings."""
 
 import ast
+import inspect
 import io
 import re
 import tokenize
@@ -66,10 +67,10 @@ def sources() -> tuple[tuple[str, str, list[ast.AST]], ...]:
 
 
 def docstring_paragraphs(text: str) -> Iterator[str]:
-    """Paragraphs and list items of a docstring; items of `Args:` and the like without names."""
+    """Paragraphs and list items of a docstring, without code blocks and names of arguments."""
     block: list[str] = []
     section = None
-    for line in [*text.splitlines(), ""]:
+    for line in [*inspect.cleandoc(text).splitlines(), ""]:
         indent = len(line) - len(line.lstrip())
         heading = re.fullmatch(r"\s*(Args|Attributes|Raises|Returns|Yields):", line)
         if heading:
@@ -82,7 +83,8 @@ def docstring_paragraphs(text: str) -> Iterator[str]:
             if block:
                 yield " ".join(block)
             block = []
-        if line.strip() and not heading:
+        is_code = indent >= 4 and section is None and not block and not starts
+        if line.strip() and not heading and not is_code:
             block.append(line[starts.end() :].strip() if starts else line.strip())
 
 
