@@ -271,8 +271,8 @@ class RobotConfig(JointValues):
         if not self.described_models:
             data.pop("described_models", None)
         for key in ("pose", "ros", "tags"):
-            if data[key] is None:
-                data.pop(key)
+            if data.get(key) is None:
+                data.pop(key, None)
         return data
 
     if not TYPE_CHECKING:

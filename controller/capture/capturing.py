@@ -185,11 +185,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             inside=region.inside,
             threshold=_threshold(options, footage),
         )
-        m_per_px = None
-        if options.marker is not None:
-            bare = detector.background if region is WHOLE else None
-            ground = whole[0] if bare is None else bare
-            m_per_px = scale_of_marker(options.marker, in_8_bits(ground))
+        m_per_px = _marker_scale(options, detector, region, whole[0])
     scale = 1.0
     if options.review is not None:
         scale = picture_scale(some[::3], footage.count, str(options.recording))
@@ -239,6 +235,16 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     if facts.warning is not None:
         LOGGER.warning(facts.warning)
     return facts
+
+
+def _marker_scale(
+    options: CaptureOptions, detector: BodyDetector, region: Region, image: DeepImage
+) -> float | None:
+    """Return the scale by the marker in an image or in the background; None without a marker."""
+    if options.marker is None:
+        return None
+    bare = detector.background if region is WHOLE else None
+    return scale_of_marker(options.marker, in_8_bits(image if bare is None else bare))
 
 
 def _write_pictures(

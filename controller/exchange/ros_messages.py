@@ -119,6 +119,8 @@ class RosMessages:
         yield from self.joints(record)
         yield from self.transforms(record)
         yield from self.head_poses(record)
+        evidence = record.header.pose_evidence
+        yield from self.odometry(record, evidence.position_m, evidence.heading_rad)
         yield from self.imu(record)
         yield from self._diagnostics(record)
         yield from self._events(record)

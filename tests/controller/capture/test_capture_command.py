@@ -186,7 +186,7 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
     assert done.returncode == 2
     told = [line for line in done.stderr.splitlines() if line.strip()]
     assert len(told) == 1
-    assert "junk.mp4: no frame can be read" in told[0]
+    assert "junk.mp4: OpenCV cannot read a frame" in told[0]
 
 
 @pytest.mark.parametrize(

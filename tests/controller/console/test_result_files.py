@@ -61,6 +61,7 @@ WRITERS_OF_A_KIND = frozenset(
         "runlog/writer.py",
         "terrain/growing_map.py",
         "track/readers/arrays.py",
+        "track/readers/writers.py",
     }
 )
 """Writers of one kind of file, as `save` is: their callers are examined."""

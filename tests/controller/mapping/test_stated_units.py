@@ -340,7 +340,7 @@ def room(count: int = 120) -> Any:
 
 def test_points_of_a_depth_camera_are_no_terrain_as_they_are(tmp_path: Path) -> None:
     file = pcd(tmp_path / "a.pcd", room(), 120, 120)
-    with pytest.raises(InputError, match=r"is a picture of 120 by 120 points, .* add --up -y"):
+    with pytest.raises(InputError, match=r"is a depth picture of 120 by 120 points .* add --up -y"):
         read(file)
     loose = pcd(tmp_path / "b.pcd", room(), 120 * 120, 1)
     with pytest.raises(InputError, match=r"is not ground seen from above: \d+ % .* --up AXIS"):

@@ -80,8 +80,10 @@ def test_a_torque_off_that_is_not_confirmed_says_what_tripped_and_where_the_log_
         main()
     assert end.value.code == 1
     log = tmp_path / "log.mcap"
-    assert capsys.readouterr().err.splitlines()[-1] == (
-        f"snakewalk: joint 3 is not confirmed; tripped by: a hand; log: {log}; its page: "
+    lines = capsys.readouterr().err.splitlines()
+    told = "; ".join(line.removeprefix("snakewalk: ") for line in lines)
+    assert told.endswith(
+        f"joint 3 is not confirmed; tripped by: a hand; log: {log}; its page: "
         f"snakewalk report {log}"
     )
     assert read_log(log).events[-1].text == "joint 3 is not confirmed"

@@ -100,5 +100,5 @@ def test_a_robot_that_cannot_bend_enough_is_refused_before_torque(tmp_path: Path
 def test_a_path_that_the_time_cannot_hold_is_told() -> None:
     far = prepare_walk("flat-square", motion="serpenoid", keys={"run.waypoints_m": [[100.0, 0.0]]})
     (told,) = far.warnings
-    assert told.startswith("a path of 100.0 m at a pulse of 0.30 m/s takes 336 s at least"), told
+    assert told.startswith("path: 100.0 m at a pulse of 0.30 m/s need at least 336 s"), told
     assert prepare_walk("flat-square", motion="serpenoid").warnings == ()

@@ -112,7 +112,7 @@ def test_a_supply_that_the_servos_do_not_take_is_refused_with_theirs(folder: Pat
     (folder / "bare.toml").write_text(
         'name = "bare"\njoint_axes = "yyyyyyyyyyyy"\n[servo]\nmodel = "XL330-M288"\n'
     )
-    said = r"robot bare: servo\.supply_v = 12: XL330-M288 takes 3\.1 to 7 V; recommended: .* = 5$"
+    said = r"robot bare: servo\.supply_v = 12: XL330-M288 accepts 3\.1 to 7 V; use supply_v = 5$"
     for prepare in (
         lambda: prepare_walk("short.toml", robot="bare.toml"),
         lambda: prepare_gait("lateral-undulation", robot="bare.toml"),

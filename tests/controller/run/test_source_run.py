@@ -136,7 +136,7 @@ def test_a_run_lasts_no_longer_than_asked(tmp_path: Path) -> None:
         (Jump, r"joint \w+ \(ID \d+\) accelerates at 2\d\.\d\d rad/s2; its limit is 25.00"),
         (Hasty, r"joint yaw_01 \(ID 1\) announces 9.00 rad/s; its limit is 2.00"),
         (Undefined, r"at 0.5\d s its goals are .*nan"),
-        (Short, r"robot yaw16 takes 16 finite angles"),
+        (Short, r"yaw16 needs 16 finite angles"),
     ],
 )
 def test_what_breaks_a_limit_is_refused_before_torque(

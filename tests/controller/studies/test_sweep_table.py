@@ -89,7 +89,7 @@ def test_other_replaced_values_are_other_points_and_a_row_of_their_own(tmp_path:
 def test_another_file_is_not_touched(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
     path.write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match="no table"):
+    with pytest.raises(InputError, match="is not a table of"):
         SweepTable(path)
     assert path.read_text() == "a,b\n1,2\n"
 

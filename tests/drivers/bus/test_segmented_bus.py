@@ -338,7 +338,7 @@ def test_an_imu_is_read_on_its_own_port() -> None:
     robot = RobotConfig(name="six", joint_axes="ypypyp", imu=with_imu, ports=ports)
     body = in_process()
     parts = [(DynamixelBus(line), port.ids) for line, port in zip(body.lines, ports, strict=True)]
-    with pytest.raises(ChainError, match=r"imu \(ID 200\): no answer"):
+    with pytest.raises(ChainError, match=r"imu \(ID 200\): no reply"):
         ServoChain(SegmentedBus(parts), robot).enable()
     assert not any(b"\xfd\x00\xc8" in data for _, sent, data in body.lines[0].heard if sent)
     assert any(b"\xfd\x00\xc8" in data for _, sent, data in body.lines[1].heard if sent)

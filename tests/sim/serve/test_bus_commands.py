@@ -178,7 +178,7 @@ def test_serve_tells_of_a_client_that_flushes_its_output() -> None:
         _, said = process.communicate()
         os.close(client)
     assert (
-        "a client flushed its output at least 3 times: what it had sent less than 5 ms before"
+        "a client flushed its output at least 3 times: bytes that it sent less than 5 ms before"
         in said
     )
 

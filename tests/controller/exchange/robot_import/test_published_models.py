@@ -196,7 +196,7 @@ def test_a_link_world_is_dropped(tmp_path: Path) -> None:
         made = imported(tmp_path, urdf(before=world.format(kind)))
         assert made.robot.model_dump() == imported(tmp_path, urdf()).robot.model_dump()
         assert noted(made, f"link world is dropped: it holds l0 by the {kind} joint w")
-    with pytest.raises(InputError, match="joint w, line 2: bolts the robot to the link world"):
+    with pytest.raises(InputError, match="joint w, line 2: connects the robot to the link world"):
         imported(tmp_path, urdf(before=world.format("revolute")))
     made = imported(tmp_path, urdf(before='<link name="world"/>'))
     assert noted(made, "link world is dropped: nothing joins it")

@@ -90,13 +90,13 @@ def test_what_tells_no_friction_is_refused(record: RunRecord, log: Path, tmp_pat
     on_metal = replace(header, backend="dynamixel")
     with pytest.raises(InputError, match="estimated by the IMU or the joints"):
         FrictionLog.of(replace(record, header=on_metal))
-    with pytest.raises(InputError, match="level, open floor"):
+    with pytest.raises(InputError, match="needs a level floor"):
         FrictionLog.of(record, load_world("ramp-10"))
     pose = replace(record.pose, links_m=np.full_like(record.pose.links_m, np.nan))
     with pytest.raises(InputError, match="does not hold where the body was"):
         FrictionLog.of(replace(record, pose=pose))
     still = replace(record.pose, links_m=record.pose.links_m[:1] + 0.0 * record.pose.links_m)
-    with pytest.raises(InputError, match="less than 20 mm in any second"):
+    with pytest.raises(InputError, match="less than 20 mm in each second"):
         FrictionLog.of(replace(record, pose=still))
     recording = tmp_path / "kp200.json"
     recording.write_text("{}")
@@ -142,7 +142,7 @@ def test_what_tells_no_mass_says_what_would(log: Path, lifting: Path, tmp_path: 
     assert "has no pitch joints" in refused(log, "--robot-out", out)
     still = FrictionLog.of(read_log(lifting))
     still.answers[1][:, list(still.goals.robot.pitch_joints)] = 0.05
-    with pytest.raises(InputError, match=r"nothing is lifted.*gait run sidewinding --robot short"):
+    with pytest.raises(InputError, match=r"lift nothing.*gait run sidewinding --robot short"):
         fit_friction([still], mass=True)
     assert not out.exists()
 

@@ -278,8 +278,8 @@ def test_faults_of_deeplabcut_and_scores_are_one_line(tmp_path: Path) -> None:
     evil = pickle.dumps([(1, [Path])])  # names a class: never called
     for names, said in (
         (both, "2 animals"),
-        (columns[:5], "5 columns for 33"),
-        (evil, "cannot be read; take DeepLabCut's CSV"),
+        (columns[:5], "5 column names for 33 columns"),
+        (evil, "cannot be read; use DeepLabCut's CSV"),
         (b"no pickle", "cannot be read"),
         ([("s", "eel", p, "z" if c == "y" else c) for _, _, p, c in columns], "expected x and y"),
     ):
