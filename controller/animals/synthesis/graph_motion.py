@@ -1,7 +1,8 @@
 """Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
 
-States are joined by distance, and a walk by ``deg / 2^v`` visits them. Coefficients between two are
-interpolated linearly: the angles ``A_c``. On land the angles of the head are handed down the body
+States without recorded neighbours are joined by distance, and a walk by ``deg / 2^v`` visits them.
+``film_graph`` joins the others. Coefficients between two states are interpolated linearly: the
+angles ``A_c``. On land the angles of the head are handed down the body
 by a point a frame: ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``, with m
 from 1 at the head to 0 behind. Correction: the text wants m "close to 1" at the head. It must be 1
 there, as nothing is in front of the head that the rest of it could come from.
@@ -79,7 +80,7 @@ def graph_motion(
     leaves the speed open).
 
     Args:
-        shapes: of ``graph_angles``.
+        shapes: of ``graph_angles`` or ``film_angles``.
         path: through the waypoints.
         frames: the most of them.
         segment_m: r, the body's length over N.
