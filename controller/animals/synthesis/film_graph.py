@@ -1,7 +1,7 @@
 """The graph of a recording's states: consecutive frames are neighbours, similar ones change course.
 
 [KP] 4.2.1 joins states by distance. Undirected edges let the film run backwards, and random states
-are no neighbours of its frames, so the pattern of bends stops. Here an edge leads from a frame to
+lie far from its frames, so the pattern of bends stops. Here an edge leads from a frame to
 the next one (temporal), and from a frame to the successor of any frame that is closer to it than
 its own neighbours are (similar). A walk by ``deg / 2^v`` follows these edges.
 """
@@ -50,7 +50,7 @@ def film_successors(film: FilmStates, points: int) -> list[list[int]]:
     """List the states that can follow each of the S states, in ascending order.
 
     Two states are similar if they are closer than the median of consecutive frames (ours). A state
-    without a successor takes that of the most similar one that lies half a body length or more of
+    without a successor uses that of the most similar one that lies half a body length or more of
     the film away.
     """
     apart = np.abs(film.frame[:, None] - film.frame)
