@@ -75,6 +75,8 @@ def graph_motion(
 ) -> Locomotion:
     """Lay at most ``frames`` frames along a path: mass centre on it, mean heading along it.
 
+    Beyond its end the path continues straight.
+
     Without slip a point of the body moves along the path by a segment a frame, times the mean
     cosine of the angles about their mean. The centre advances by the same distance (ours; the text
     leaves the speed open).
@@ -102,9 +104,13 @@ def graph_motion(
                 on_state(t, state)
         swing = body - body.mean()
         heading = path.heading_rad(min(at_m, path.length_m))
+        beyond_m = max(at_m - path.length_m, 0.0)
+        centre_m = path.position(min(at_m, path.length_m)) + beyond_m * np.array(
+            [np.cos(heading), np.sin(heading)]
+        )
         angles.append(swing + heading)
         shape = chain(angles[-1], segment_m)
-        points.append(shape - shape.mean(axis=0) + path.position(min(at_m, path.length_m)))
+        points.append(shape - shape.mean(axis=0) + centre_m)
         advance_m = segment_m * float(np.cos(swing).mean())
         speed.append(advance_m / dt_s)
         at_m += advance_m

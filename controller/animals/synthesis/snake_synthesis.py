@@ -191,7 +191,10 @@ class SnakeSynthesis:
         return GroundStep(self.prepared.ground)
 
     def synthesise(self, frames: int | None = None) -> SynthesisedWalk:
-        """Synthesise a motion until the last target, or for a number of frames.
+        """Synthesise a motion until the last target, or for a number of frames on the map.
+
+        A number of frames can lead beyond the path. The motion then ends when the head leaves the
+        ground of the world.
 
         Raises:
             InputError: the run's time limit allows more than ``FRAMES_MAX``.
@@ -220,7 +223,8 @@ class SnakeSynthesis:
         )
 
         def until(points_m: Floats) -> bool:
-            return targets.observe(points_m) and frames is None
+            reached = targets.observe(points_m)
+            return reached if frames is None else not self.prepared.on_map(points_m[0])
 
         if run.motion == "kp":
             plan, states = self._on_graph(most, until)

@@ -191,6 +191,24 @@ def test_the_older_graph_of_states_keeps_the_snake_on_its_path() -> None:
     assert made.facts()["bend_k_rad"] > 0.3  # type: ignore[operator]
 
 
+@pytest.mark.parametrize("how", [["--motion", "walk"], ["--motion", "kp"], ["--animal", "lizard"]])
+def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_path: Path) -> None:
+    """All 600 frames were made, on the height of the border."""
+    keys = ("world.ground.size_m=3.0", "run.start_m=[0.0,0.0]", "run.waypoints_m=[[0.5,0.0]]")
+    sets = [word for key in keys for word in ("--set", key)]
+    done = snakewalk(
+        *("synthesise", "flat-slalom", *how, *sets, "--frames", "600", "--json"),
+        *("-o", str(tmp_path / "out")),
+    )
+    assert done.returncode == 0, done.stderr
+    made = json.loads(done.stdout)["frames"]
+    assert 10 < made < 600
+    warning = f"--frames 600: the motion ends after {made} frames, where the head leaves the ground"
+    assert warning in done.stderr
+    head_m = np.abs(load_track(str(tmp_path / "out.npz")).points[:, 0]).max(axis=1)
+    assert head_m[-1] > 1.5 >= head_m[:-1].max()
+
+
 def test_a_motion_on_paper_is_refused_as_a_run() -> None:
     done = snakewalk("run", "jacksboro-traverse", "--motion", "kp")
     assert done.returncode == 2
