@@ -1,7 +1,7 @@
 """A snake's motion without a robot: library, path, walk, speed, skeleton, ground ([PT] 2.6)."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -254,7 +254,7 @@ class SnakeSynthesis:
         """[PT] 2.6: a star of states around the present one, aimed at the targets."""
         run = self.run
         printed = run.motion == "walk-printed"
-        walker = self.prepared.walker(self.library, self.shape_filters)
+        walker = self._with_share.walker(self.library, self.shape_filters)
         heading_rad = self.prepared.start_heading_rad
         states, at = [(0, 0)], [0]
 
@@ -289,6 +289,15 @@ class SnakeSynthesis:
             until=observe,
         )
         return plan, states
+
+    @property
+    def _with_share(self) -> WalkRun:
+        """The run with the share of a state that the synthesis walks."""
+        share = self.how.state_share
+        if share is None:
+            return self.prepared
+        walk = self.run.walk.model_copy(update={"decision_fraction": share})
+        return replace(self.prepared, run=self.run.model_copy(update={"walk": walk}))
 
     def _on_graph(
         self, most: int, until: Callable[[Floats], bool]

@@ -78,6 +78,20 @@ def test_the_same_seed_gives_the_same_motion_and_another_another() -> None:
     assert np.abs(one - other).max() > 0.01
 
 
+def test_a_smaller_share_of_each_state_shows_more_of_them() -> None:
+    """250 frames show fewer than three whole states."""
+    made = {}
+    for share in (None, 1.0, 0.25):
+        keys = {} if share is None else {"run.synthesis.state_share": share}
+        made[share] = SnakeSynthesis(prepare_walk("flat-slalom", keys=keys)).synthesise(250)
+    whole, quarter = (len(made[share].states) for share in (1.0, 0.25))
+    assert whole <= 3
+    assert quarter >= 3 * whole
+    np.testing.assert_array_equal(made[None].plan.points_m, made[1.0].plan.points_m)
+    angles = made[0.25].plan.angles_rad
+    assert np.abs(np.diff(angles, axis=1)).max() < 0.25  # no corner at a join
+
+
 def test_aimed_as_printed_the_snake_leaves_its_path() -> None:
     """The mass centre lies half a body behind the place where the next state begins."""
     worst = []
