@@ -12,7 +12,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 
 _CLOSE = 1e-13
-"""Of the curve's length: residual of a point on the path."""
+"""Residual of a point on the path, as a share of the length of the curve."""
 _NEWTON = 8
 _STRAIGHT = 0.9  # cosine between tangents before and after a step, at least
 _SMALLEST = 1e-12
@@ -49,7 +49,7 @@ class _Path:
         return np.asarray(found / np.linalg.norm(found))
 
     def corrected(self, at: Floats, border: Floats, value: float) -> Floats | None:
-        """Nearest point of the path with ``border @ at == value``; None if there is none near."""
+        """Nearest point of the path with ``border @ at == value``; None if Newton fails."""
         for _ in range(_NEWTON):
             gap, slopes = self.equations(at)
             gap = np.append(gap, border @ at - value)
