@@ -95,6 +95,13 @@ class SynthesisConfig(Strict):
         True,
         description="states that the robot can make and that push; else all but self-contact",
     )
+    state_share: float | None = Field(
+        None,
+        gt=0.05,
+        le=1.0,
+        description="share of each state that is walked, from its tail; default: "
+        "walk.decision_fraction. walk-printed walks whole states",
+    )
     target_spacing_m: float = Field(
         0.6, gt=0.05, description="between targets on the path, in addition to the waypoints"
     )

@@ -1,7 +1,8 @@
 """The lens of a camera: its matrix and distortion as OpenCV's calibration has them, and its file.
 
-The file is one of OpenCV's FileStorage with the names of its calibration sample: ``image_width``,
-``image_height``, ``camera_matrix``, ``distortion_coefficients``.
+The file is one of OpenCV's FileStorage, or JSON with plain lists. It has the names of OpenCV's
+calibration sample: ``image_width``, ``image_height``, ``camera_matrix``,
+``distortion_coefficients``.
 """
 
 from dataclasses import dataclass
@@ -12,10 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import check_matrices, why_no_file
+from snakewalk.config.archive import check_matrices, read_json_lists, why_no_file
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
+_MATRICES: Final = "camera_matrix", "distortion_coefficients"
 _ENDINGS: Final = (".yml", ".yaml", ".xml", ".json")
 _COEFFICIENTS: Final = (4, 5, 8, 12, 14)
 _STEPS: Final = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
@@ -68,19 +70,9 @@ class Lens:
             raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
         if not file.is_file():
             raise InputError(why_no_file(file))
-        check_matrices(file)
-        try:
-            store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
-            size = [store.getNode(f"image_{side}").real() for side in ("width", "height")]
-            names = "camera_matrix", "distortion_coefficients"
-            held = [store.getNode(name).mat() for name in names]
-            store.release()
-        except (cv2.error, SystemError) as error:
-            raise InputError(
-                f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
-            ) from None
+        size, held = _stored(file)
         faults = [
-            f"{file}: holds no {name}" for name, value in zip(names, held, strict=True)
+            f"{file}: holds no {name}" for name, value in zip(_MATRICES, held, strict=True)
             if value is None
         ]  # fmt: skip
         if not all(1.0 <= side <= 100_000.0 for side in size):
@@ -108,3 +100,30 @@ class Lens:
         store.write("avg_reprojection_error", rms_px)
         store.write("nframes", views)
         store.release()
+
+
+def _stored(file: Path) -> tuple[list[float], list[Any]]:
+    """Width and height, and the two matrices; 0 and None where a name is missing.
+
+    Raises:
+        InputError: OpenCV cannot read the file.
+
+    """
+    check_matrices(file)
+    sides = "image_width", "image_height"
+    lists = read_json_lists(file)
+    if lists is not None:
+        size = [np.ravel(lists.get(side, 0.0)) for side in sides]
+        return [float(side[0]) if side.size == 1 else 0.0 for side in size], [
+            lists.get(name) for name in _MATRICES
+        ]
+    try:
+        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
+        stored = [store.getNode(side).real() for side in sides]
+        held = [store.getNode(name).mat() for name in _MATRICES]
+        store.release()
+    except (cv2.error, SystemError) as error:
+        raise InputError(
+            f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
+        ) from None
+    return stored, held

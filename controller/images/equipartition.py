@@ -2,7 +2,8 @@
 
 Steepest descent on the chord as in [PT], Algorithm 1, with the corrections of the errata. It is
 bracketed and bisected if it does not settle. Then chords that end at a later crossing of their
-circle are tried. A curve without a solution is an error, never an unequal partition.
+circle are tried, and last the path of the existence proof (``chord_path``). A curve without a
+solution is an error, never an unequal partition.
 """
 
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.images.chord_path import follow_chords
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 TOLERANCE = 1e-9
@@ -20,6 +22,7 @@ _RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
 _DESCENTS = 12
 _BISECTIONS = 80
 _SCAN = 96  # chords tried between the least and the greatest possible one
+_FEW = 8  # most chords for which the path is followed: it costs seconds for 100
 _GRID = 400  # of the scan for three chords
 _NEWTON_STEPS = 40
 _BENT = 1.05  # arc over chord from which all solutions are searched
@@ -41,7 +44,7 @@ class Equipartition:
     """Distance of neighbouring points, in the curve's unit."""
     method: str
     """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``,
-    ``two places`` (3 chords)."""
+    ``two places`` (3 chords), ``path`` (the path of ``chord_path``)."""
     solutions: int
     """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""
@@ -194,12 +197,27 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
         for third in _thirds(given):
             if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in found):
                 found.append(third)
+    if not found and given.segments <= _FEW:
+        places = follow_chords(given.curve, given.arc, given.segments, _path_steps(given))
+        if places is not None:
+            found.append(_at_places(given, places))
     if not found:
         raise NoEquipartitionError(
             f"no {given.segments} equal chords on this curve of {len(given.curve)} points"
         )
     best = min(found, key=lambda one: one.distance)
     return Equipartition(best.points, best.at, best.chord, best.method, len(found), best.distance)
+
+
+def _path_steps(given: _Curve) -> int:
+    """Most steps along the path: each place passes each vertex a few times."""
+    return 8 * given.segments * len(given.curve) + 1000
+
+
+def _at_places(given: _Curve, places: Floats) -> Equipartition:
+    points = np.stack([np.interp(places, given.arc, column) for column in given.curve.T], axis=-1)
+    chord = float(np.hypot(*(points[1] - points[0])))
+    return Equipartition(points, places, chord, "path", 1, given.distance(points, places))
 
 
 def _thirds(given: _Curve) -> list[Equipartition]:

@@ -13,7 +13,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from snakewalk.config.archive import check_matrices, read_arrays
+from snakewalk.config.archive import check_matrices, read_arrays, read_json_lists
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
 
@@ -78,8 +78,8 @@ class RectifiedPair:
 def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
     """Read a calibration.
 
-    Known are files of OpenCV (.yml, .yaml, .xml, .json), .npz with the same names, and calib.txt of
-    the Middlebury pairs, whose baseline is in millimetres by itself.
+    The reader accepts files of OpenCV (.yml, .yaml, .xml, .json), .json with plain lists and .npz
+    with the same names, and calib.txt of the Middlebury pairs, whose baseline is in millimetres.
 
     Args:
         file: by its ending.
@@ -118,8 +118,11 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
 
 
 def _storage(file: Path) -> dict[str, Any]:
-    """Matrices of a file of OpenCV by name."""
+    """Matrices of a file of OpenCV by name, or lists of a plain JSON file."""
     check_matrices(file)
+    lists = read_json_lists(file)
+    if lists is not None:
+        return lists
     try:
         store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
         nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
@@ -139,19 +139,31 @@ class PathRun(GroundedRun):
 
         """
         x_m, y_m = (float(at) for at in point_m)
-        where, ground = f"waypoint ({x_m:.2f}, {y_m:.2f})", self.world.ground
-        if isinstance(ground, FlatGround | WaterGround):
-            inside, wide_m = max(abs(x_m), abs(y_m)) <= 0.5 * ground.size_m, (ground.size_m,) * 2
-        else:
-            assert self.ground is not None
-            inside, wide_m = bool(self.ground.contains(x_m, y_m)), self.ground.size_m
-        if not inside:
+        where = f"waypoint ({x_m:.2f}, {y_m:.2f})"
+        if not self.on_map(point_m):
+            wide_m = self._map_size_m
             raise InputError(
                 f"{where} is outside the world, {wide_m[0]:.1f} m by {wide_m[1]:.1f} m"
             )
         obstacle = self.world.obstacle
         if obstacle is not None and obstacle.stands_at(x_m, y_m):
             raise InputError(f"{where} is in the world's obstacle, the {obstacle.kind}")
+
+    def on_map(self, points_m: Floats) -> Bools:
+        """Whether points (..., 2) are on the ground of the world: (...)."""
+        ground = self.world.ground
+        if isinstance(ground, FlatGround | WaterGround):
+            return np.asarray(np.abs(points_m).max(axis=-1) <= 0.5 * ground.size_m)
+        assert self.ground is not None
+        return self.ground.contains(points_m[..., 0], points_m[..., 1])
+
+    @property
+    def _map_size_m(self) -> tuple[float, float]:
+        ground = self.world.ground
+        if isinstance(ground, FlatGround | WaterGround):
+            return ground.size_m, ground.size_m
+        assert self.ground is not None
+        return self.ground.size_m
 
     @property
     def start_heading_rad(self) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Complexes, Floats
+from snakewalk.config.arrays import Bools, Complexes, Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import WavesConfig
 from snakewalk.controller.shape.states import (
@@ -37,6 +37,8 @@ class StateLibrary:
     """Factor on the bends of the recorded shapes."""
     energy_kept: float
     """Share of the recorded shapes' energy that the coefficients hold, mean over the frames."""
+    frame: Ints
+    """(recorded,) row of the recording of each state that comes from it."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -75,6 +77,7 @@ def build_library(
     states = curvature * states
     rejected = dict.fromkeys(filters, 0)
     recorded, made = np.empty((0, points)), [np.empty((0, points))]
+    frame: Ints = np.empty(0, dtype=np.int64)
     for wanted, band in _counts(random_count, waves):
         got = 0
         for _ in range(_ROUNDS):
@@ -83,10 +86,10 @@ def build_library(
             drawn = random_states(states, max(wanted - got, 20), rng)
             if waves is not None and band is not None:
                 drawn = limit_to_waves(drawn, *band, waves.energy_share)
-            made.append(_passing(to_angles(drawn, points), filters, rejected)[: wanted - got])
+            made.append(_passing(to_angles(drawn, points), filters, rejected)[0][: wanted - got])
             got += len(made[-1])
         if band is None:
-            recorded = _passing(to_angles(states, points), filters, rejected)
+            recorded, frame = _passing(to_angles(states, points), filters, rejected)
     fresh = np.concatenate(made)
     if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
@@ -97,7 +100,7 @@ def build_library(
         )
     kept = float(energy_kept(track_rad, coefficients).mean())
     shapes_rad = np.concatenate([recorded, fresh])
-    return StateLibrary(shapes_rad, len(recorded), rejected, curvature, kept)
+    return StateLibrary(shapes_rad, len(recorded), rejected, curvature, kept, frame)
 
 
 def _wide_enough(states: Complexes, filters: dict[str, ShapeFilter], points: int) -> float:
@@ -105,7 +108,7 @@ def _wide_enough(states: Complexes, filters: dict[str, ShapeFilter], points: int
     shares = []
     for factor in _FACTORS:
         drawn = random_states(factor * states, _DRAWN, np.random.default_rng(0))
-        shares.append(len(_passing(to_angles(drawn, points), filters, {})) / _DRAWN)
+        shares.append(len(_passing(to_angles(drawn, points), filters, {})[0]) / _DRAWN)
         if shares[-1] >= _ENOUGH:
             return factor
     return _FACTORS[int(np.argmax(shares))]
@@ -122,11 +125,15 @@ def _counts(
     return list(zip(np.diff(ends).tolist(), parts, strict=True))
 
 
-def _passing(shapes: Floats, filters: dict[str, ShapeFilter], rejected: dict[str, int]) -> Floats:
+def _passing(
+    shapes: Floats, filters: dict[str, ShapeFilter], rejected: dict[str, int]
+) -> tuple[Floats, Ints]:
+    """Return the shapes (P, N) that pass every filter, and their rows (P,); count the others."""
+    row: Ints = np.arange(len(shapes))
     for name, refuses in filters.items():
-        if len(shapes) == 0:
+        if len(row) == 0:
             break
-        bad = refuses(shapes)
+        bad = refuses(shapes[row])
         rejected[name] = rejected.get(name, 0) + int(bad.sum())
-        shapes = shapes[~bad]
-    return shapes
+        row = row[~bad]
+    return shapes[row], row

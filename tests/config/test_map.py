@@ -52,5 +52,7 @@ def test_what_is_no_map_is_refused(tmp_path: Path) -> None:
         read_map(tmp_path / "a.npz")
     world = tmp_path / "w.toml"
     world.write_text('name = "w"\n[ground]\nkind = "map"\nsource = "none.npz"\n')
-    with pytest.raises(ConfigError, match=r"ground\.source: none\.npz: no such file in the folder of"):
+    with pytest.raises(
+        ConfigError, match=r"ground\.source: none\.npz: no such file in the folder of"
+    ):
         build_ground(load_world(str(world)))

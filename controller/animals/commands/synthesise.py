@@ -13,6 +13,7 @@ from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
 from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
@@ -81,7 +82,8 @@ def synthesise(
         typer.Option(
             min=2,
             max=100_000,
-            help="exact number of frames; default: as many as the last waypoint needs",
+            help="number of frames, fewer if the head leaves the world; default: until the last "
+            "waypoint is reached",
         ),
     ] = None,
     film: Annotated[
@@ -123,6 +125,13 @@ def synthesise(
                 f"{wrong[0]}: is for snakes; --animal {animal} has its own motion and skin"
             )
         facts, complete = _with_legs(prepared, frames, animal, files)
+    made = facts["frames"]
+    if frames is not None and made != frames:
+        LOGGER.warning(
+            "--frames %s: the motion ends after %s frames, where the head leaves the ground of %s; "
+            "ask for fewer frames, or add waypoints",
+            *(frames, made, prepared.world.name),
+        )
     show(facts | {what: str(files[what]) if what in files else None for what in _ENDINGS}, as_json)
     if frames is None and not complete:
         raise SystemExit(1)

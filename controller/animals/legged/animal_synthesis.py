@@ -140,18 +140,26 @@ def synthesise_animal(
 ) -> SynthesisedAnimal:
     """Lead an animal along a run's path until its trunk is at the end, or for a number of frames.
 
+    A number of frames can lead beyond the path. The motion then ends when the head leaves the
+    ground of the world.
+
     Raises:
         InputError: the path bends more sharply than the animal is wide.
 
     """
     run, path = prepared.run, prepared.path
     rate_hz = max(run.synthesis.rate_hz, CYCLE_FRAMES / animal.cycle_s)
+    to_end = frames is None
     if frames is None:
         front, hind = (pair.at for pair in animal.leg_pairs)
         way_m = path.length_m + 0.5 * animal.length_m * (front + hind)
         frames = 1 + int(np.ceil(min(way_m / animal.speed_m_s, run.time_limit_s) * rate_hz))
     made = prototype(animal, np.arange(frames) / rate_hz)
     motion = transformed(made, animal, path, prepared.ground)
+    off = np.flatnonzero(~prepared.on_map(motion.spine_m[:, 0, :2]))
+    if len(off) and not to_end:
+        made = prototype(animal, np.arange(max(2, int(off[0]) + 1)) / rate_hz)
+        motion = transformed(made, animal, path, prepared.ground)
     return SynthesisedAnimal(
         animal,
         motion,

@@ -1,8 +1,9 @@
 """Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
 
-States are joined by distance, and a walk by ``deg / 2^v`` visits them. Coefficients between two are
-interpolated linearly: the angles ``A_c``. On land the angles of the head pass down the body, one
-point a frame: ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``. Here m falls
+States without recorded neighbours are joined by distance, and a walk by ``deg / 2^v`` visits them.
+``film_graph`` joins the others. Coefficients between two states are interpolated linearly: the
+angles ``A_c``. On land the angles of the head pass down the body, one point a frame:
+``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``. Here m falls
 from 1 at the head to 0 behind. Correction: the text wants m "close to 1" at the head. It must be 1
 there, as nothing is in front of the head that the rest of it could come from.
 """
@@ -74,12 +75,14 @@ def graph_motion(
 ) -> Locomotion:
     """Lay at most ``frames`` frames along a path: mass centre on it, mean heading along it.
 
+    Beyond its end the path continues straight.
+
     Without slip a point of the body moves along the path by a segment a frame, times the mean
     cosine of the angles about their mean. The centre advances by the same distance (ours; the text
     leaves the speed open).
 
     Args:
-        shapes: of ``graph_angles``.
+        shapes: of ``graph_angles`` or ``film_angles``.
         path: through the waypoints.
         frames: the most of them.
         segment_m: r, the body's length over N.
@@ -101,9 +104,13 @@ def graph_motion(
                 on_state(t, state)
         swing = body - body.mean()
         heading = path.heading_rad(min(at_m, path.length_m))
+        beyond_m = max(at_m - path.length_m, 0.0)
+        centre_m = path.position(min(at_m, path.length_m)) + beyond_m * np.array(
+            [np.cos(heading), np.sin(heading)]
+        )
         angles.append(swing + heading)
         shape = chain(angles[-1], segment_m)
-        points.append(shape - shape.mean(axis=0) + path.position(min(at_m, path.length_m)))
+        points.append(shape - shape.mean(axis=0) + centre_m)
         advance_m = segment_m * float(np.cos(swing).mean())
         speed.append(advance_m / dt_s)
         at_m += advance_m

@@ -1,15 +1,16 @@
 """A snake's motion without a robot: library, path, walk, speed, skeleton, ground ([PT] 2.6)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Complexes, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
+from snakewalk.controller.animals.synthesis.film_graph import FilmStates, film_angles
 from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, graph_motion
 from snakewalk.controller.animals.synthesis.synthesis import (
     Behaviour,
@@ -29,6 +30,7 @@ from snakewalk.controller.run.kinds.walk_run import POINTS, WalkRun
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.shape.states import to_states
 from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.track.analysis import analyse
 from snakewalk.controller.track.bone_motion import BoneMotion, from_points
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.walk.angle_track import AngleTrack
@@ -189,7 +191,10 @@ class SnakeSynthesis:
         return GroundStep(self.prepared.ground)
 
     def synthesise(self, frames: int | None = None) -> SynthesisedWalk:
-        """Synthesise a motion until the last target, or for a number of frames.
+        """Synthesise a motion until the last target, or for a number of frames on the map.
+
+        A number of frames can lead beyond the path. The motion then ends when the head leaves the
+        ground of the world.
 
         Raises:
             InputError: the run's time limit allows more than ``FRAMES_MAX``.
@@ -218,7 +223,8 @@ class SnakeSynthesis:
         )
 
         def until(points_m: Floats) -> bool:
-            return targets.observe(points_m) and frames is None
+            reached = targets.observe(points_m)
+            return reached if frames is None else not self.prepared.on_map(points_m[0])
 
         if run.motion == "kp":
             plan, states = self._on_graph(most, until)
@@ -248,7 +254,7 @@ class SnakeSynthesis:
         """[PT] 2.6: a star of states around the present one, aimed at the targets."""
         run = self.run
         printed = run.motion == "walk-printed"
-        walker = self.prepared.walker(self.library, self.shape_filters)
+        walker = self._with_share.walker(self.library, self.shape_filters)
         heading_rad = self.prepared.start_heading_rad
         states, at = [(0, 0)], [0]
 
@@ -284,17 +290,22 @@ class SnakeSynthesis:
         )
         return plan, states
 
+    @property
+    def _with_share(self) -> WalkRun:
+        """The run with the share of a state that the synthesis walks."""
+        share = self.how.state_share
+        if share is None:
+            return self.prepared
+        walk = self.run.walk.model_copy(update={"decision_fraction": share})
+        return replace(self.prepared, run=self.run.model_copy(update={"walk": walk}))
+
     def _on_graph(
         self, most: int, until: Callable[[Floats], bool]
     ) -> tuple[Locomotion, list[tuple[int, int]]]:
         """[KP] 4.2.1: a walk on the fixed graph, the mass centre on the path."""
-        run = self.run
         states: list[tuple[int, int]] = []
-        between = max(1, round(run.walk.decision_fraction * POINTS))
-        coefficients = to_states(self.library.shapes_rad, self.how.coefficients)
-        shapes = graph_angles(coefficients, between, POINTS, np.random.default_rng(run.seed))
         plan = graph_motion(
-            shapes,
+            self._graph_shapes(),
             self.path,
             most,
             self.segment_m,
@@ -303,6 +314,30 @@ class SnakeSynthesis:
             lambda frame, state: states.append((frame, state)),
         )
         return plan, states
+
+    def _graph_shapes(self) -> Iterator[tuple[int, Floats]]:
+        """States and angles A_c of [KP] 4.2.1, from consecutive frames where there are any."""
+        run, library = self.run, self.library
+        coefficients = to_states(library.shapes_rad, self.how.coefficients)
+        rng = np.random.default_rng(run.seed)
+        film = self._film(coefficients[: library.recorded])
+        if film is not None:
+            return film_angles(film, POINTS, rng)
+        between = max(1, round(run.walk.decision_fraction * POINTS))
+        return graph_angles(coefficients, between, POINTS, rng)
+
+    def _film(self, states: Complexes) -> FilmStates | None:
+        """Recorded states (S, n) as a film; None without neighbours or a wave to the tail."""
+        track = load_track(self.run.track)
+        number = np.rint(track.time_s * track.rate_hz).astype(np.int64)[self.library.frame]
+        if not (np.diff(number) == 1).any():
+            return None
+        pulse = analyse(track).pulse
+        known = np.isfinite(pulse.body_points_per_frame)
+        rows, speeds = pulse.frame[known], pulse.body_points_per_frame[known]
+        if len(speeds) == 0 or np.median(speeds) <= 0.0:
+            return None
+        return FilmStates(states, number, np.interp(self.library.frame, rows, speeds))
 
     @property
     def law(self) -> SpeedLaw:

@@ -8,6 +8,8 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.playback import PlaybackConfig
+from snakewalk.config.world import WaterGround
+from snakewalk.controller.mechanics.thrust import forward_speed_m_s
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.kinds.joint_file import foreign_joints
@@ -17,6 +19,9 @@ from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.track.recorded_joints import recorded_joints
 
 _LINEAR = 0.9  # of the limit: angles up to it are played as they are
+_NO_THRUST_1_S = 0.02
+"""Predicted speed, body lengths per second, below which a motion counts as one without thrust
+(ours): shipped recordings of crawling animals have 0.1 and more."""
 _MOST = 0.995  # of the limit: the spline between frames goes a little beyond them
 
 
@@ -93,6 +98,20 @@ class PlaybackRun(PathlessRun):
             f"frame {frame}"
         )
 
+    @cached_property
+    def no_thrust(self) -> str | None:
+        """Warning that the motion does not move this robot, at the recording's own speed."""
+        time_s, joints = self.joint_track
+        if isinstance(self.world.ground, WaterGround) or not np.ptp(joints, axis=0).any():
+            return None
+        speed_m_s = forward_speed_m_s(self.robot, self.world.friction, time_s, joints)
+        if abs(speed_m_s) >= _NO_THRUST_1_S * self.robot.length_m:
+            return None
+        return (
+            f"{self.run.track}: the traction model predicts {1e3 * speed_m_s:.0f} mm/s on this "
+            "ground, so the motion produces no thrust; play one whose waves run down the body"
+        )
+
     @property
     def duration_s(self) -> float:
         """Duration of the playback."""
@@ -116,6 +135,8 @@ class PlaybackRun(PathlessRun):
             on_event("limit", told)
         for line in self.notes:
             on_event("recording", line)
+        if self.no_thrust is not None:
+            on_event("thrust", self.no_thrust)
         if self.speed < 1.0:
             on_event("limit", f"played at {self.speed:.2f} times the animal's speed")
         return self._recorded(self.speed)

@@ -78,6 +78,20 @@ def test_the_same_seed_gives_the_same_motion_and_another_another() -> None:
     assert np.abs(one - other).max() > 0.01
 
 
+def test_a_smaller_share_of_each_state_shows_more_of_them() -> None:
+    """250 frames show fewer than three whole states."""
+    made = {}
+    for share in (None, 1.0, 0.25):
+        keys = {} if share is None else {"run.synthesis.state_share": share}
+        made[share] = SnakeSynthesis(prepare_walk("flat-slalom", keys=keys)).synthesise(250)
+    whole, quarter = (len(made[share].states) for share in (1.0, 0.25))
+    assert whole <= 3
+    assert quarter >= 3 * whole
+    np.testing.assert_array_equal(made[None].plan.points_m, made[1.0].plan.points_m)
+    angles = made[0.25].plan.angles_rad
+    assert np.abs(np.diff(angles, axis=1)).max() < 0.25  # no corner at a join
+
+
 def test_aimed_as_printed_the_snake_leaves_its_path() -> None:
     """The mass centre lies half a body behind the place where the next state begins."""
     worst = []
@@ -189,6 +203,24 @@ def test_the_older_graph_of_states_keeps_the_snake_on_its_path() -> None:
     way = made.path.position(np.linspace(0.0, made.path.length_m, 3000))
     assert np.linalg.norm(centre[:, None] - way, axis=2).min(axis=1).max() < 2e-3
     assert made.facts()["bend_k_rad"] > 0.3  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("how", [["--motion", "walk"], ["--motion", "kp"], ["--animal", "lizard"]])
+def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_path: Path) -> None:
+    """All 600 frames were made, on the height of the border."""
+    keys = ("world.ground.size_m=3.0", "run.start_m=[0.0,0.0]", "run.waypoints_m=[[0.5,0.0]]")
+    sets = [word for key in keys for word in ("--set", key)]
+    done = snakewalk(
+        *("synthesise", "flat-slalom", *how, *sets, "--frames", "600", "--json"),
+        *("-o", str(tmp_path / "out")),
+    )
+    assert done.returncode == 0, done.stderr
+    made = json.loads(done.stdout)["frames"]
+    assert 10 < made < 600
+    warning = f"--frames 600: the motion ends after {made} frames, where the head leaves the ground"
+    assert warning in done.stderr
+    head_m = np.abs(load_track(str(tmp_path / "out.npz")).points[:, 0]).max(axis=1)
+    assert head_m[-1] > 1.5 >= head_m[:-1].max()
 
 
 def test_a_motion_on_paper_is_refused_as_a_run() -> None:

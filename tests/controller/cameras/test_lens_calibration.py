@@ -1,5 +1,6 @@
 """Boards warped through a known lens: the corners, the lens, its file, and what is refused."""
 
+import json
 from pathlib import Path
 
 import cv2
@@ -107,6 +108,24 @@ def test_a_file_that_is_no_lens_is_refused(content: str, line: str, tmp_path: Pa
     file = tmp_path / "lens.yml"
     file.write_text(content)
     with pytest.raises(InputError, match=line):
+        Lens.read(file)
+
+
+def test_plain_lists_of_json_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "lens.json"
+    lens = {
+        "image_width": 640,
+        "image_height": 480,
+        "camera_matrix": [[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]],
+        "distortion_coefficients": [0.1, 0.0, 0.0, 0.0, 0.0],
+    }
+    file.write_text(json.dumps(lens))
+    found = Lens.read(file)
+    assert found.size_px == (640, 480)
+    np.testing.assert_array_equal(found.matrix, lens["camera_matrix"])
+    np.testing.assert_array_equal(found.distortion, lens["distortion_coefficients"])
+    file.write_text(json.dumps(lens | {"image_width": [640, 480]}))
+    with pytest.raises(InputError, match="image_width and image_height are needed"):
         Lens.read(file)
 
 

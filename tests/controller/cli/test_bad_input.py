@@ -99,7 +99,10 @@ ROWS = [
     ("bus sniff empty", "empty: holds no exchange"),
     ("bus sniff noise.bin", "noise.bin: holds no packet in 400 bytes"),
     ("trials flat-slalom --robot nosuch --seeds 1", "nosuch: no such robot"),
-    ("run flat-square --live", "--live: waypoints come from the page or from ROS; add --view or --ros"),
+    (
+        "run flat-square --live",
+        "--live: waypoints come from the page or from ROS; add --view or --ros",
+    ),
     ("run flat-square --set run.seed", "--set run.seed: expected KEY=VALUE"),
     ("run flat-square --set run.seed=-1", "run flat-square: seed: "),
     ("run flat-square --set run.seed=1e999", "run flat-square: seed: "),

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from snakewalk.controller.images.chord_path import follow_chords
 from snakewalk.controller.images.equipartition import (
     NoEquipartitionError,
     equipartition,
@@ -165,6 +166,23 @@ def test_three_chords_are_found_on_every_smooth_body(seed: int) -> None:
     assert np.ptp(chords(found.points)) < 1e-9
     assert (np.diff(found.at) > 0.0).all()
     assert on_curve(smooth(seed), found.points) < 1e-9
+
+
+@pytest.mark.parametrize(("seed", "n"), [(1, 4), (31, 4), (63, 5)])
+def test_the_path_of_the_proof_ends_at_an_equipartition(seed: int, n: int) -> None:
+    """Counted crossings lead to none of these: 15 of 61 smooth bodies were rejected at 4 chords."""
+    found = equipartition(smooth(seed), n)
+    assert found.method == "path"
+    assert np.ptp(chords(found.points)) < 1e-9
+    assert (np.diff(found.at) > 0.0).all()
+    assert np.array_equal(found.points[[0, -1]], smooth(seed)[[0, -1]])
+    assert on_curve(smooth(seed), found.points) < 1e-9
+
+
+def test_too_few_steps_of_the_path_are_reported() -> None:
+    curve = smooth(1)
+    arc = np.concatenate([[0.0], np.cumsum(chords(curve))])
+    assert follow_chords(curve, arc, 4, 10) is None
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -1,5 +1,6 @@
 """Calibrations: written as people write them, rectified, and points that come back."""
 
+import json
 from pathlib import Path
 
 import cv2
@@ -27,7 +28,7 @@ def opencv_file(file: Path, names=("K1", "D1", "K2", "D2", "R", "T"), t=T_M) -> 
     return file
 
 
-@pytest.mark.parametrize("ending", ["yml", "yaml", "xml", "json", "npz"])
+@pytest.mark.parametrize("ending", ["yml", "yaml", "xml", "json", "npz", "lists.json"])
 def test_calibrations_are_read_by_the_names_people_use(ending: str, tmp_path: Path) -> None:
     names = ("cameraMatrix1", "distCoeffs1", "cameraMatrix2", "distCoeffs2", "R", "T")
     file = tmp_path / f"c.{ending}"
@@ -35,6 +36,10 @@ def test_calibrations_are_read_by_the_names_people_use(ending: str, tmp_path: Pa
         np.savez(
             file, **dict(zip(names, (K, D[None], K, D, TURN, 1000 * T_M[:, None]), strict=True))
         )
+    elif ending == "lists.json":
+        values = (K, D, K, D, TURN, 1000 * T_M)
+        lists = {name: value.tolist() for name, value in zip(names, values, strict=True)}
+        file.write_text(json.dumps(lists | {"camera": "bench", "rms": 0.4}))
     else:
         opencv_file(file, names, 1000 * T_M)
     found = read_calibration(file, 0.001)
@@ -106,6 +111,12 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
     assert "ends in .yml" in fault("a.toml")
     assert "OpenCV's FileStorage cannot read it" in fault("a.yml", "not: [yaml")
     assert "K1 or M1" in fault("b.yml", "%YAML:1.0\n---\na: 3\n")
+    assert "holds no K1 or M1" in fault("c.json", '{"R": [1, 2]}')
+    assert "K1 is not a list of numbers or of rows" in fault("d.json", '{"K1": [[1, 2], [3]]}')
+    assert "OpenCV's FileStorage cannot read it" in fault("e.json", '{"K1": [1, ')
+    assert "K1 has 2 numbers, not 9" in fault(
+        "f.json", '{"K1": [1, 2], "K2": [1], "R": [1], "T": [1]}'
+    )
     assert "not a calib.txt" in fault("c.txt", "cam0=[1 2]\n")
     assert "T has 2 numbers" in fault("d.npz", **(whole | {"T": T_M[:2]}))
     assert "R is no rotation" in fault("e.npz", **(whole | {"R": 2 * np.eye(3)}))

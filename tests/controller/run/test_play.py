@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -120,3 +121,18 @@ def test_bad_input_is_one_line(arguments: list[str]) -> None:
     found = CliRunner().invoke(app, ["play", *arguments])
     assert isinstance(found.exception, InputError)
     assert len(found.exception.faults) == 1
+
+
+def test_a_motion_without_thrust_is_reported(tmp_path: Path) -> None:
+    """A standing wave bends the joints, and friction returns the body to its place."""
+    time_s = np.arange(121) / 30.0
+    beat, place = np.pi * time_s[:, None], 0.6 * np.arange(16)
+    waves = {"standing": np.sin(beat) * np.sin(place), "travelling": np.sin(place - beat)}
+    for name, wave in waves.items():
+        path = tmp_path / f"{name}.npz"
+        np.savez(path, joints_rad=0.3 * wave, rate_hz=30.0, robot="yaw16")
+        on_event = Mock()
+        prepare_playback(str(path)).make_source(on_event)
+        told = [call.args[1] for call in on_event.mock_calls if call.args[0] == "thrust"]
+        assert len(told) == (name == "standing")
+        assert all("the traction model predicts" in text and "no thrust" in text for text in told)

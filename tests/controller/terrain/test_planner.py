@@ -60,6 +60,23 @@ def test_on_level_ground_variance_ties_and_length_decides() -> None:
     assert len(at_once(straighten_in_steps(way, graph))) == 2
 
 
+def test_variance_along_an_edge_ties_a_contour_with_every_detour_on_it() -> None:
+    """As printed, both weigh 0 on a slope; with a length term the detour weighs more."""
+    ground = field(lambda x, y: 0.2 * y + 0.0 * x)
+    graph = TerrainPlanner(ground, CONFIG).graph
+    assert graph is not None
+    x = np.linspace(-1.0, 1.0, 81)
+    there_and_back = np.concatenate([x, x[::-1], x])
+    printed, weight = [], []
+    for along in (x, there_and_back):
+        points = np.stack([along, np.zeros_like(along)], axis=1)
+        printed.append(ground.elevation_m(*points.T).var())
+        weight.append(graph.cost_per_m(points).mean() * np.hypot(*np.diff(points, axis=0).T).sum())
+    assert max(printed) < 1e-20
+    assert weight[1] == pytest.approx(3.0 * weight[0], rel=0.01)
+    assert weight[0] > 0.0
+
+
 def test_a_hill_is_gone_around_by_the_shorter_side() -> None:
     planner = TerrainPlanner(field(hill), CONFIG)
     ends = np.array([(-1.5, 0.0), (1.5, 0.0)])

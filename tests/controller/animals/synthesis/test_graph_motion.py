@@ -51,7 +51,7 @@ def test_with_less_than_one_at_the_head_the_printed_rule_has_nothing_to_take_fro
     """
     m = leading(N)
     m[0] = 0.9
-    with pytest.raises(ValueError, match=r"is 0\.9 at the head"):
+    with pytest.raises(ValueError, match=r"m: is 0\.9 at the head"):
         handed_down(np.ones(N), np.ones(N), m)
     printed = m * 1.0 + (1.0 - m) * np.concatenate([[0.0], np.ones(N - 1)])
     assert printed[0] == pytest.approx(0.9)  # all of the body is at 1, the head falls behind
