@@ -11,6 +11,7 @@ import importlib.metadata
 import importlib.util
 import sys
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -23,7 +24,7 @@ LEARNING = (
     *("torch", "torchvision", "accelerate", "datasets", "einops", "safetensors"),
     *("huggingface_hub", "transformers", "pandas"),
 )
-OURS = ("lerobot", "lerobot_robot_snakewalk", *LEARNING)
+OURS = ("lerobot", "draccus", "lerobot_robot_snakewalk", *LEARNING)
 
 
 class _Unused:
@@ -67,8 +68,11 @@ class _Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 @pytest.fixture(scope="module")
 def package() -> Iterator[ModuleType]:
     """Import the package as LeRobot does, and forget LeRobot's modules afterwards."""
+    clients = str(Path(sys.prefix) / "clients")
+    sys.path.append(clients)
     for needed in NEEDED:
         if importlib.util.find_spec(needed) is None:
+            sys.path.remove(clients)
             pytest.skip(f"{needed} is not installed; .ci/setup installs it")
     before = dict(sys.modules)
     finder = _Finder()
@@ -81,6 +85,7 @@ def package() -> Iterator[ModuleType]:
         yield sys.modules["lerobot_robot_snakewalk"]
     finally:
         sys.meta_path.remove(finder)
+        sys.path.remove(clients)
         for name in [each for each in sys.modules if each.partition(".")[0] in OURS]:
             if name not in before:
                 del sys.modules[name]
