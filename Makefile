@@ -22,7 +22,7 @@ lock: setup
 
 # The loops are compiled once, by two processes, before many would compile them each for itself.
 loops: setup
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python .ci/loops
+	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk compile
 
 run: loops
 	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk run
