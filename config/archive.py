@@ -136,7 +136,7 @@ def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = Fals
     Args:
         file: for the fault.
         packed: bytes of the file.
-        unpacked: bytes that its content says it takes.
+        unpacked: size of its unpacked content in bytes, as the file states it.
         text: whether the content is JSON.
 
     Raises:

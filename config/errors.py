@@ -74,7 +74,7 @@ class Assumptions:
             key: of the option.
             low: smallest value.
             high: largest value.
-            missing: what the file does not state, with the place: ``link l4: states no mass``.
+            missing: the missing value, with the place: ``link l4: states no mass``.
             likely: value to suggest.
 
         Raises:

@@ -36,7 +36,7 @@ def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
             its folder ``servos``.
 
     Raises:
-        ConfigError: there is no such model; or the faults of its file, one line each.
+        ConfigError: the model is unknown; or the faults of its file, one line each.
 
     """
     path = model_file(name_or_path, beside)

@@ -89,7 +89,7 @@ def _kind_of(choices: list[type[BaseModel]], values: Mapping[str, Any]) -> type[
 
 
 def _rows(model: type[BaseModel], rows: Sequence[Mapping[str, Any]], where: str) -> Iterator[str]:
-    """Repeated tables; one table of comments if there are no rows."""
+    """Repeated tables; one table of comments if the list of rows is empty."""
     for row in rows or ({},):
         yield ""
         yield f"[[{where}]]" if row else f"# [[{where}]]"

@@ -1,7 +1,7 @@
 """Loops compiled by numba for one signature, when their module is imported.
 
 Never at the first call: a bus that stops for a second to compile has missed fifty cycles. Later
-imports take the machine code from numba's cache.
+imports load the machine code from numba's cache.
 
 A package of the base install that may be absent all the same: a light install of the test fixture
 has no numba (docs/start/ci.md), and runs the loops as they are written.
@@ -35,8 +35,8 @@ def compiled(
 ) -> Callable[[F], F]:
     """Compile a function for ``signature``; the function as written is its ``py_func``.
 
-    Without numba the function itself is given back: what drives servos names numba's types for its
-    signatures, and is not imported then.
+    Without numba the function itself is returned: modules that drive servos use numba's types in
+    their signatures, and they are not imported in that case.
 
     Args:
         signature: a numba type, or its name, for modules that do not import numba themselves.
@@ -44,8 +44,8 @@ def compiled(
         divides_by_zero: a division by zero is infinite, not an error; without the question for it
             a loop is made for several numbers at once.
         makes_arrays: False for a loop that only reads and writes the arrays it is given. Numba then
-            counts no references, which take as long as a short loop does. A loop that makes an
-            array in spite of it does not compile. If numba has no such option, all loops count
+            counts no references, which would need as much time as a short loop. A loop that makes
+            an array in spite of it does not compile. If numba has no such option, all loops count
             references: the results have the same bits.
 
     """

@@ -1,9 +1,9 @@
 """Small least squares whose result has the same bits on every processor.
 
-numpy hands products and solvers to BLAS, which takes other kernels on other processors, with sums
-in another order; a run then differs in the last bit, and after a while in everything. The loops
-here have one order. They stand beside ``compiling``, as the simulation needs them and the
-controller.
+numpy hands products and solvers to BLAS, which uses other kernels on other processors, with sums in
+another order; a run then differs in the last bit, and after a while in everything. The loops here
+have one order. They are in the same package as ``compiling``, because the simulation and the
+controller both need them.
 """
 
 import numpy as np

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 RAISE = 10
-"""Steps of niceness where there is no real-time scheduling; each is about a quarter more of a busy
-processor (Linux, ``sched(7)``), but only among the programs of one terminal where the system
-groups them (autogroup)."""
+"""Steps of niceness if real-time scheduling is not available. Each step is about a quarter more of
+a busy processor (Linux, ``sched(7)``). This holds only among the programs of one terminal if the
+system groups them (autogroup)."""
 LOWER = 10
 """Niceness of work that may wait."""
 

@@ -210,7 +210,7 @@ def examine_segments(
         safety: as of a run.
         rate_hz: of its control cycle.
         wiggle: all joints at once.
-        on_progress: takes the port and the step.
+        on_progress: called with the port and the step.
 
     """
     findings: list[Finding] = []

@@ -30,10 +30,10 @@ class HomingOffset:
 
 
 def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ...]:
-    """Homing Offset of each joint's servo that takes over its ``zero_rad``, head first; reads only.
+    """Homing Offset for each joint's servo that replaces its ``zero_rad``, head first; reads only.
 
     Raises:
-        InputError: offsets that a servo would ignore in position mode, or that take the joint's
+        InputError: offsets that a servo would ignore in position mode, or that move the joint's
             range out of its turn, all of them at once.
         BusError: a servo does not answer.
 

@@ -62,7 +62,7 @@ def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) 
     Args:
         pings: of the robot's IDs.
         reads: of those that answer.
-        overheard: what came before anybody was asked.
+        overheard: traffic on the line before the first request.
 
     """
     probes = [*pings, *reads]
@@ -154,7 +154,7 @@ def line_quality(
     Args:
         port: the line.
         cycle: waits ``PATIENCE_S``.
-        latency_s: beyond it a run takes a reply for lost.
+        latency_s: a run treats a reply that is later than this as lost.
         ask_each: asks each servo by itself, to see whose replies get lost.
 
     """

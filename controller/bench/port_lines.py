@@ -66,7 +66,7 @@ def open_lines(port: str | None, baud: int) -> Iterator[PortLines]:
 
     Raises:
         PortError: one is not there, or cannot be opened; none was named, and there is not just one.
-        InputError: what cannot be read, or a port or an ID that is named twice.
+        InputError: an entry that cannot be read, or a port or an ID that is named twice.
 
     """
     if port is None or not is_port_map(port):

@@ -70,9 +70,9 @@ class CameraCheck:
 
         Args:
             camera: names the markers.
-            robot: what the camera looks at.
-            detector: with a picture of the empty floor; None where there is none: then neither
-                latency nor a bump is told.
+            robot: the robot that the camera looks at.
+            detector: with a picture of the empty floor; None without such a picture: then neither
+                latency nor a bump is reported.
 
         """
         self._camera, self._robot, self._detector = camera, robot, detector

@@ -28,7 +28,7 @@ def camera_findings(
 
     Args:
         report: of the check.
-        camera: what was asked for.
+        camera: the requested camera settings.
         locks: of ``exposure`` and ``white balance``.
 
     """

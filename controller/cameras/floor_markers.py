@@ -177,8 +177,8 @@ def fit_floor(
     Args:
         seen: in a picture.
         places_m: (2,) of the middle of each marker on the floor.
-        lens: without distortion, pixels and floor are one homography; with a lens known the
-            camera's place is told as well.
+        lens: without distortion, pixels and floor are one homography; with a known lens the
+            camera's place is reported as well.
 
     Raises:
         InputError: fewer than four of the markers are seen, or they lie on a line.

@@ -16,7 +16,7 @@ Heights = Callable[[Floats], Floats]
 """Heights (...,) of the ground at places (..., 2)."""
 _ROUNDS: Final = 3
 _LEAST_SPREAD_M2: Final = 4e-4
-"""A body narrower than this across its line tells nothing about the slope across it (ours)."""
+"""A body narrower than this across its line does not show the slope across it (ours)."""
 
 
 def heights_of(ground: HeightField | None) -> Heights | None:

@@ -67,7 +67,7 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
     """Find the lens; views far off the others are left out.
 
     Args:
-        views: what was found in each picture; None is left out.
+        views: the board found in each picture; None is left out.
         size_px: width, height of the pictures.
 
     Raises:

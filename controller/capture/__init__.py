@@ -1,8 +1,8 @@
 """Recordings in: films, tracked midlines, keypoints and joint angles become one ``Track``.
 
 ``readers`` load recordings; ``track`` turns points into tangent angles at 100 equal arc lengths
-(``resample``). Films: ``image`` finds a body in a frame, ``body_detector`` knows the scene,
-``capture`` goes through the film, ``outlier_frames`` marks bodies that differ from the film's,
+(``resample``). For films, ``image`` finds a body in a frame, ``body_detector`` knows the scene, and
+``capture`` goes through the film. ``outlier_frames`` marks bodies that differ from the film's.
 ``identity`` keeps head and tail, ``small_body`` fits small bodies, ``scale`` gives metres.
 ``analysis`` measures a track: its ``wave``, ``pulse_speed`` and ``undulation``; ``slowing`` says
 how much slower the servos must be. ``mesh`` gives the body a skin. ``fish`` matches a deformable

@@ -24,10 +24,10 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
-_LOST_FRAMES = 5  # for so many frames a lost small body is searched where it was last
+_LOST_FRAMES = 5  # for this number of frames a lost small body is searched at its last place
 _OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
 _FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
-_STILL = 0.02  # of the length: less change than that is no motion
+_STILL = 0.02  # of the length: a smaller change does not count as motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +42,9 @@ class Capture:
     """(T,)"""
     status: tuple[FrameStatus, ...]
     expected_px: Floats
-    """(T,) expected mean error of a point; NaN where there is none. Above a hundredth of the length
-    the status is ``rough``: the frame has points, but they are less accurate than wanted."""
+    """(T,) expected mean error of a point; NaN for a frame without a skeleton. Above a hundredth of
+    the length the status is ``rough``: the frame has points, but they are less accurate than
+    wanted."""
     distractors: Floats
     """(T,) area of the next largest object that stands out, over the body's."""
     margin: Floats
@@ -52,7 +53,7 @@ class Capture:
     time_s: Floats
     """(T,) when the frames were taken; uneven where the film says so."""
     head_by: str
-    """How the head was told from the tail: ``given``, ``travel``, ``wave`` or ``taper``."""
+    """How the head and the tail were distinguished: ``given``, ``travel``, ``wave``, ``taper``."""
     head_sure: float
     """How surely, 0 to 1."""
     places_recorded: bool = True
@@ -151,7 +152,7 @@ def capture(
 
 @dataclass(frozen=True, slots=True)
 class CaptureFile:
-    """What a file of a captured recording holds."""
+    """Content of a file of a captured recording."""
 
     captured: Capture
     name: str
@@ -163,21 +164,21 @@ class CaptureFile:
 
     @property
     def fingerprint(self) -> str:
-        """Of the points: another capture, or a corrected one, has another."""
+        """Digest of the points: another capture, or a corrected one, has another digest."""
         points = np.ascontiguousarray(self.captured.points_px, dtype="<f8")
         return hashlib.sha256(points.tobytes()).hexdigest()[:16]
 
 
 def save_capture(path: Path, held: CaptureFile) -> None:
-    """Write an .npz that ``load_track`` reads, with the data of every frame beside the track.
+    """Write an .npz that ``load_track`` reads, with the track and the data of every frame.
 
-    ``points`` (T, 101, 2) head first, m (pixels where there is no scale), y upwards; ``rate_hz``,
-    ``time_s`` (T,), ``rate_assumed``, ``length_m`` (NaN: no scale), ``name``, ``source``,
-    ``licence`` are the track.
-    Of every frame, used or not: ``verdict`` (T,) its status in words, ``points_px`` (T, 101, 2) as
-    in the image, ``radius_px`` (T, 101), ``length_px`` (T,), ``head_margin`` (T,),
-    ``expected_px`` (T,), the error of a point, ``company`` (T,), the size of the next largest
-    object. Once: ``m_per_px`` (NaN: no scale), ``head_by``, ``head_sure``, ``places_recorded``.
+    The track consists of ``points`` (T, 101, 2) head first, m (pixels without a scale), y upwards;
+    ``rate_hz``, ``time_s`` (T,), ``rate_assumed``, ``length_m`` (NaN: no scale), ``name``,
+    ``source``, ``licence``. Each frame, used or not, has ``verdict`` (T,) its status in words,
+    ``points_px`` (T, 101, 2) as in the image, ``radius_px`` (T, 101), ``length_px`` (T,), and
+    ``head_margin`` (T,). It also has ``expected_px`` (T,), the error of a point, and ``company``
+    (T,), the size of the next largest object. Once: ``m_per_px`` (NaN: no scale), ``head_by``,
+    ``head_sure``, ``places_recorded``.
     """
     captured = held.captured
     scale = 1.0 if held.m_per_px is None else held.m_per_px
@@ -274,9 +275,9 @@ class _Detections:
     area_px: list[float] = field(default_factory=list)
     distractors: list[float] = field(default_factory=list)
     expected_px: list[float] = field(default_factory=list)
-    """Of long bodies, whose medial axis is kept; NaN for all others."""
+    """Error of long bodies, whose medial axis is kept; NaN for all others."""
     axis_error_px: list[float] = field(default_factory=list)
-    """Of the medial axis of any body; NaN where there is none."""
+    """Error of the medial axis of any body; NaN for a frame without one."""
     outlines: dict[int, Outline] = field(default_factory=dict)
     """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
     faint_error_px: dict[int, float] = field(default_factory=dict)

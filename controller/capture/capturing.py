@@ -1,6 +1,7 @@
 """One recording captured: frames read, the animal detected in them, track and pictures written.
 
-A track that was captured before is corrected by what a person has saved from its review page.
+A track that was captured before is corrected by the file that the user has saved from its review
+page.
 """
 
 from collections.abc import Iterator, Sequence
@@ -113,7 +114,7 @@ class CorrectionFacts:
 
 
 def correct_recording(options: CaptureOptions) -> CorrectionFacts:
-    """Correct a captured track by the file of ``--corrections`` and write it anew.
+    """Correct a captured track by the file of ``--corrections`` and write it again.
 
     Raises:
         InputError: no captured track, no corrections of it, another option, a result that exists.

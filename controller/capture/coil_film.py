@@ -38,7 +38,7 @@ _CHANGE = 2.0  # times the usual change from frame to frame, while a body coils
 _LEAST_CHANGE = (0.3, 0.3, 0.004, *[0.05] * COIL_BENDS)  # working px, log, rad
 _ROUNDS = 10
 _AGREE = 0.02  # of the length: solutions that are further apart are two
-_RIVAL = 150.0  # squares of what is usual: a dearer solution is none
+_RIVAL = 150.0  # squares of the usual residual: a dearer solution is rejected
 _OF_FIT, _OF_MODEL = 3.0, 2.5  # how the fit's own error and that of its body count
 _STEP = 100.0  # the same of a step from frame to frame: a body does not jump
 _BESIDE = 3  # frames on both sides of one that is solved in two ways, which are as doubtful
@@ -48,7 +48,7 @@ COIL_LEAST = 1.4
 """Times the usual expected error of the other frames: a coil is not surer than that."""
 _OTHERS = {FrameStatus.BLOB, FrameStatus.LARGER, FrameStatus.PART, FrameStatus.GHOST}  # or else
 COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *_OTHERS}
-"""What the medial axis and the comparison with the film make of a coil."""
+"""Result of the medial axis and of the comparison with the film for a coil."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class _Solution:
     error: Floats
     """(K,) expected mean error of a point by the fit alone, working px."""
     cost: float
-    """Of all frames, and of the steps between them, in squares of what is usual."""
+    """Cost of all frames, and of the steps between them, in squares of the usual residual."""
     apart: Floats
     """(K,) how far another solution of about the same cost is, working px."""
     steps: Floats
@@ -102,7 +102,7 @@ def solve_coils(
         if len(stretch) > _LONGEST:
             continue
         solved = film.solved(stretch, out, own_px)
-        if solved.turned:  # what follows was taken for the other end first
+        if solved.turned:  # the later frames were ordered by the wrong end before
             out[stretch[-1] + 1 :] = [one.reversed() for one in out[stretch[-1] + 1 :]]
         for k, body, error in zip(stretch, solved.skeletons, solved.expected_px, strict=True):
             out[k], expected[k] = body, error
@@ -110,7 +110,7 @@ def solve_coils(
 
 
 def _stretches(coils: Sequence[int], good: set[int]) -> list[list[int]]:
-    """Runs of consecutive frames: coils, and the good frames among and beside them.
+    """Runs of consecutive frames: coils, and the good frames among and next to them.
 
     A coil may pass for a body that does not touch itself for a few frames.
     """
@@ -131,7 +131,7 @@ def _stretches(coils: Sequence[int], good: set[int]) -> list[list[int]]:
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """A good frame beside a stretch."""
+    """A good frame next to a stretch."""
 
     values: Floats
     turned: Floats
@@ -140,7 +140,7 @@ class _End:
 
 @dataclass(frozen=True, slots=True)
 class _Solved:
-    """What became of the frames of a stretch."""
+    """Result for the frames of a stretch."""
 
     skeletons: list[Skeleton]
     expected_px: list[float]
@@ -151,14 +151,14 @@ class _Solved:
 
 @dataclass(frozen=True, slots=True)
 class _Film:
-    """What the good frames say of a film."""
+    """Properties of a film, from its good frames."""
 
     body: CoilBody
     outlines: Mapping[int, Outline]
     squares: float
     """Usual mean square of the residual."""
     left: float
-    """What good frames leave, nine of ten of them."""
+    """Residual of good frames, nine of ten of them."""
     misfit: float
     """How far fits of good frames are from their skeletons, nine of ten of them, working px."""
     change: Floats
@@ -194,7 +194,7 @@ class _Film:
         )
 
     def solved(self, stretch: list[int], skeletons: Sequence[Skeleton], own_px: float) -> "_Solved":
-        """What becomes of the frames of a stretch."""
+        """Result for the frames of a stretch."""
         shapes = [Shape.of(self.outlines[k], self.body.scale) for k in stretch]
         before, after = (self._end(k, skeletons) for k in (stretch[0] - 1, stretch[-1] + 1))
         if before is None or after is None:
@@ -220,7 +220,7 @@ class _Film:
         return out
 
     def _end(self, k: int, skeletons: Sequence[Skeleton]) -> "_End | None":
-        """The good frame beside a stretch."""
+        """The good frame next to the stretch."""
         if not 0 <= k < len(skeletons) or skeletons[k].status is not FrameStatus.GOOD:
             return None
         shape = Shape.of(self.outlines[k], self.body.scale)
@@ -270,7 +270,7 @@ class _Film:
     def _ways(
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> Floats:
-        """(K, chains) the least cost of the stretch if a frame takes its value of that chain.
+        """(K, chains) the least cost of the stretch if a frame has its value from that chain.
 
         A chain that took a wrong way at some frame is right before it.
         """
@@ -387,7 +387,7 @@ class _Film:
     def _eliminated(
         self, own: Sequence[Floats], push: Sequence[Floats]
     ) -> list[tuple[Floats, Floats]]:
-        """For each frame, what the frames before it add to its information and push."""
+        """For each frame, the information and push that the frames before it add."""
         tie = self.change
         nothing = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
         out = [nothing]
@@ -428,7 +428,7 @@ class _Film:
 
 
 def _unsolved(own: Skeleton, status: FrameStatus) -> Skeleton:
-    """What stays of a frame that is not solved: its own reason where it may be no coil."""
+    """Skeleton of a frame that is not solved: its own reason if it may not be a coil."""
     return own if own.status in _OTHERS else no_skeleton(status)
 
 

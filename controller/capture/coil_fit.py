@@ -1,8 +1,8 @@
 """The body of one frame as a film knows it, fitted to a silhouette in which it may lie on itself.
 
 A medial axis needs two free sides along the whole body. The union of the discs of a body of known
-length and widths needs none: its distances to the boundary are compared with those of the
-silhouette, by damped least squares over the bends and the place.
+length and widths does not need sides: its distances to the boundary are compared with those of the
+silhouette. The method is damped least squares over the bends and the place.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from snakewalk.drivers.compiling import compiled
 COIL_BENDS = 14
 """Coefficients of the tangent angle: four more than of a body that does not coil."""
 PARAMETERS = 3 + COIL_BENDS
-"""Of a frame: x, y of the middle of the body against that of the silhouette, log of the length over
-the usual one, bends."""
+"""Parameters of a frame: x, y of the middle of the body against that of the silhouette, log of the
+length over the usual one, bends."""
 WIDTH_PX = 8.0
 """Greatest width of the body while it is fitted, working px."""
 _DISCS = 60
@@ -36,7 +36,7 @@ _TOGETHER = 9.0  # neighbouring pixels whose residuals are about the same
 _LEAST_PX = 0.25  # working px: the residual of a silhouette of pixels
 _LENGTH = 0.015  # prior standard deviation of the log of a frame's length
 _STIFF = 2.0  # rad, of second differences of the bends
-_APART_PX = 1.25  # working px on both sides of the boundary: what is left over is more than edge
+_APART_PX = 1.25  # working px on both sides of the boundary: a larger residual is more than edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class CoilBody:
-    """What a film's good frames say of its body, on the working grid."""
+    """Properties of a film's body from its good frames, on the working grid."""
 
     length: float
     half_width: Floats
@@ -261,7 +261,7 @@ def normal_of(
 
 
 def _own_prior(values: Floats) -> tuple[Floats, Floats]:
-    """Rows of what is known of any frame, and what is left of them."""
+    """Rows of the prior knowledge about any frame, and their residuals."""
     rows = np.zeros((COIL_BENDS - 1, PARAMETERS))
     rows[0, 2] = 1.0 / _LENGTH
     rows[1:, 3:] = np.diff(np.eye(COIL_BENDS), 2, axis=0) / _STIFF
@@ -279,7 +279,7 @@ def fit_coil(
 ) -> tuple[Floats, Normal]:
     """Fit one frame from ``start`` (PARAMETERS,); damped least squares.
 
-    ``prior`` is what the frame beside it says: expected values and their information.
+    ``prior`` is the prediction of the next frame: expected values and their information.
     """
     kept = start
     normal = normal_of(start, body, shape, squares, coarse=coarse)

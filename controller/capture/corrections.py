@@ -24,7 +24,8 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skele
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _LONGEST: Final = 4.0
-"""Of the film's usual length (ours): a line drawn longer is a slip of the hand."""
+"""Longest line, as a multiple of the film's usual length (ours): a longer one is a slip of the
+hand."""
 
 
 class RedrawnFrame(Strict):
@@ -36,12 +37,12 @@ class RedrawnFrame(Strict):
 
 
 class Corrections(Strict):
-    """What a person has corrected; frames count from 0."""
+    """Corrections by the user; frames count from 0."""
 
     track: str
     """``CaptureFile.fingerprint`` of the track that was looked at."""
     frames: int = Field(ge=1)
-    """Of that track."""
+    """Number of frames of that track."""
     flipped: tuple[int, ...] = ()
     """Frames whose head is at the other end."""
     left_out: tuple[int, ...] = ()
@@ -77,8 +78,8 @@ def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) ->
         name: of the corrections, for faults.
 
     Raises:
-        InputError: they belong to another track, or were applied already; a frame that is not
-            there; a line that is no body; fewer than two frames stay.
+        InputError: they belong to another track, or were applied already; a frame that does not
+            exist; a line that cannot be a body; fewer than two frames stay.
 
     """
     captured = held.captured

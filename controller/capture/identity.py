@@ -16,7 +16,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import track_from_points
 from snakewalk.controller.track.wave import measure_wave
 
-_SURE = 0.2  # margin from which one frame is enough to tell the ends apart
+_SURE = 0.2  # margin from which one frame is enough to distinguish the ends
 _WAVE_FRAMES = 8  # from which a wave's direction is looked at
 _TRAVEL = 0.2  # travel score from which the travel decides which end is the head
 _TRAVEL_S = 0.25
@@ -31,8 +31,8 @@ class AlignedSkeletons:
 
     skeletons: tuple[Skeleton, ...]
     margin: Floats
-    """(T,) how much better the frame fits as it is than reversed, -1 to 1; NaN where there is no
-    skeleton, 1 at the first one. Below 0 where thickness overruled the place."""
+    """(T,) how much better the frame fits as it is than reversed, -1 to 1; NaN for a frame without
+    a skeleton, 1 at the first one. Below 0 where thickness overruled the place."""
 
 
 def margin_of(body: Skeleton, before: Skeleton) -> float:
@@ -122,7 +122,7 @@ def travel_score(points_px: Floats, step: int) -> float:
 
 
 def usual_travel(points_px: Floats, step: int) -> float:
-    """How far the middle of the body (T, P, 2) goes in so many frames, median; 0: not known."""
+    """Median travel of the middle of the body (T, P, 2) in ``step`` frames; 0: not known."""
     middle = points_px.mean(axis=1)
     moved = np.hypot(*(middle[step:] - middle[:-step]).T)
     return float(np.nanmedian(moved)) if np.isfinite(moved).any() else 0.0
@@ -152,7 +152,7 @@ def head_end(
     """Which end is the head: given, or by travel, the wave's direction, or the taper.
 
     Args:
-        points: (T, P, 2) pixels, the same end first in all; NaN where there is no body.
+        points: (T, P, 2) pixels, the same end first in all; NaN for a frame without a body.
         radius: (T, P) half the thickness.
         rate_hz: frames a second.
         head_px: a place near the head in the first frame with a body.

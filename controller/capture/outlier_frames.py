@@ -14,13 +14,13 @@ from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _SPREADS = 6.0  # standard deviations, estimated from the median deviation
-_LENGTH = 0.06  # of the median: a smaller deviation is none
+_LENGTH = 0.06  # of the median: a smaller deviation does not count
 _AREA = 0.08
 _THICK = 0.3
 _LEAST_PX = 0.3
 _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
-_FEWEST = 5  # frames from which outliers can be told
+_FEWEST = 5  # frames from which outliers can be found
 
 
 def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:

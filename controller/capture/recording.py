@@ -1,4 +1,4 @@
-"""The facts of ``snakewalk track``: what a recording holds, and what of it a robot can do."""
+"""The facts of ``snakewalk track``: a recording's content, and the share that a robot can do."""
 
 from dataclasses import dataclass
 
@@ -60,7 +60,7 @@ class RecordingFacts:
     wave_share: float
     time_towards_head: float | None
     wave_not_told: str | None
-    """Why the wave's figures are None; the joints' smoothing still takes the strongest pattern."""
+    """Why the wave's figures are None; the joints' smoothing still uses the strongest pattern."""
     bend_k_rad: float
     bend_k_most_rad: float
     energy_kept: float

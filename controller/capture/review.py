@@ -1,6 +1,6 @@
 """The page on which a person reviews a capture: frames, skeletons, status over time; one file.
 
-It needs no server and no network. What is corrected on it is saved as a file that
+It needs no server and no network. The corrections on it are saved as a file that
 ``controller.capture.corrections`` reads.
 """
 
@@ -27,7 +27,7 @@ _LARGEST_PX: Final = 1280
 _SMALLEST_PX: Final = 320
 """Longest side of the pictures on the page."""
 _MOST_BYTES: Final = 150_000_000
-"""Of all pictures (ours): a browser opens such a page in seconds."""
+"""Limit for all pictures together (ours): a browser opens such a page in seconds."""
 _QUALITY: Final = 85
 
 
@@ -40,7 +40,7 @@ def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
         name: of the recording, for the fault.
 
     Raises:
-        InputError: so many frames that even small pictures would be too much.
+        InputError: the frames are so numerous that even small pictures would be too much.
 
     """
     longest: int = max(max(frame.shape[:2]) for frame in some)

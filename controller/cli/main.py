@@ -46,8 +46,8 @@ def main() -> None:
     # choice that is not installed.
     os.environ["MUJOCO_GL"] = "disable"
     leave_out_avx512()
-    # a script has what it starts beside itself ignore ^C and SIGQUIT, and it has to stop all the
-    # same; nohup has SIGHUP ignored, and means it
+    # a script makes its background programs ignore ^C and SIGQUIT, and a run has to stop all the
+    # same; nohup ignores SIGHUP on purpose
     for number in _ENDING:
         ignored = signal.getsignal(number) is signal.SIG_IGN
         if signal.getsignal(number) is signal.SIG_DFL or (ignored and number.name != "SIGHUP"):

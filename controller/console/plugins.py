@@ -101,7 +101,7 @@ def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Pl
         kind: one of ``KINDS``.
         name: the value of the option.
         option: how a message names the option.
-        others: further valid values, which are no plug-ins.
+        others: further valid values, which are not plug-ins.
 
     Raises:
         InputError: the plug-in does not exist; lists the valid values.

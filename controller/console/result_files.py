@@ -25,8 +25,8 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
     """Check the files of all results before any work is done; None is ignored.
 
     Raises:
-        InputError: one line for each that exists (without ``force``), whose folder does not or
-            takes no new file, or that is named twice.
+        InputError: one line for each file that exists (without ``force``), whose folder is missing
+            or not writable, or that is named twice.
 
     """
     files = [path for path in paths if path is not None]

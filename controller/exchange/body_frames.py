@@ -16,7 +16,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.runlog.record import RunRecord
 
 WORLD: Final = "world"
-"""The frame in which the head's pose is told."""
+"""The frame of the head's pose."""
 
 
 @dataclass(frozen=True, slots=True)

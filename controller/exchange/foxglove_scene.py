@@ -70,7 +70,7 @@ SHOWN: Final[Shown] = {
 }
 """Fields that well-known messages contain; the others keep the log's topics and schemas."""
 _LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
-"""Of ``foxglove.Log``."""
+"""Levels of ``foxglove.Log``."""
 _HEAD: Final = (0.85, 0.33, 0.10, 1.0)
 _LINKS: Final = ((0.20, 0.45, 0.70, 1.0), (0.35, 0.65, 0.85, 1.0))
 _PATH: Final = (0.95, 0.75, 0.10, 1.0)
@@ -176,7 +176,7 @@ def _frames(record: RunRecord) -> Iterator[Row]:
 
 
 def _imu(record: RunRecord) -> Iterator[Row]:
-    """The link's axes as the device says them, where the link is: beside its frame, drift shows."""
+    """The link's axes as the device reports them, at the link: next to its frame, drift shows."""
     readings = imu_readings(record)
     rows = zip(
         readings.time_s.tolist(),

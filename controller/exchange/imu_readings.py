@@ -1,4 +1,4 @@
-"""What a run's IMU measured, each reading once, in the frames of ``body_frames``."""
+"""Measurements of a run's IMU, each reading once, in the frames of ``body_frames``."""
 
 from dataclasses import dataclass
 from typing import Final

@@ -9,7 +9,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 
 Ros2Control = Literal["topic", "dynamixel"]
-"""What ros2_control drives: our ROS node, or the servos themselves."""
+"""Hardware that ros2_control drives: our ROS node, or the servos themselves."""
 _DEVICE: Final = "/dev/ttyUSB0"
 _POSITION_MODE: Final = 3
 

@@ -36,11 +36,11 @@ PATH: Final = PathTable.topic.name
 DIAGNOSTICS: Final = "/diagnostics"
 ROSOUT: Final = "/rosout"
 _LEVELS: Final = {"info": 20, "warning": 30, "error": 40}
-"""Of ``rcl_interfaces/msg/Log``."""
+"""Levels of ``rcl_interfaces/msg/Log``."""
 OK: Final = 0
 WARNING: Final = 1
 ERROR: Final = 2
-"""Of ``diagnostic_msgs/msg/DiagnosticStatus``."""
+"""Levels of ``diagnostic_msgs/msg/DiagnosticStatus``."""
 _PATH: Final = "nav_msgs/msg/Path"
 _TEXT: Final = "std_msgs/msg/String"
 TYPES: Final = {
@@ -138,7 +138,7 @@ class RosMessages:
             )
 
     def joints(self, record: RunRecord) -> Iterator[Row]:
-        """What was measured, and what was sent, in every cycle."""
+        """Measured and sent values of every cycle."""
         cycle, names = record.cycle, list(record.header.robot.joint_names)
         effort_n_m = cycle.current_a * record.header.torque_constant_n_m_a
         none = np.zeros(0)

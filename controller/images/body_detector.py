@@ -128,8 +128,8 @@ def make_detector(
     Without a background the median of the frames is taken. If the animal hardly moves, or the
     camera follows it, the median shows the animal itself. Then another ground is used if more
     frames agree on the body's length and are explained by it. It is the median of frames in which
-    the animal is painted out, a brighter or darker quantile of each pixel's values, or the ground
-    found in each frame alone: a smooth surface or the surroundings of each place.
+    the animal is painted out, or a brighter or darker quantile of each pixel's values. It can also
+    be the ground found in each frame alone: a smooth surface or the surroundings of each place.
 
     Args:
         frames: (H, W) or (H, W, 3), 8 bit.

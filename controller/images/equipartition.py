@@ -67,7 +67,7 @@ class _Curve:
         self.first: Ints = np.zeros(segments, dtype=np.int64)
         self.points = np.empty((segments + 1, 2))
         self.at = np.empty(segments + 1)
-        # N chords are no longer than the curve, and no shorter than the distance from A to B
+        # N chords are never longer than the curve, and never shorter than the distance from A to B
         self.least = float(np.hypot(*(kept[-1] - kept[0]))) / segments
         self.most = self.length / segments
 
@@ -297,7 +297,7 @@ def march(
         line: (M, 2) vertices; the last piece should be long enough that no step leaves it.
         arc: (M,) arc length at the vertices.
         chord: length of every step.
-        crossing: (N,) which crossing of its circle each step takes, 0 the first.
+        crossing: (N,) which crossing of its circle each step uses, 0 the first.
         points: (N + 1, 2) written.
         at: (N + 1,) arc length of them, written.
 

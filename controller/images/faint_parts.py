@@ -15,15 +15,15 @@ from snakewalk.controller.images.silhouette import (
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _AWAY = 1.2  # widths from the silhouette: blur and shadow stay nearer
-_MUCH = 0.06  # of the silhouette's area: fewer faint pixels are no part of the body
-_FAINTEST = 0.07  # of the body's contrast: what is fainter is a stain or a trail
+_MUCH = 0.06  # of the silhouette's area: fewer faint pixels do not count as a part of the body
+_FAINTEST = 0.07  # of the body's contrast: a fainter area is a stain or a trail
 _MARGIN_PX = 20  # of the cut-out, where the body fades out
-_BLUR_PX = 4  # around the silhouette: what goes on further is not its blur
-_TYPICAL = 40.0  # percentile of the contrast along the middle of what goes on: of the faint parts
+_BLUR_PX = 4  # around the silhouette: an area that goes on further is not its blur
+_TYPICAL = 40.0  # percentile of the contrast along the middle of the faint parts
 
 
 def may_have_faint_parts(body: Silhouette) -> bool:
-    """Whether something fainter than the silhouette goes on beyond its cut-out, or beside it."""
+    """Whether something fainter than the silhouette goes on beyond its cut-out, or next to it."""
     if body.status is FrameStatus.SEVERAL:
         return True
     if body.status is not FrameStatus.GOOD:

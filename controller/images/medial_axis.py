@@ -311,7 +311,7 @@ def walk_line(
     """Walk over the pixels of a thin line from some of them, a pixel further at a time.
 
     Args:
-        place: (H W,) index of each pixel of the line, -1 beside it; the rim of the image is beside.
+        place: (H W,) index of each pixel of the line, -1 off it; the rim of the image is off it.
         flat: (N,) where the line's pixels are in it.
         wide: W.
         start: (S,) indices of the first pixels.

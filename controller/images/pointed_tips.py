@@ -17,7 +17,7 @@ _BEFORE = 2.0  # widths before the end that is known, from which the profile is 
 _BLUR_PX = 2.0  # of filters and image: so far a blunt end's profile reaches beyond it
 _BEYOND = 2.5  # widths beyond the end that is known, at most
 _ACROSS = 0.9  # widths on each side that are summed
-_RIM = 0.7  # widths: what lies further to the side is ground
+_RIM = 0.7  # widths: a place further to the side is ground
 _AHEAD = 0.5  # widths over which the direction at the end is taken
 _BLUNT = 0.18  # of the usual width at the end that is known: a wider end is not pointed
 _LONGEST = 0.6  # widths: a longer extension is a trail
@@ -86,7 +86,7 @@ def _crossing(sums: Floats, share: float) -> float | None:
 
 
 def _sums(path: Floats, level: NDArray[np.float32], wide: float) -> Floats:
-    """(P,) contrast summed across the path, less that of the ground beside it."""
+    """(P,) contrast summed across the path, less that of the ground on both sides."""
     along = np.gradient(path, axis=0)
     side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
     reach = round(_ACROSS * wide)

@@ -128,8 +128,8 @@ def _threshold_of_body(
     """Half of the contrast of the part with the most contrast in sum.
 
     Stains of a JPEG and a soft shade of the ground may be larger than the animal, and joined to it.
-    So if a part is mostly fainter than half of its strong pixels, its contrast is a percentile in
-    which each pixel counts by its squared contrast, and a part's sum is taken above half of that.
+    So if a part is mostly fainter than half of its strong pixels, its contrast is a percentile. In
+    it each pixel counts by its squared contrast, and a part's sum is computed above half of that.
     """
     strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
     inside = label > 0

@@ -187,7 +187,7 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
 
     Args:
         path: a video file, a TIFF stack, or a folder of images.
-        rate_hz: frames a second, instead of what the file states; a folder states none.
+        rate_hz: frames a second, instead of the rate that the file states; a folder states none.
 
     Raises:
         InputError: no such file, no images, no video that can be read, or an empty one.

@@ -43,8 +43,8 @@ class Frame:
 def body_frame(link_m: Floats, up: ArrayLike = UP) -> Frame:
     """Frame of links with centres ``link_m`` (L, 3), head first.
 
-    x goes from the mean of the centres to the head; y is *normalised*: ``up`` is not at a right
-    angle to x on a slope, and Eq. 3 as printed leaves a short axis there.
+    The axis x goes from the mean of the centres to the head. The axis y is *normalised*: ``up`` is
+    not at a right angle to x on a slope, and Eq. 3 as printed leaves a short axis there.
 
     Raises:
         ValueError: the head is at the centre, or x is parallel to ``up``.

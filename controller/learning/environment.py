@@ -52,8 +52,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     Observation (4 J + 7,): measured angles (rad), velocities (rad/s) and currents (A), as in the
     packets; the last goals that safety passed (rad). The simulation adds the world's up in the axes
-    of the head, cosine and sine of the body's mean heading (x being 0), and the velocity of the
-    centre of mass along x and y since the last step (m/s).
+    of the head, and cosine and sine of the body's mean heading (x being 0). It also adds the
+    velocity of the centre of mass along x and y since the last step (m/s).
 
     Reward, in m: how far the centre of mass came along x, less ``energy_weight_m_j`` metres for
     each joule that the motors took in. If safety trips, the episode terminates, and
@@ -192,7 +192,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Send goals (J,), as shares of the limits; wait for the next cycle, read all servos.
 
         Raises:
-            gymnasium.error.ResetNeeded: there is no episode, or safety has tripped in it.
+            gymnasium.error.ResetNeeded: no episode is running, or safety has tripped in it.
             gymnasium.error.InvalidAction: its shape is not that of ``action_space``.
 
         """

@@ -81,7 +81,7 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
         """Change the wave, go on by a cycle.
 
         Raises:
-            gymnasium.error.ResetNeeded: there is no episode, or safety has tripped in it.
+            gymnasium.error.ResetNeeded: no episode is running, or safety has tripped in it.
             gymnasium.error.InvalidAction: its shape is not that of ``action_space``.
 
         """

@@ -32,7 +32,7 @@ _LEAST_STEEP: Final = 4.0
 _MOST_SHIFT_PX: Final = 0.5
 _RADIUS_PX: Final = 4
 _LEAST_SHARE: Final = 0.4
-"""Of a window's pixels that must lie on the plane of its middle (ours)."""
+"""Share of a window's pixels that must lie on the plane of its middle (ours)."""
 _TOUCH_PX: Final = 1.0
 """How far from the plane a pixel may be that belongs to it (ours)."""
 
@@ -40,7 +40,8 @@ _TOUCH_PX: Final = 1.0
 def match(left: Image, right: Image, count: int, least: int = 0) -> Floats:
     """Disparities (H, W) of the left picture's pixels, NaN where they are not known.
 
-    Known is what matches both ways, lies with its neighbours on a plane, and is no speck.
+    A pixel is known if it matches both ways, lies with its neighbours on a plane, and is not a
+    speck.
 
     Args:
         left: (H, W) or (H, W, 3), rectified.
@@ -98,9 +99,9 @@ def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
 
 
 def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
-    """Shift each pixel's window by what least squares of the grey levels ask for.
+    """Shift each pixel's window by least squares of the grey levels.
 
-    Semi-global matching tells fractions of a pixel by three costs, which draws them to whole
+    Semi-global matching finds fractions of a pixel by three costs, which draws them to whole
     pixels; this is the step of B. D. Lucas and T. Kanade (1981) along the row, after which they are
     not.
     """

@@ -30,10 +30,10 @@ LASERS: Final = (".las", ".laz")
 CLOUDS: Final = (".pcd", ".ply", ".xyz", *LASERS)
 MESHES: Final = (".obj", ".stl", ".glb")
 _MOST_SIZE_M: Final = 100_000.0
-"""Of a map in the robot's world: a run's places reach a hundredth of it (ours)."""
+"""Largest size of a map in the robot's world: a run's places reach a hundredth of it (ours)."""
 ENDINGS: Final = (*RASTERS, *CLOUDS, *MESHES)
 _POINTS_A_CELL: Final = 2.0
-"""Of a cloud whose spacing is not given, in the mean (ours)."""
+"""Mean number of points in a cell of a cloud whose spacing is not given (ours)."""
 _STACKED_SHARE, _STACKED_RELIEF, _STACKED_POINTS = 0.2, 0.5, 3
 """Share of the points, in cells with some of them, that lie one above the other by a share of the
 relief: beyond it a cloud is not seen from above (ours)."""
@@ -55,7 +55,7 @@ class MapOptions:
     """How a file becomes a map."""
 
     units: RasterUnits = field(default_factory=RasterUnits)
-    """What the file leaves unsaid."""
+    """Facts that the file does not state."""
     crop: Crop | None = None
     """Metres from the south-west corner of the file; None: all of it."""
     scale: float = 1.0
@@ -70,9 +70,9 @@ class MapOptions:
     """Axis of a mesh's or cloud's file that points up, of ``AXES``; None: z, if nothing else is
     likely."""
     classes: tuple[int, ...] | None = None
-    """Of the points of a laser scanner that count; None: the ground's."""
+    """Classes of the points of a laser scanner that count; None: the ground's."""
     assumed: Assumptions = field(default_factory=Assumptions)
-    """What the file does not state, besides units."""
+    """Facts that the file does not state, besides units."""
 
     @property
     def rise(self) -> float:
@@ -90,9 +90,9 @@ class FileMap:
     relief_m: float
     """Highest less lowest of that part, in metres of the file."""
     kind: str
-    """What the file holds: raster, points or triangles."""
+    """Content of the file: raster, points or triangles."""
     notes: tuple[str, ...] = ()
-    """What was used, changed or left out."""
+    """Parts that were used, changed or left out."""
 
 
 def read_elevation(file: Path, options: MapOptions) -> FileMap:
@@ -257,7 +257,7 @@ def _of_points(
 
 
 def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> None:
-    """Reject a cloud in which many points lie one above the other: walls, rooms, a camera's view.
+    """Reject a cloud in which many points lie above each other: walls, interiors, a camera's view.
 
     Raises:
         InputError: the question.

@@ -32,7 +32,7 @@ from snakewalk.controller.mapping.raster_file import (
 )
 
 MOST_STRIPPED_CELLS: Final = 1_000_000_000
-"""Of a raster that is read in strips (ours)."""
+"""Most cells of a raster that is read in strips (ours)."""
 _MOST_PLAIN: Final = 4 * MOST_SAMPLES
 """Cells that are read at once: a finer spacing than two cells makes too many samples of more."""
 _STRIP_CELLS: Final = 2_000_000
@@ -40,7 +40,7 @@ _STRIP_CELLS: Final = 2_000_000
 _COARSER: Final = 2.0
 """Spacing of a map over a raster's from which strips are read (ours)."""
 _CACHE_BYTES: Final = 64_000_000
-"""Of GDAL's blocks (ours)."""
+"""Cache of GDAL's blocks (ours)."""
 _DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
 """Largest cell that may be one of degrees: a minute, 1.8 km (ours)."""
 
@@ -65,7 +65,7 @@ def read_geo_raster(
 
     Args:
         file: ends in .tif, .tiff or .asc.
-        units: what the user states.
+        units: the units that the user states.
         crop: of the file.
         spacing_of: function of a cell's width and depth in metres that returns the spacing of the
             map in metres of the file; a raster with a finer one is reduced to it while it is read.
@@ -221,7 +221,7 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
     """Unit of the cells by the coordinate system.
 
     Raises:
-        InputError: there is none, and the cells may be of degrees.
+        InputError: the file has no coordinate system, and its cells may be degrees.
 
     """
     crs, turn = opened.crs, opened.transform
@@ -260,7 +260,7 @@ def _height_unit(
     """Unit of heights: by the user, the band, or the vertical part of the system.
 
     Raises:
-        InputError: nothing states it where lengths are no metres, or two statements differ.
+        InputError: the unit is not stated and lengths may not be metres, or two statements differ.
 
     """
     if units.height_unit is not None:

@@ -50,7 +50,7 @@ _WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+
 
 
 _MOST_MEMORY_BYTES, _MOST_CPU_S = 3_000_000_000, 600
-"""Of the process that reads a file (ours)."""
+"""Limits of the process that reads a file: memory and CPU time (ours)."""
 _CHILD: Final = """
 import sys
 words, memory_bytes, cpu_s = sys.argv[1:]
@@ -73,9 +73,9 @@ class LasPoints:
     points: Floats
     """(n, 3) x, y, z."""
     unit: str | None
-    """Of x and y: of ``UNITS_M`` or deg; None: not stated."""
+    """Unit of x and y: of ``UNITS_M`` or deg; None: not stated."""
     height_unit: str | None
-    """Of z; None: not stated."""
+    """Unit of z; None: not stated."""
     crs: Any = None
     """Projected coordinate system of Rasterio; None: not stated, or unknown."""
     notes: list[str] = field(default_factory=list)
@@ -123,7 +123,7 @@ def read_las(
 
 
 def run_child(words: str) -> dict[str, Any]:
-    """Read a file in a process of its own; what it states, or its fault."""
+    """Read a file in a process of its own; return its facts, or its fault."""
     ended = run_code(_CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S))
     try:
         said = parse_json(ended.stdout)

@@ -22,11 +22,12 @@ def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
     table that is separated otherwise may have decimal commas.
 
     Raises:
-        InputError: it is no such table; names row and column of the first cell that is no number.
+        InputError: the file is not such a table; names row and column of the first cell that is not
+            a number.
 
     """
     size = file.stat().st_size
-    check_expansion(file, size, 4 * size)  # a number takes two characters or more
+    check_expansion(file, size, 4 * size)  # a number needs two characters or more
     try:
         text = file.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
@@ -65,7 +66,7 @@ def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
 
 
 def _separator(lines: list[str]) -> str | None:
-    """What separates the cells: the first of ; tab , that is in a line of numbers; else blanks."""
+    """Separator of the cells: the first of ; tab , that is in a line of numbers; else blanks."""
     first = lines[:10]
     for mark in ";\t":
         if any(mark in line for line in first):

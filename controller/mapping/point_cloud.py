@@ -37,14 +37,14 @@ class PcdCloud:
     image: tuple[int, int] | None
     """Width and height of a picture of points, as of a depth camera; None of other clouds."""
     notes: tuple[str, ...]
-    """What was left out."""
+    """Parts that were left out."""
 
 
 def read_pcd(file: Path) -> PcdCloud:
     """Read a PCD file; its pose of the sensor (VIEWPOINT) is not used.
 
     Raises:
-        InputError: it is none, is damaged, or would expand too far.
+        InputError: the file is not a point cloud, is damaged, or would expand too far.
         OSError: the file cannot be opened.
 
     """
@@ -189,7 +189,7 @@ def read_ply(file: Path) -> tuple[Floats, Any]:
     try:
         counts = [int(words[2]) for words in said if words[:1] == [b"element"]]
         size = file.stat().st_size
-        if any(not 0 <= count <= size for count in counts):  # each takes a byte or more
+        if any(not 0 <= count <= size for count in counts):  # each needs a byte or more
             raise ValueError("says more elements than it can hold")
         check_expansion(file, size, min(MOST_BYTES, 100 * sum(counts)))
         held: Any = trimesh.load(file, process=False)

@@ -21,9 +21,9 @@ from snakewalk.controller.mapping.number_table import read_numbers
 GEO_RASTERS: Final = (".tif", ".tiff", ".asc")
 RASTERS: Final = (*GEO_RASTERS, ".png", ".csv", ".npz")
 MOST_CELLS: Final = 40_000_000
-"""Of a raster that is read at once (ours): 320 MB as numbers."""
+"""Most cells of a raster that is read at once (ours): 320 MB as numbers."""
 Crop = tuple[float, float, float, float]
-"""Least x and y, greatest x and y, in metres from the south-west corner of what the file holds."""
+"""Least x and y, greatest x and y, in metres from the south-west corner of the file's content."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +44,11 @@ class Raster:
 
 @dataclass(frozen=True, slots=True)
 class RasterUnits:
-    """What a file may leave unsaid of its numbers."""
+    """Facts about its numbers that a file may leave out."""
 
     unit: str | None = None
-    """Of lengths: of ``UNITS_M``, or deg (then heights are metres); None: as the file states."""
+    """Unit of lengths: of ``UNITS_M``, or deg (then heights are metres); None: as the file
+    states."""
     cell: float | None = None
     """Distance between samples, in the unit; None: as the file says."""
     height_step: float | None = None
@@ -55,15 +56,15 @@ class RasterUnits:
     no_data: float | None = None
     """Value of cells that hold nothing, besides those that the file declares."""
     height_unit: str | None = None
-    """Of heights: of ``UNITS_M``; None: as the file states, else as ``unit``."""
+    """Unit of heights: of ``UNITS_M``; None: as the file states, else as ``unit``."""
 
 
 def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Raster:
     """Read a PNG, a CSV or an NPZ, or the part of it within a crop.
 
     Raises:
-        InputError: it cannot be read, is no raster of heights, is too large, states no size of its
-            cells where ``units`` does not either, or has no cell within the crop.
+        InputError: it cannot be read, is not a raster of heights, is too large, states no size of
+            its cells where ``units`` does not either, or has no cell within the crop.
         OSError: the file cannot be opened.
 
     """

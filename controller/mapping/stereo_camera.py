@@ -25,14 +25,14 @@ _NAMES: Final = {
     "rotation": ("R",),
     "translation": ("T",),
 }
-"""What people call what ``stereoCalibrate`` returns."""
+"""Names that people use for the results of ``stereoCalibrate``."""
 _OPTIONAL: Final = ("distortion_left", "distortion_right")
 _MOST_BYTES: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class StereoCalibration:
-    """What a calibration found."""
+    """Result of a calibration."""
 
     k_left: Floats
     """(3, 3) camera matrix, pixels."""
@@ -48,7 +48,7 @@ class StereoCalibration:
 
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:
-    """Two pictures whose rows correspond, and the camera that takes both."""
+    """Two pictures whose rows correspond, and the camera that records both."""
 
     left: Image
     right: Image
@@ -56,7 +56,7 @@ class RectifiedPair:
     """(H, W) where the left picture shows something."""
     focal_px: float
     centre_px: tuple[float, float]
-    """Of the left picture."""
+    """Centre of the left picture."""
     offset_px: float
     """Column of the right picture's centre less that of the left's: a point at infinity has the
     disparity ``-offset_px``."""
@@ -65,7 +65,7 @@ class RectifiedPair:
     """(3, 3) from the left camera's axes to the rectified ones."""
 
     def points_m(self, disparity: Floats) -> Floats:
-        """(H, W, 3) points in the left camera's own axes; NaN where there is no disparity."""
+        """(H, W, 3) points in the left camera's own axes; NaN for a pixel without a disparity."""
         rows, columns = disparity.shape
         u, v = np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float))
         beyond = disparity + self.offset_px
@@ -86,7 +86,8 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
         unit_m: metres per unit of the translation.
 
     Raises:
-        InputError: it is none of these, lacks something, or describes no pair side by side.
+        InputError: the file has another format, lacks something, or does not describe a pair side
+            by side.
         OSError: it cannot be opened.
 
     """

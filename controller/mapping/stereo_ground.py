@@ -16,7 +16,7 @@ from snakewalk.controller.mapping.stereo_camera import RectifiedPair
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 DISPARITY_ERROR_PX: Final = 0.3
-"""Standard error of a disparity that is told (ours): the median on a real pair is 0.15 px."""
+"""Standard error that is assumed for a disparity (ours): the median on a real pair is 0.15 px."""
 _TRIALS: Final = 300
 _SAMPLE: Final = 20_000
 """Points that a plane is searched in."""
@@ -25,7 +25,7 @@ _LEVEL_ENOUGH: Final = np.cos(np.radians(70.0))
 _LEAST_POINTS: Final = 2
 """In a cell that is known (ours)."""
 _LEAST_GROUND: Final = 0.2
-"""Of the points that must lie on a ground that is fitted (ours)."""
+"""Share of the points that must lie on a ground that is fitted (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class CameraStand:
 
     height_m: float
     tilt_rad: float
-    """Of its axis, downwards from the level."""
+    """Tilt of its axis, downwards from the level."""
     roll_rad: float
     """About its axis: the picture's right side is down."""
 
@@ -84,9 +84,9 @@ def stereo_ground(
         pair: rectified pictures.
         count: disparities that are tried, from that of a point at infinity on.
         spacing_m: between the map's samples.
-        error_m: a point is left out if its expected error, ``distance * DISPARITY_ERROR_PX /
-            disparity``, is more.
-        stand: of the camera; None fits a plane to what is seen.
+        error_m: a point is left out if its expected error,
+            ``distance * DISPARITY_ERROR_PX / disparity``, is more.
+        stand: height, tilt and roll of the camera; None fits a plane to the visible points.
         far_m: points farther ahead, level, are left out.
 
     Raises:
@@ -118,13 +118,13 @@ def stereo_ground(
 
 
 def seen_points(pair: RectifiedPair, count: int, error_m: float) -> tuple[Floats, Floats, Floats]:
-    """What a pair shows: disparities (H, W), points (n, 3), and the expected error of each (n,).
+    """Result for a pair: disparities (H, W), points (n, 3), and the expected error of each (n,).
 
     Args:
         pair: rectified pictures.
         count: disparities that are tried, from that of a point at infinity on.
-        error_m: a point is left out if its expected error, ``distance * DISPARITY_ERROR_PX /
-            disparity``, is more.
+        error_m: a point is left out if its expected error,
+            ``distance * DISPARITY_ERROR_PX / disparity``, is more.
 
     """
     least = max(0, int(np.floor(-pair.offset_px)))

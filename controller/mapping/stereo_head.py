@@ -1,7 +1,7 @@
 """The stereo head of a simulated run: rendered pictures on the way, and the map that comes of them.
 
-The true ground is seen by the renderer and by the physics alone. What goes into the map is what the
-pictures show, placed by the pose that the run measures, with the errors of a picture's own pose.
+The true ground is seen by the renderer and by the physics alone. The content of the pictures goes
+into the map, placed by the pose that the run measures, with the errors of a picture's own pose.
 """
 
 from collections import deque
@@ -28,7 +28,7 @@ from snakewalk.sim.rendering.stereo_view import CameraFrame, StereoView, tilted
 _BODY_MARGIN_M = 0.03
 """Points so near to the body's own skin, in plan, are left out (ours)."""
 _BLUR_PX = 1.0
-"""Of a moving camera, between two instants of which its picture is the mean."""
+"""Blur of a moving camera between two instants; its picture is the mean of the instants."""
 _MOST_INSTANTS = 5
 
 
@@ -40,7 +40,7 @@ class _Seen(NamedTuple):
 
 
 class StereoHead:
-    """Takes a pair of pictures each period, and adds its ground to the map when it is matched.
+    """Records a pair of pictures each period, and adds its ground to the map when it is matched.
 
     Raises:
         OffscreenError: nothing here draws without a screen.
@@ -78,7 +78,7 @@ class StereoHead:
         """Time and qpos (7 + J,) of the last call."""
 
     def observe(self, now_s: float, pose: BodyPose, joint_rad: Floats) -> None:
-        """Take a picture if one is due; add those to the map that are matched by now.
+        """Record a picture if one is due; add those to the map that are matched by now.
 
         Args:
             now_s: of the run's clock.

@@ -1,4 +1,4 @@
-"""A map of ground from above: heights, what is unknown, and where a path may go."""
+"""A map of ground from above: heights, unknown places, and places where a path may go."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A world's file of a map, with the map beside it."""
+"""A world file for a map, with the map in the same folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class MapWorld:
         """Name a map's world after its file; the planner's limits are the defaults.
 
         Raises:
-            InputError: the file's name is none for a world.
+            InputError: the file's name cannot name a world.
 
         """
         source = {"kind": "map", "source": map_beside(file).name}
@@ -44,7 +44,7 @@ class MapWorld:
 
     @property
     def map_file(self) -> Path:
-        """The map beside it."""
+        """The map file in the same folder."""
         return map_beside(self.file)
 
     def write(self, comment: Sequence[str]) -> None:
@@ -55,7 +55,7 @@ class MapWorld:
             part.write_text(text, encoding="utf-8")
 
     def facts(self) -> dict[str, object]:
-        """Numbers for the user: extent, holes, what of it is safe, and where most room is."""
+        """Numbers for the user: extent, holes, share of safe ground, and the most open place."""
         ground = self.ground
         rows, columns = ground.z_m.shape
         x = ground.x0_m + np.arange(columns) * ground.spacing_m

@@ -84,7 +84,7 @@ class FrictionFilter:
 
         Args:
             file: of the world.
-            sigma: three standard deviations of what a model foretells, in the unit of ``update``.
+            sigma: three standard deviations of the model's predictions, in the unit of ``update``.
 
         """
         self._file = file
@@ -104,7 +104,8 @@ class FrictionFilter:
 
         Args:
             measured: (3,) way ahead and to the left, m, and turn, rad.
-            foretold: (3, 3) a row under each of ``hypotheses``; what is not finite tells nothing.
+            foretold: (3, 3) a row under each of ``hypotheses``; a row that is not finite is
+                ignored.
             span_s: its length.
 
         """

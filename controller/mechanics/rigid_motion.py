@@ -216,8 +216,8 @@ def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
     They state how each link's velocity along and across itself grows with (vx, vy, omega), three
-    numbers each; the contribution of the change of the shape to the two; and the lower triangle of
-    the product of the first rows with their transpose.
+    numbers each. They also contain the contribution of the change of the shape to the two, and the
+    lower triangle of the product of the first rows with their transpose.
     """
     for group in range(len(table) // rows):
         link = table[group * rows : (group + 1) * rows]

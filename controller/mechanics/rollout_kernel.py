@@ -308,7 +308,7 @@ def write_result(
 
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)", makes_arrays=False)
 def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
-    """Return the earlier piece with the longest equal beginning, and its samples; -1 is none.
+    """Return the earlier piece with the longest equal beginning, and its samples; -1: not found.
 
     Among equally long ones it is the first: its own common part is known.
     """
@@ -376,9 +376,9 @@ def roll_pieces(
         waypoint: (3,) the next waypoint, and its place on the path.
         cruise: wanted segments a second.
         drift: (3,) added to each step.
-        states: (P, steps + 1, 11) of each piece before each step, and at its end: the body's place
-            (2) and turn, place on the path, distance from it, sum of its squares, time, velocity
-            (3), and the least square of its distance from the waypoint.
+        states: (P, steps + 1, 11) of each piece before each step, and at its end. The numbers are
+            the body's place (2) and turn, place on the path, distance from it, sum of its squares,
+            time, velocity (3), and the least square of its distance from the waypoint.
         movings: (P, steps + 1, m) velocities of the links; kept as ``states`` are.
         out: written.
 

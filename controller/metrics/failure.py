@@ -28,8 +28,8 @@ class Failure:
     """Why a run did not reach every waypoint."""
 
     cause: Cause
-    """The first that holds, in this order: safety stopped the run; the body rolled over at any
-    time; the time limit is shorter than what the plan takes; the joints did not follow; the body
+    """The first that holds. The order is: safety stopped the run; the body rolled over at any time;
+    the time limit is shorter than the plan needs; the joints did not follow. Then: the body
     advanced too little, on a climb or on other ground; it advanced, but not towards the waypoints;
     it was on its way and ran out of time."""
     text: str
@@ -49,7 +49,7 @@ def failure(record: RunRecord) -> Failure | None:
         return None
     roll = np.abs(roll_rad(pose.rotation))
     walks = pose.pulse_m_s > 0.0 if record.header.run.gait is None else np.ones(len(roll), bool)
-    over = np.flatnonzero((roll > ROLL_LIMIT_RAD) & walks)  # a body that rolls uphill is none
+    over = np.flatnonzero((roll > ROLL_LIMIT_RAD) & walks)  # rolling uphill does not count
     if len(over):
         return Failure(
             "roll",

@@ -39,9 +39,9 @@ def travel(record: RunRecord) -> Travel:
     """Return how far the centre of mass went along what the run was for.
 
     - On a way to waypoints: along its track, while the shape travels along the body.
-    - Of one gait that nobody changed: along its axis, in whole cycles at full rate. The axis of a
+    - One gait that nobody changed: along its axis, in whole cycles at full rate. The axis of a
       climber is the vertical, that of another gait goes with the virtual chassis.
-    - Of other motions: along the straight line between the ends, of gaits at full rate.
+    - Other motions: along the straight line between the ends, for gaits at full rate.
     """
     pose, gait = record.pose, record.header.run.gait
     moving = np.flatnonzero(pose.pulse_m_s > 0.0)

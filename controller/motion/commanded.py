@@ -147,10 +147,10 @@ class Commanded:
         Args:
             robot: its limits are kept.
             joints: J names by which commands call its joints, head first.
-            commands: what has come since the last call, the oldest first; returns at once.
-            on_event: takes ("command", text) of what is begun or done, ("refused", text) and
-                ("stale", text).
-            timeout_s: after so long the joints stop on their way to goals that nobody renews, and
+            commands: returns the commands since the last call, the oldest first; returns at once.
+            on_event: called with ("command", text) for an action that begins or ends, ("refused",
+                text) and ("stale", text).
+            timeout_s: after this time the joints stop on their way to goals that nobody renews, and
                 the body comes to rest if nobody renews its velocity; infinite: they never do.
             gait: to begin with; None: hold.
 

@@ -56,8 +56,9 @@ class Operator(MotionWrapper):
             motion: the gait to begin with.
             robot: for the gaits to change to.
             keys: names of ``KEYS`` pressed since the last call, ``PARAMETER=VALUE`` and
-                ``gait=NAME``; others, and ``t``, which is for whoever owns the torque, are ignored.
-            on_event: takes ("operator", text) of what was done or refused.
+                ``gait=NAME``; others are ignored, and so is ``t``, which is for the owner of the
+                torque.
+            on_event: called with ("operator", text) for an action that was done or refused.
             held: whether the dead man's button is held; while it is not, the body stands in its
                 shape, whatever else was pressed.
 

@@ -42,7 +42,7 @@ class DeadReckoning:
             friction: of the ground.
             start_m: where the head begins.
             heading_rad: mean heading of the links at the beginning.
-            imu: take the attitude from the robot's IMU, from its first reading on.
+            imu: use the attitude from the robot's IMU, from its first reading onwards.
 
         """
         self._spine = SpineLinks.of(robot)
@@ -77,7 +77,7 @@ class DeadReckoning:
         return BodyPose(time_s, np.array((x_m, y_m, 0.0)), rotation)
 
     def _take_attitude(self, state: JointState, joints: Floats) -> float | None:
-        """Take the head's tilt from the IMU; returns its heading, None where there is none."""
+        """Set the head's tilt from the IMU; return its heading, None without a reading."""
         if self._imu_link is None or state.imu is None:
             return None
         behind = self._spine.in_world(BodyPose(0.0, _NOWHERE, _LEVEL), joints)

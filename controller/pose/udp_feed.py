@@ -40,7 +40,7 @@ def decoded(data: bytes, sender: str, arrival_s: float) -> ArrivedPose:
 
 
 class PoseQueue:
-    """Poses that one thread receives and another takes."""
+    """Poses that one thread receives and another reads."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock

@@ -139,7 +139,7 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
 
 
 def clock_offset_s(truth: Truth, record: RunRecord) -> float | None:
-    """Return the run's time less the server's; None without datagrams that tell it."""
+    """Return the run's time less the server's; None without datagrams that contain it."""
     source = record.pose_source
     if not len(source.time_s):
         return None

@@ -1,4 +1,4 @@
-"""Metrics of a run beside those of its truth, computed by the same functions."""
+"""Metrics of a run next to those of its truth, computed by the same functions."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -69,7 +69,7 @@ def true_record(truth: Truth, record: RunRecord) -> tuple[RunRecord, Floats] | N
     """Return the record with the true poses, and the displacement (P,) of the links in each cycle.
 
     The links follow from the true pose of the head and the measured joints. None without datagrams
-    that tell the time of the server's clock.
+    that contain the time of the server's clock.
     """
     offset_s = clock_offset_s(truth, record)
     pose = record.pose

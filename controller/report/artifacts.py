@@ -33,13 +33,13 @@ def make_artifacts(
     """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
 
     ``numbers`` is the record's summary as ``execute`` returns it; without it, it is computed. The
-    page is written before the film, which takes longest, and again when the film is drawn; a film
-    that is there already is the same run's, and stays until then. What this machine cannot make (no
-    simulator, no matplotlib, no OpenGL) is noted and left out: a run is not lost for want of its
-    pictures. Shows progress on standard error. ``look`` is the body in the film, as ``film_look``
-    accepts it; ``made`` says at the page's foot what made it. Without ``folders`` the page contains
-    the names of the user's files, but no folders. Times in the page and in the film count from the
-    moment torque was switched on, as in the summary.
+    page is written before the film, which needs the most time, and again when the film is drawn; a
+    film that is there already is the same run's, and stays until then. Parts that this machine
+    cannot make (no simulator, no matplotlib, no OpenGL) are noted and left out: a run is not lost
+    for want of its pictures. Shows progress on standard error. ``look`` is the body in the film, as
+    ``film_look`` accepts it; ``made`` says at the page's foot what made it. Without ``folders`` the
+    page contains the names of the user's files, but no folders. Times in the page and in the film
+    count from the moment torque was switched on, as in the summary.
     """
     record = record.from_torque_on()
     notes: list[str] = []
@@ -78,7 +78,7 @@ def build_report(
 
 @dataclass(frozen=True, slots=True)
 class _Drawn:
-    """What a page shows beside its film."""
+    """Parts that a page shows next to its film."""
 
     sections: list[Section]
     curves: str

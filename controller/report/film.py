@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FPS, FINE_FPS = 15, 25
 SIZE, FINE_SIZE = (800, 450), (1280, 720)
 _LONGEST_S: Final = 27.0
-"""Of the film: a longer run is shown faster."""
+"""Longest film: a longer run is shown faster."""
 
 
 def film_run(

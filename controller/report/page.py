@@ -69,7 +69,7 @@ def page(
         events: of the log.
         config: run, robot and world.
         curves: HTML made by ``curves_html``, or empty.
-        links: names of files beside the page.
+        links: names of files in the same folder as the page.
         made: command, place and time that made the page; may be empty.
         folders: whether the texts keep the folders of the user's files.
 
@@ -222,7 +222,7 @@ def film_on_page(film: Path, out_dir: Path, start_s: float = 0.0, speed_up: floa
     It begins at ``start_s`` of the run, and is ``speed_up`` times as fast.
 
     Raises:
-        InputError: there is no such file, or browsers do not play its type.
+        InputError: the file does not exist, or browsers do not play its type.
 
     """
     kind = _TYPES.get(film.suffix.lower())

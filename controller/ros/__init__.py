@@ -1,1 +1,1 @@
-"""A run in a ROS 2 graph: it is told there, stopped from there, and commanded from there."""
+"""A run in a ROS 2 graph: it is published there, stopped from there, and commanded from there."""

@@ -29,7 +29,7 @@ class RosLink(WatcherProcess):
         require_extra("ROS needs", "rclpy")
         super().__init__(_serve, options, what="ROS node", fault="ROS")
         self.name = str(self.said["name"])
-        """Of the node, with its namespace."""
+        """Name of the node, with its namespace."""
         self.domain = int(self.said["domain"])
 
     def commands(self) -> list[Command]:

@@ -110,7 +110,7 @@ def serve(line: socket.socket, options: RosOptions) -> None:
 
 
 def _make_node(options: RosOptions) -> Node:
-    # what a run says is printed by the run; here it goes to /rosout alone
+    # the run prints its own events; here they go to /rosout alone
     quiet = ["--ros-args", "--disable-stdout-logs", "--disable-external-lib-logs"]
     rclpy.init(
         args=quiet,
@@ -154,7 +154,7 @@ class ClockOffset:
         self._seen: deque[tuple[float, float]] = deque()
 
     def add(self, ros_s: float, run_s: float) -> None:
-        """Take a row of ``run_s`` that came at ``ros_s``."""
+        """Process a row of ``run_s`` that came at ``ros_s``."""
         offset_s = ros_s - run_s
         while self._seen and self._seen[-1][1] >= offset_s:
             self._seen.pop()
@@ -188,7 +188,7 @@ class RobotNode:
         node.create_service(message_type("std_srvs/srv/Trigger"), "~/stop", self._stop)
 
     def step(self, wait_s: float) -> None:
-        """Take the rows that have come, publish them, and hand the run what was commanded."""
+        """Read the rows that have come, publish them, and pass the commands to the run."""
         for topic, row in self._end.rows(wait_s):
             self._take(topic, row)
             if topic == PoseTable.topic.name:

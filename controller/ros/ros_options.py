@@ -1,4 +1,4 @@
-"""Where in a ROS graph a robot is, and what it takes from there."""
+"""Place of a robot in a ROS graph, and the inputs that it accepts from there."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class RosOptions:
     network: bool = False
     """Whether other machines see it; else only this one, unless the environment says where."""
     commands: bool = False
-    """Whether it takes commands; the stop service is there in any case."""
+    """Whether it accepts commands; the stop service is there in any case."""
     goals: bool = False
     """Whether it accepts goal poses, of a run along waypoints."""
     timeout_s: float = TIMEOUT_S

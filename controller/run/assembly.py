@@ -41,7 +41,7 @@ def assemble(
         fields: of ``RunConfig``.
         keys: as ``checked_keys`` returns them.
         body: the robot that runs.
-        origin: what messages name as the origin of the fields.
+        origin: name that messages use for the origin of the fields.
         beside: folder of the run's file.
 
     Raises:

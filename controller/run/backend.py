@@ -126,7 +126,7 @@ def simulated(
         world: friction and ground.
         ground: the world's height field, where it has one.
         initial_pose: heading of the head link, and joint angles to begin with, as servos say them.
-        deviation: in what the simulated robot and its ground differ from ``robot`` and ``world``;
+        deviation: differences of the simulated robot and its ground from ``robot`` and ``world``;
             None is the run's.
 
     """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Differences from the file; the defaults, and None, are no difference."""
+    """Differences from the file; the defaults, and None, mean no difference."""
 
     along: float = 1.0
     """Friction along the body over the world's, forward and backward."""

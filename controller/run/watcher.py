@@ -31,7 +31,7 @@ class WatcherProcess:
         Args:
             serve: a function of a module; sends one line of JSON when it is ready, with ``fault``
                 if it cannot be, and ends when the line does.
-            options: what can be pickled.
+            options: options that can be pickled.
             what: name of the watcher in messages.
             fault: beginning of the sentence that says what could not be started.
 

@@ -101,7 +101,7 @@ def forecast(
     """Run ``pilot`` on a quasi-static body until it is done or the time is up.
 
     Args:
-        pilot: used up by this; the run takes a fresh one.
+        pilot: used up by this; the run needs a fresh one.
         robot: links and joints.
         friction: the ellipse, the same under every link.
         start_m: (2,) centre of the head link.

@@ -24,7 +24,8 @@ SPAN_S = 1.5
 in a longer one bodies diverge."""
 _SETTLED, _RESTS = 4, 3
 """After this number of spans in a row in which the file's friction held, this number is skipped
-behind each replayed one (ours): a quarter of the cost, and up to 4.5 s until a change is seen."""
+behind each replayed one (ours). This is a quarter of the cost, and up to 4.5 s until a change is
+seen."""
 _STRIDE = 5
 """Cycles in a step on paper."""
 _NOTABLE = 0.25
@@ -146,7 +147,8 @@ class FrictionMonitor:
             file: of the world.
             model: foretells motion.
             cycle_s: length of a control cycle.
-            use: given the friction to reckon with when it changes: the file's until that is out.
+            use: called with the friction to use when it changes. This is the file's until the run
+                contradicts it.
 
         """
         self._file, self._model, self._cycle_s, self._use = file, model, cycle_s, use
@@ -162,7 +164,7 @@ class FrictionMonitor:
         """Process the measured body, and the goals (J,) that were sent in the cycle before.
 
         Returns:
-            What is found now, when a span has been judged; else None.
+            The finding, if a span has just been judged; else None.
 
         """
         self._views.append(view)

@@ -44,7 +44,7 @@ class StarVisits:
             error_rad: (V,) heading error of each state, were it next.
             tolerance_rad: of the error.
             nearest_count: how many of the nearest count where none is within the tolerance.
-            rest: the last so many states are left out.
+            rest: this number of last states is left out.
 
         """
         size = np.abs(error_rad)

@@ -64,7 +64,7 @@ def walk(
         rule: one of ``RULES``.
         start: first state.
         rng: used by ``random`` only.
-        max_steps: default V^2, what a random walk may need.
+        max_steps: default V^2, the number that a random walk may need.
 
     Raises:
         InputError: unknown rule, or the start is not a state.

@@ -155,8 +155,8 @@ def graph_source(spec: str) -> Draw:
 
     - ``er:1000:9``: random (Erdos-Renyi), mean degree 9;
     - ``ws:1000:6:0.1``: small world (Watts-Strogatz), 3 neighbours on either side, a tenth rewired;
-    - ``kp:worm-like:40``: the states of a recording, joined where they are no further apart
-      ([KP] 4.2.1); without a threshold, the smallest that joins all. Always the same graph;
+    - ``kp:worm-like:40``: the states of a recording, joined at a distance up to the threshold ([KP]
+      4.2.1); without a threshold, the smallest that joins all. Always the same graph;
     - ``mine.graphml``: a graph of your own (GraphML, GML or an edge list), taken as undirected.
 
     Sparse random graphs are hardly ever connected (at mean degree 3 one state in twenty has no edge

@@ -36,7 +36,7 @@ def replay(
     Args:
         record: a run, on metal or simulated; may be cut short.
         log: to be written.
-        on_progress: takes cycles done, and of how many.
+        on_progress: called with the number of cycles done, and of all.
 
     Raises:
         InputError: the simulator is not installed, or the record holds no cycle.

@@ -44,7 +44,7 @@ class SweepTable(CsvTable):
         super().__init__(path, columns=COLUMNS, place=_PLACE, command="sweep")
 
     def missing(self, points: list[Point]) -> list[Point]:
-        """Those of ``points`` that the table lacks."""
+        """The entries of ``points`` that the table lacks."""
         return [point for point in points if self.held(point.key) is None]
 
     def add(self, point: Point, row: Measurement) -> None:

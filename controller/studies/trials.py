@@ -118,7 +118,7 @@ def prepare_case(
     A walk's start on unsafe ground is drawn again, so that the moved start does not fail by itself.
 
     Raises:
-        InputError: the run cannot be prepared, or there is no safe ground about its start.
+        InputError: the run cannot be prepared, or the ground about its start is not safe.
 
     """
     found = _prepared(case, seed, changes)
@@ -158,10 +158,10 @@ def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> PreparedR
 
 
 def parse_over(text: str) -> tuple[str, tuple[Value, ...]]:
-    """Read ``world.ground.slope_deg=5,10,15``: a key and the values it takes in turn.
+    """Read ``world.ground.slope_deg=5,10,15``: a key and its values in turn.
 
     Raises:
-        InputError: there is no key, or no value.
+        InputError: the key or the value is missing.
 
     """
     key, equals, values = (part.strip() for part in text.partition("="))
@@ -255,7 +255,7 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
 def plan_trials(
     cases: Sequence[Case], seeds: Sequence[int], spread_m: float, changes: Mapping[str, object]
 ) -> list[tuple[Case, int]]:
-    """List what is to be run, seed by seed: what is stopped has nearly as many runs of each case.
+    """List the runs to do, seed by seed: after an early stop each case has nearly as many runs.
 
     A case of which all seeds give the same run stands once.
 
@@ -296,7 +296,7 @@ class CaseSummary:
     motion: str
     relief: float
     keys: dict[str, Value]
-    """What was replaced in the files."""
+    """Values that were replaced in the files."""
     runs: int
     slope_deg: float | None
     complete: str
@@ -320,19 +320,19 @@ class CaseSummary:
     in_air: float | None
     alarms: int
     causes: dict[str, int]
-    """Of failure, how many runs each, most first."""
+    """Number of runs by cause of failure, most first."""
     why: str
-    """The same in a line; what the software did not foresee in full."""
+    """The same in a line; errors that the software did not foresee are in full."""
     compliance: str = ""
     """``on`` or ``off`` where it was chosen."""
     speed_m_s: float | None = None
-    """Of gaits, net, mean of the runs."""
+    """Net speed of gaits, mean of the runs."""
     speed_sd_m_s: float | None = None
     """Standard deviation of that speed from run to run."""
     truly_complete: str = ""
     """``n of m`` runs whose body came to every waypoint, where its pose was estimated."""
     head_error_m: float | None = None
-    """Of an estimated pose, mean over the runs."""
+    """Error of an estimated pose, mean over the runs."""
     world: str = ""
     """Where one was chosen."""
     pose: str = ""

@@ -13,7 +13,7 @@ _CASE = tuple(field.name for field in fields(Case))
 _MEASURED = tuple(f.name for f in fields(Trial) if f.name not in {"case", "seed"})
 _PLACE = ("config", "start_spread_m", "seed")
 COLUMNS = (*_CASE, *_PLACE, *_MEASURED)
-"""``config`` is the digest of the three files; ``keys`` are told as ``KEY=VALUE KEY=VALUE``."""
+"""``config`` is the digest of the three files; ``keys`` are written as ``KEY=VALUE KEY=VALUE``."""
 
 
 class TrialsTable(CsvTable):
@@ -30,7 +30,7 @@ class TrialsTable(CsvTable):
         self._configs, self._spread = dict(configs), f"{spread_m:g}"
 
     def finished(self, planned: Sequence[tuple[Case, int]]) -> list[Trial]:
-        """Those of ``planned`` that the table holds."""
+        """The entries of ``planned`` that the table holds."""
         found: list[Trial] = []
         for case, seed in planned:
             row = self.held(self._where(case, seed))

@@ -32,7 +32,7 @@ _WORST = 1e3
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is asked of a gait."""
+    """Requirements for a gait."""
 
     aim: Aim
     goal: Goal
@@ -56,7 +56,7 @@ def pace(row: Measurement, task: Task) -> float:
 
 
 def loss(row: Measurement, task: Task) -> float:
-    """What is made small; a gait that trips, is derated, or hardly moves is no answer."""
+    """Quantity that is minimised; a gait that trips, is derated, or hardly moves is rejected."""
     speed = pace(row, task)
     if speed <= 0.0 or _value(row.least_rate) < 1.0:
         return _WORST
@@ -68,7 +68,7 @@ def loss(row: Measurement, task: Task) -> float:
 
 
 def task_of(row: Measurement, aim: Aim, goal: Goal) -> Task:
-    """Judge others by what the defaults do."""
+    """Return a task that judges other parameters by the result of the defaults."""
     forward, left = _value(row.forward_bl_cycle), _value(row.left_bl_cycle)
     size = math.hypot(forward, left)
     toward = (forward / size, left / size) if size > 1e-9 else (1.0, 0.0)

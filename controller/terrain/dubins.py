@@ -1,8 +1,8 @@
 """Dubins curves: from one pose to another with bounded curvature; how a body joins a path.
 
 L. E. Dubins, On curves of minimal length with a constraint on average curvature, and with
-prescribed initial and terminal positions and tangents, American Journal of Mathematics 79, 1957:
-the shortest curve is two arcs and a line between them, or three arcs.
+prescribed initial and terminal positions and tangents, American Journal of Mathematics 79, 1957.
+The shortest curve is two arcs and a line between them, or three arcs.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class DubinsCurves:
     """(n,) at the start."""
     radius_m: float
     pieces_m: Floats
-    """(n, 8, 3) lengths of the pieces; infinite where there is no such curve."""
+    """(n, 8, 3) lengths of the pieces; infinite if the curve does not exist."""
 
     @property
     def length_m(self) -> Floats:
@@ -144,7 +144,7 @@ class Turn:
     joins_at_m: float
     """Arc length of the path there."""
     cost: float
-    """Of the turn and what is left of the path."""
+    """Cost of the turn and the rest of the path."""
 
 
 class PathTurns:
@@ -168,7 +168,7 @@ class PathTurns:
             radius_m: least that the body can turn with.
             until_m: arc length on the path, for example of the first waypoint.
             cost_per_m: of points (..., k, 2) along curves, (..., k).
-            least_per_m: what a metre costs at least: spares curves that are too long.
+            least_per_m: least cost of a metre: spares curves that are too long.
             joins: places.
 
         """

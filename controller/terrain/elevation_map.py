@@ -70,7 +70,7 @@ class ElevationMap:
     def of_triangles(
         cls, vertices_m: Floats, faces: Ints, low_m: Floats, high_m: Floats, spacing_m: float
     ) -> Self:
-        """Take the highest surface of a mesh at each sample.
+        """Set each sample to the highest surface of a mesh.
 
         Args:
             vertices_m: (n, 3).

@@ -1,8 +1,8 @@
 """Footprint: the ground under a body that follows a path, and how far steep ground is from it.
 
-A body that bends to and fro stands on a strip about half its length wide. What makes it roll or
-slide is the slope across the path there, what stops it is the slope along the path, and neither is
-seen on the path alone: a valley is level along its bottom.
+A body that bends to and fro stands on a strip about half its length wide. The slope across the path
+there makes it roll or slide, and the slope along the path stops it. Neither is seen on the path
+alone: a valley is level along its bottom.
 """
 
 import numpy as np

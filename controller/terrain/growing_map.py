@@ -1,7 +1,7 @@
 """Growing map: the ground of a fixed area as one pair of pictures after the other shows it.
 
-What no picture showed stays unknown. Where a picture contradicts the map, the one that was taken
-from nearer by counts.
+A place that no picture showed stays unknown. Where a picture contradicts the map, the one that was
+taken from nearer by counts.
 """
 
 from pathlib import Path
@@ -15,15 +15,16 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.terrain.elevation_map import filled, opened
 
 _LEAST_ERROR_M: Final = 0.002
-"""Of a sample, however often it was seen (ours): errors of the pose are common to its points."""
+"""Least error of a sample, however often it was seen (ours): errors of the pose are common to its
+points."""
 _CONTRADICTS: Final = 3.0
 """Standard errors between two heights that are not of the same ground (ours)."""
 _LEAST_POINTS: Final = 2
-"""Of a picture in a sample's square, to count."""
+"""Least points of a picture in a sample's square, to count."""
 _SMALL_HOLE_M: Final = 0.12
 """Width of a hole that counts as known (ours): less than twice a body."""
 _SMOOTH_M: Final = 0.4
-"""How far from what was seen the surface filled in is as fine as the map."""
+"""Distance from the seen places within which the filled surface is as fine as the map."""
 _COARSE: Final = 5
 """Samples, along a side, of the map for one of the surface that is filled in farther off."""
 
@@ -119,7 +120,7 @@ class GrowingMap:
         return HeightField(filled(z_m, smooth), self.spacing_m, self.x0_m, self.y0_m, trusted)
 
     def write(self, file: Path) -> None:
-        """Write a map's file, with the expected errors and the times beside the heights.
+        """Write a map's file, with the heights, the expected errors and the times.
 
         It is empty of heights, and holds no sample known, where nothing was seen.
         """

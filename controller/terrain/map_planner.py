@@ -1,9 +1,9 @@
 """Paths on a map that grows: over known safe ground, as far as that leads towards the waypoints.
 
-A waypoint that the map does not reach yet is planned to as if what is unknown could be passed, at
-the price of ground beside what cannot be climbed. Of that plan the body is sent along the part that
-is known and safe. (The free-space assumption: A. Stentz, The focussed D* algorithm for real-time
-replanning, IJCAI 1995; here no step of it is taken for granted.)
+A waypoint that the map does not reach yet is planned to as if unknown ground could be passed, at
+the price of ground next to a place that cannot be climbed. The body is sent along the part of that
+plan that is known and safe. (The free-space assumption: A. Stentz, The focussed D* algorithm for
+real-time replanning, IJCAI 1995; here no step of it is taken for granted.)
 """
 
 from functools import cached_property
@@ -29,8 +29,8 @@ _LEAST_M: Final = 0.4
 _WITHIN_M: Final = (np.inf, 1.2, 0.7)
 """How far a path may lead, the nearer ones where no smooth one leads farther (ours)."""
 _SURELY_UNSAFE: Final = 1.15
-"""Risk of ground that is not passed any more: what was planned as safe may be found a little worse
-by the next picture."""
+"""Largest risk of ground on a path in force: the next picture may show planned ground to be a
+little worse."""
 _TIES: Final = 0.01
 _UNSEEN: Final = 1.5
 """Metres of level path that a straight metre is taken for where no path is found at all."""
@@ -109,12 +109,12 @@ class _Knowledge:
 
     @cached_property
     def cautious(self) -> TerrainPlanner:
-        """Takes nothing unknown for safe."""
+        """Treats unknown ground as unsafe."""
         return TerrainPlanner(self._ground, self._config, exact=False)
 
     @cached_property
     def open_relief(self) -> Relief:
-        """Takes what is unknown for passable."""
+        """Treats unknown ground as passable."""
         return Relief(self._ground, self._config, unknown_risk=0.0)
 
     @cached_property
@@ -126,7 +126,7 @@ class _Knowledge:
 
         Args:
             points: (n, 2) the first is where the head is.
-            within_m: from the head; what is farther off is not known.
+            within_m: distance from the head; ground farther off counts as unknown.
 
         """
         graph, relief = self.cautious.graph, self.cautious.relief

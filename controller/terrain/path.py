@@ -91,7 +91,8 @@ class SplinePath:
     def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
         """Arc length, from ``from_s_m`` on, at which the path first comes nearest to a point.
 
-        Of several passes as near as a table's step, the first counts: a lap may end where it began.
+        If several passes are as near as a table's step, the first counts: a lap may end where it
+        began.
         """
         low = min(int(np.searchsorted(self._s, from_s_m - 1e-9)), len(self._s) - 1)
         gap = np.hypot(*(self._points[low:] - np.asarray(point_m, dtype=float)[:2]).T)

@@ -21,7 +21,7 @@ from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
 _CHECK_STEP_M = 0.02  # how densely a spline is checked again
-_UNSAFE = 30.0  # metres of level path that a turn takes to stay off a metre of unsafe ground
+_UNSAFE = 30.0  # metres of level path that a turn accepts to stay off a metre of unsafe ground
 _ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
 
 
@@ -75,7 +75,7 @@ class TerrainPlanner:
             turn_radius_m: least radius with which the body turns.
             avoid_m: (k, 2) places where the body could not go on; paths keep off them by a
                 footprint where another way exists.
-            number: of the first waypoint, in what is said of it.
+            number: number of the first waypoint, for messages about it.
 
         Raises:
             InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
@@ -149,7 +149,7 @@ class TerrainPlanner:
     def _again(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
         """Path from elsewhere: a new leg to the next waypoint, then the path that was planned.
 
-        A body that moves has no time for more: turns by waypoints take some 30 ms each.
+        A body that moves leaves no time for more: turns by waypoints need some 30 ms each.
         """
         yield 500
         onward = self._onward(points, avoid)
@@ -215,7 +215,7 @@ class TerrainPlanner:
             if there is not None and graph is not self.graph:
                 yield from graph.tree_in_steps(there)
             yield 300
-            if k == 1 and there is not None:  # the body may stand beside an island of safe nodes
+            if k == 1 and there is not None:  # the body may be next to an island of safe nodes
                 here = graph.nearest(points[0], graph.can_reach(there))
             nodes = None if here is None or there is None else graph.cheapest_path(here, there)
             if nodes is None:
@@ -287,7 +287,7 @@ class TerrainPlanner:
         return [f"{self._name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
 
     def _name(self, k: int, point: Floats) -> str:
-        """Of the k-th point: 0 is the start, or where a path begins to later waypoints."""
+        """Name of the k-th point: 0 is the start, or where a path begins to later waypoints."""
         where = f"({point[0]:.2f}, {point[1]:.2f})"
         if k == 0:
             return f"start {where}" if self._number == 1 else where
@@ -311,7 +311,7 @@ def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
 
 
 def _unsafe_because(relief: Relief, point: Floats) -> str:
-    """What is wrong with a place (2,), in words."""
+    """The fault of a place (2,), in words."""
     if not relief.ground.contains(*point):
         w, h = relief.ground.size_m
         return f"is outside the world, {w:.1f} m by {h:.1f} m around (0, 0)"
@@ -332,7 +332,7 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
 _REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
 _SAMPLES_IN_STEP = 6000
 _EXACT_STEP = 50_000  # a search of all safe ground is one step; it is rare
-_CORNER_M = 1.0  # what a corner costs, as metres of path: few corners make wide bends
+_CORNER_M = 1.0  # cost of a corner, as metres of path: few corners make wide bends
 
 
 def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:

@@ -18,7 +18,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 EDGE_TOLERANCE_M = 1e-9
 """By which a point may lie beyond the margin and count as on it."""
 _UNKNOWN_RISK = 1e9
-"""Of samples beside which something was not measured: never safe; finite, as it is interpolated."""
+"""Risk of samples next to one that was not measured: never safe; finite, as it is interpolated."""
 
 
 class Relief:
@@ -30,7 +30,7 @@ class Relief:
     def __init__(
         self, ground: HeightField, config: PlannerConfig, *, unknown_risk: float = _UNKNOWN_RISK
     ) -> None:
-        """Take samples beside which something was not measured for as risky as told; 0 is free."""
+        """Give samples next to one that was not measured the risk ``unknown_risk``; 0 is free."""
         self.ground = ground
         self.config = config
         self._variance = elevation_variance_m2(ground, config.variance_window_m)
@@ -41,7 +41,7 @@ class Relief:
         )
         self._unknown = np.zeros(ground.z_m.shape)
         if ground.known is not None:
-            # A slope is known if its whole window is: what is filled in proves nothing.
+            # A slope is known if its whole window is: filled places prove nothing.
             _, _, disc = _disc(ground, config.slope_window_m)
             self._unknown[binary_dilation(~ground.known, disc > 0.0)] = 1.0
         self._risk = np.where(self._unknown > 0.0, unknown_risk, self._risk)
@@ -185,7 +185,7 @@ def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]
 def _summed(values: Floats, weight: Floats) -> Floats:
     """Sum of ``values`` around each sample, weighted by offset; nothing beyond the border.
 
-    As ``scipy.signal.fftconvolve`` does it, whose import takes longer than all of its sums.
+    As ``scipy.signal.fftconvolve`` does it, whose import needs more time than all of its sums.
     """
     sizes = zip(values.shape, weight.shape, strict=True)
     shape = [next_fast_len(n + m - 1, True) for n, m in sizes]

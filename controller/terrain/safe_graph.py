@@ -94,7 +94,7 @@ class SafeGraph:
         return total
 
     def nearest(self, point_m: Floats, among: Bools | None = None) -> int | None:
-        """Return the safe node nearest to a point; None if there is none."""
+        """Return the safe node nearest to a point; None if all nodes are unsafe."""
         gap = np.hypot(*(self.nodes_m - point_m).T)
         if among is not None:
             gap = np.where(among, gap, np.inf)
@@ -117,7 +117,7 @@ class SafeGraph:
         self._trees[target] = found
 
     def costs_to(self, target: int) -> Floats:
-        """(n,) cost of the cheapest path to ``target``; infinite where there is none."""
+        """(n,) cost of the cheapest path to ``target``; infinite without a path."""
         return self._tree(target)[0]
 
     def costs_from(self, point_m: Floats, reach_m: float) -> Floats:
@@ -138,7 +138,7 @@ class SafeGraph:
         return np.asarray(dijkstra(both, directed=True, indices=[n]))[0, :n]
 
     def cheapest_path(self, start: int, target: int) -> Floats | None:
-        """(m, 2) nodes of the cheapest path, both ends included; None if there is none."""
+        """(m, 2) nodes of the cheapest path, both ends included; None without a path."""
         score, towards = self._tree(target)
         if not np.isfinite(score[start]):
             return None

@@ -1,6 +1,6 @@
 """Turns by waypoints: where a path bends there more sharply than a body can, it swings out.
 
-A path through waypoints may turn back at one of them, or come to it past unsafe ground: its spline
+A path through waypoints may turn back at one of them, or come to it past unsafe ground. Its spline
 then has a bend of a few centimetres, and the body that cannot follow it passes the waypoint by.
 """
 
@@ -17,10 +17,10 @@ from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.path import SplinePath
 
 _SHARP = 0.45
-"""Of the wanted radius (ours): bends above it are followed, at 0.2 m a corner of 90 degrees."""
+"""Share of the wanted radius (ours): larger bends are followed, at 0.2 m a corner of 90 degrees."""
 _RADII = 1.5, 1.0, 0.75, 0.5
-"""Of the wanted radius, tried in turn until a turn stays on safe ground. The centre of a body of
-1.2 m in an arc of 0.4 m lies 0.13 m inside of it, of 0.6 m 0.09 m."""
+"""Shares of the wanted radius, tried in turn until a turn stays on safe ground. The centre of a
+body of 1.2 m in an arc of 0.4 m lies 0.13 m inside of it, of 0.6 m 0.09 m."""
 _ALL_ROUND_RAD = np.arange(16) * 2.0 * np.pi / 16
 _STEP_M = 0.01
 _NEAR_M = 0.5
@@ -43,7 +43,7 @@ class WaypointTurns:
 
         Args:
             cost_per_m: of points (..., k, 2) along curves, (..., k).
-            least_per_m: what a metre costs at least.
+            least_per_m: least cost of a metre.
             safe: whether all points (n, 2) are on safe ground.
             radius_m: wanted of every turn.
 
@@ -120,7 +120,7 @@ class WaypointTurns:
         return None
 
     def _turns(self, leg: Floats, headings: Floats, share: float, *, back: bool) -> PathTurns:
-        """Turns from the waypoint onto a leg (n, 2); of one to it both are told backwards."""
+        """Turns from the waypoint onto a leg (n, 2); ``back``: the leg is reversed."""
         path = SplinePath.tabulated(np.ascontiguousarray(leg))
         joins = int(np.clip(path.length_m / _JOIN_M, *_JOINS))
         cost = self._cost_backwards if back else self._cost_per_m

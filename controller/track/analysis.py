@@ -23,7 +23,7 @@ TARGET_SHIFT = 4.0
 """Points that the pattern should move between the frames that are compared."""
 COEFFICIENTS = 7
 LEAST_TRAVEL = 0.2
-"""Of the pulse speed: recorded animals that go somewhere lie at 0.7 or more."""
+"""Share of the pulse speed: recorded animals that go somewhere lie at 0.7 or more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +76,8 @@ class Analysis:
     def travel(self) -> float | None:
         """Speed of the points along the body over the pulse speed, where both are known.
 
-        1: every point passes where the head passed. Where the body stays behind its wave by far,
-        the water may run as fast the other way: the ground does not tell how the body slides.
+        1: every point passes where the head passed. If the body stays far behind its wave, the
+        water may run as fast the other way: the ground does not show how the body slides.
         """
         if self.advance is None or self.travel_not_told is not None:
             return None
@@ -85,7 +85,7 @@ class Analysis:
 
     @property
     def sliding(self) -> float | None:
-        """w_d of [PT] 2.6.4 as the synthesis takes it: the share of the head's speed not shifted.
+        """w_d of [PT] 2.6.4 as the synthesis uses it: the share of the head's speed not shifted.
 
         0: no sliding. Up to 1: the body glides on in its shape. Below 0: the head advances less
         than the wave runs back, so the body slips.

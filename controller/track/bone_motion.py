@@ -33,7 +33,7 @@ class BoneMotion:
 
     @property
     def length_m(self) -> float:
-        """Of the body at rest."""
+        """Length of the body at rest."""
         return float(self.bone_m.sum())
 
 

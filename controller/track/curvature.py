@@ -23,7 +23,7 @@ def smooth_curvature(angles_rad: Floats) -> Floats:
 def analytic_signal(values: Floats) -> Complexes:
     """Analytic signal (T, N) of each column: the positive frequencies alone, doubled.
 
-    To the bit as ``scipy.signal.hilbert`` makes it, whose import takes a second.
+    Equal to the bit to the result of ``scipy.signal.hilbert``, whose import needs a second.
     """
     count = len(values)
     share = np.zeros(count)

@@ -1,8 +1,9 @@
 """Pulse speed: how many points the pattern of angles moves down the body in a frame ([PT] 2.4).
 
-``Theta(n, t) = Theta(n - u, t - 1) + w (Theta(n + 1 - u, t - 1) - Theta(n - u, t - 1))`` with a
-whole u and 0 <= w < 1 looks up the place ``n - (u - w)``. Correction: so the pulse speed is
-``U = u - w``, where the text prints ``u + w``. Both come from least squares over nine points.
+The place ``n - (u - w)`` is looked up with a whole u and 0 <= w < 1. The interpolation is
+``Theta(n, t) = Theta(n - u, t - 1) + w (Theta(n + 1 - u, t - 1) - Theta(n - u, t - 1))``.
+Correction: so the pulse speed is ``U = u - w``, where the text prints ``u + w``. Both come from
+least squares over nine points.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from snakewalk.config.arrays import Bools, Floats, Ints
 NEIGHBOURS = 9
 """Points that decide together, [PT] 2.4."""
 LEAST_SLOPE = 0.2
-"""Of the recording's usual slope along the body: a flatter neighbourhood shows no shift."""
+"""Share of the recording's usual slope along the body: a flatter neighbourhood shows no shift."""
 _EDGE = 1e-9
 _SLACK = 0.5  # points that the pulse may differ between neighbours
 
@@ -30,7 +31,7 @@ class PulseSpeed:
     slope: Floats
     """(S, N) root mean square of Theta_n over the neighbourhood, rad a point: the weight."""
     error_rad: Floats
-    """(S, N) root mean square of what the shifted angles leave over."""
+    """(S, N) root mean square of the residual of the shifted angles."""
     frame: Ints
     """(S,) index of the later frame of each pair."""
     step: int
@@ -91,7 +92,7 @@ def measure_pulse_speed(
     slope = np.sqrt(_sums(np.diff(before, axis=1) ** 2) / NEIGHBOURS)
     slope = np.pad(slope, ((0, 0), (4, 5)), mode="edge")
     usual = np.sqrt((np.diff(before, axis=1) ** 2).mean()) if before.size else 0.0
-    # a best shift at the end of the range is no minimum: the pattern came from beyond
+    # a best shift at the end of the range does not count as a minimum: the pattern came from beyond
     # the head or the tail, or moved by more than was tried
     n = np.arange(points)
     ahead, behind = n - NEIGHBOURS // 2 - 1 - shift, points - 2 - NEIGHBOURS // 2 - n + shift

@@ -42,7 +42,7 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
 
 
 def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
-    """Joint angles that a synthesis wrote beside its midlines; None where there are none."""
+    """Joint angles that a synthesis wrote in addition to its midlines; None without them."""
     if Path(track).suffix != ".npz" or not Path(track).is_file():
         return None
     try:

@@ -1,8 +1,8 @@
 """How much slower than the animal a robot must be: joint speed and acceleration at its own pace.
 
 Tracked points shake from frame to frame, and differences over one frame time amplify that: at 60 Hz
-a slow fish seems to need the speed of a fast one. So demands are taken from angles smoothed over
-time, with a cut well above the wave's frequency; the unsmoothed speed stays beside them.
+a slow fish seems to need the speed of a fast one. So demands are computed from angles smoothed over
+time, with a cut well above the wave's frequency; the unsmoothed speed is kept as well.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ CUT_CYCLES = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What the recorded motion asks of the joints in the animal's own time."""
+    """Demand of the recorded motion on the joints in the animal's own time."""
 
     speed_rad_s: Floats
     """(K,) fastest joint between each two frames that follow each other, smoothed over time."""
@@ -78,7 +78,7 @@ def joint_demand(joints_rad: Floats, time_s: Floats, rate_hz: float, wave_hz: fl
 
 
 def slowing(demand: Demand, speed_limit_rad_s: float, acceleration_limit_rad_s2: float) -> Slowing:
-    """Compare a demand with what a robot's plan may ask of its joints."""
+    """Compare a demand with the limits of a robot's plan for its joints."""
     speed = demand.speed_rad_s / speed_limit_rad_s
     acceleration = demand.acceleration_rad_s2.max(initial=0.0) / acceleration_limit_rad_s2
     return Slowing(

@@ -225,7 +225,7 @@ def _between(
 ) -> tuple[Floats, Ints, Ints]:
     """Bodies (T', P, 2) at an even rate, their frame numbers, and the nearest frame of each.
 
-    None lies beside a frame without a body, or where frames are far apart.
+    No body is returned next to a frame without a body, or where frames are far apart.
     """
     first = np.flatnonzero(whole[:-1] & whole[1:] & (np.diff(time_s) <= _JOINED / rate_hz))
     bodies, numbers, nearest = [points[:0]], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]

@@ -75,11 +75,12 @@ class Advance:
     """(S, N) of the angle between the tangent there and the head's."""
 
     def head_speed(self, pulse: Floats) -> Floats:
-        """Speed of the head along its tangent (S, N), as each segment tells it.
+        """Speed of the head along its tangent (S, N), estimated from each segment.
 
-        With the skeleton of [PT] 2.6.4 a segment goes at the pulse speed along its own tangent,
-        and all of them at what the head is faster than the pulse in the direction of the head. So
-        the speed along the tangent of a segment is less than the head's by the angle between them.
+        With the skeleton of [PT] 2.6.4 a segment goes at the pulse speed along its own tangent. In
+        addition all segments go in the direction of the head, at the difference of the head's speed
+        and the pulse speed. So the speed along the tangent of a segment is less than the head's by
+        the angle between them.
 
         Args:
             pulse: (S, N) pulse speed, points a frame.

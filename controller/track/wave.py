@@ -15,7 +15,7 @@ from snakewalk.controller.track.slowing import CUT_CYCLES
 from snakewalk.controller.track.track import Track
 
 LEAST_SHARE = 0.45
-"""Of the bending: recorded animals that turn and reverse lie above 0.5, noise below 0.35."""
+"""Share of the bending: recorded animals that turn and reverse lie above 0.5, noise below 0.35."""
 LEAST_FRAMES = 4.0
 """Frames a cycle: from 2 on a wave looks like another that runs the other way."""
 LEAST_CYCLES = 2.0
@@ -54,7 +54,7 @@ class Wave:
 
     @property
     def not_told(self) -> str | None:
-        """Why frequency, length and direction are no measurement; None where they are one."""
+        """Why frequency, length and direction are not measured; None if they are."""
         if self.share < LEAST_SHARE:
             share = below(100.0 * self.share, 100.0 * LEAST_SHARE, digits=0)
             return (
@@ -154,8 +154,8 @@ def _turns_a_frame(phasor: Floats) -> float:
     """How far the pattern (T,) turns from frame to frame, weighted by its energy.
 
     Noise turns at any rate, so the phasor is smoothed over time as the joints are, well above the
-    frequency that comes out. The first and the last cycle count less and less towards the ends:
-    the analytic signal takes a recording for periodic.
+    frequency that comes out. The first and the last cycle count less and less towards the ends: the
+    analytic signal treats a recording as periodic.
     """
     turns, smooth = 0.5, phasor
     for step in range(_STEPS):

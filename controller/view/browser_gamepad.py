@@ -1,8 +1,8 @@
-"""A gamepad at the computer of whoever has the page open: the browser tells it, this process reads.
+"""A gamepad at the computer of the page's user: the browser sends its state, this process reads it.
 
-viser has no place for it, so a script of our own in the page sends the state of the gamepad to a
-socket of its own behind the gate: when it changes, ten times a second while it does not, and no
-state before the last one was taken, so that none waits on the way.
+viser has no support for it, so a script of our own in the page sends the state of the gamepad to a
+socket of its own behind the gate. It sends when the state changes, and ten times a second while it
+does not. It sends no state before the last one was received, so that none waits on the way.
 """
 
 import math
@@ -35,10 +35,10 @@ STOP: Final = (11, 16)
 _HALF: Final = 0.5
 _MESSAGE_BYTES: Final = 2000
 _MESSAGES_S: Final = 100
-"""More in a second are none of our script's: its line is closed (ours)."""
+"""More messages in a second cannot come from our script: its line is closed (ours)."""
 _KEYS_MAX: Final = 100
 PATH: Final = "/gamepad"
-"""Of the socket."""
+"""Path of the socket."""
 _PERIOD_MS, _KEEP_MS, _AGAIN_MS = 20, 100, 2000
 
 
@@ -76,7 +76,7 @@ SCRIPT: Final = f"""(() => {{
   setInterval(tell, {_PERIOD_MS});
   document.addEventListener("visibilitychange", tell);
 }})();"""
-"""What the page runs."""
+"""The script in the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class PadState:
     """Whether the browser knows which of its buttons is which."""
     pressed: frozenset[int]
     sides: tuple[int, ...]
-    """Of each axis: -1, 0 or 1."""
+    """State of each axis: -1, 0 or 1."""
 
     @property
     def held(self) -> bool:
@@ -148,7 +148,7 @@ class BrowserGamepad:
         self._is_new = False
         self._keys: deque[str] = deque(maxlen=_KEYS_MAX)
         self.state: PadState | None = None
-        """Of the one that steers, as it was told last."""
+        """Last state of the gamepad that steers."""
         self.on_stop: Callable[[], None] = lambda: None
         """Called when a stop button is pressed, from any thread."""
 
@@ -163,7 +163,7 @@ class BrowserGamepad:
         return self._steers is None or self.is_stale
 
     def take(self, source: Hashable, message: str | bytes) -> bool:
-        """Take what a browser sent; whether its line may stay open."""
+        """Process a message from a browser; return whether its line may stay open."""
         now_s = self._now_s()
         with self._lock:
             browser = self._sources.setdefault(source, _Source())
@@ -194,7 +194,7 @@ class BrowserGamepad:
                 self._steers, self.state, self._is_new = None, None, True
 
     def commands(self) -> list[str]:
-        """Keys pressed since the last call, then whether it is held, where it was told anew."""
+        """Keys pressed since the last call; then, if a state has come, whether it is held."""
         with self._lock:
             found = list(self._keys)
             self._keys.clear()
@@ -205,7 +205,7 @@ class BrowserGamepad:
         return found
 
     async def serve(self, connection: Any) -> None:
-        """Take what one browser sends, one message after another, until it leaves."""
+        """Process the messages of one browser, one after another, until it leaves."""
         try:
             async for message in connection:
                 if not self.take(connection, message):
@@ -218,7 +218,7 @@ class BrowserGamepad:
 
 
 def _pressed(before: PadState | None, state: PadState | None) -> list[str]:
-    """Keys that a change means: none of what is down when a gamepad is seen first.
+    """Keys that a change means: a button that is down when a gamepad is first seen does not count.
 
     A stick counts once each time it leaves the middle.
     """

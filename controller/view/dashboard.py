@@ -1,4 +1,4 @@
-"""The panels beside the scene: state, a row of bars for each servo, curves over time, events."""
+"""The panels next to the scene: state, a row of bars for each servo, curves over time, events."""
 
 from collections.abc import Sequence
 from html import escape
@@ -23,7 +23,7 @@ _POINTS: Final = 150
 _EVENTS: Final = 7
 _AMBIENT_C: Final = 20.0
 _LATE_CYCLES: Final = 3.0
-"""Readings that are so many cycles old are told in another colour (ours)."""
+"""Readings that are this number of cycles old are shown in another colour (ours)."""
 _GOOD, _WARN, _BAD, _INK = "#3a7dbd", "#e39a1b", "#d62026", "#666"
 _LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD}
 _COLORS: Final = (

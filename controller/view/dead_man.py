@@ -1,4 +1,4 @@
-"""The dead man's button of a browser's gamepad, at the run's end: who lets go stops the body."""
+"""The dead man's button of a browser's gamepad, at the run's end: its release stops the body."""
 
 import math
 import time
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 STALE_S: Final = 0.3
-"""A gamepad that says nothing for so long is not held (ours)."""
+"""A gamepad that sends nothing for this time is not held (ours)."""
 _AHEAD_S: Final = 0.1
 """A later time is not believed (ours): both processes read the same clock."""
 WITHOUT: Final = "pad=none"
@@ -19,7 +19,7 @@ def hold_command(held: bool, at_s: float) -> str:
 
 
 class DeadMan:
-    """Whether the body may move: once a gamepad steers, somebody has to hold its button.
+    """Whether the body may move: once a gamepad steers, its button has to be held.
 
     One that is gone or silent is not held.
     """

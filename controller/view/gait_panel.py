@@ -16,13 +16,13 @@ from snakewalk.controller.motion.refusals import NAME_MAX
 _EVERY_S: Final = 0.2
 """A slider that is drawn along commands no more often (ours)."""
 _SETTLED_S: Final = 1.0
-"""An input shows what the run says once it was left for so long: also a refusal (ours)."""
+"""An input shows the run's value this time after its last change: also a refusal (ours)."""
 _BUTTONS: Final = {"halt, go on": "space", "defaults": "d", "stop": "q"}
 """Keys of an ``Operator``."""
 
 
 class GaitPanel:
-    """A tab of inputs. What is set in them is commanded of the run; what runs is shown in them."""
+    """A tab of inputs. The inputs command the run, and show the gait that runs."""
 
     def __init__(
         self, server: viser.ViserServer, tabs: viser.GuiTabGroupHandle, robot: RobotConfig
@@ -56,7 +56,7 @@ class GaitPanel:
         self._settle()
 
     def commands(self, now_s: float) -> list[str]:
-        """What was set since the last call, the newest of each input; call it often."""
+        """Inputs that were set since the last call, the newest value of each; call it often."""
         self._now_s = now_s
         self._collect()
         late = {name for name, at_s in self._moved_s.items() if now_s - at_s >= _SETTLED_S}
@@ -90,7 +90,7 @@ class GaitPanel:
         return self._gui.add_slider(name, span.low, span.high, step, value, hint=hint)
 
     def _command_of(self, name: str) -> Callable[[Any], None]:
-        """What happens when an input is changed, by a browser and not by ``show``."""
+        """Callback for a change of an input, by a browser and not by ``show``."""
 
         def moved(event: Any) -> None:
             if event.client_id is None:
@@ -104,7 +104,7 @@ class GaitPanel:
         return moved
 
     def _collect(self) -> None:
-        """Take what browsers have set, which their threads put."""
+        """Collect the values that browsers have set, which their threads put."""
         while not self._moved.empty():
             name, value = self._moved.get()
             self._waiting[name] = value
@@ -120,7 +120,7 @@ class GaitPanel:
 
 
 def _shown(value: Any) -> Any:
-    """A number with as many digits as fit beside its slider."""
+    """A number with as many digits as fit next to its slider."""
     return round(value, 4) if isinstance(value, float) else value
 
 

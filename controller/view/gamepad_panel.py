@@ -1,4 +1,4 @@
-"""What is said of a gamepad at the computer of whoever has the page open, and how to do without."""
+"""Text about a gamepad at the computer of the page's user, and how to do without."""
 
 from html import escape
 from queue import SimpleQueue
@@ -66,7 +66,7 @@ class GamepadPanel:
             self._without.visible = missing
 
     def commands(self) -> list[str]:
-        """What was pressed in the tab since the last call."""
+        """Buttons that were pressed in the tab since the last call."""
         found = []
         while not self._pressed.empty():
             found.append(self._pressed.get())

@@ -1,4 +1,4 @@
-"""Who may open the page: checked at every request, before viser sees it.
+"""Access to the page: checked at every request, before viser sees it.
 
 viser serves every program that reaches its port, browsers let any web page send requests to this
 machine, and every user of this machine can reach 127.0.0.1. So a request has to name an expected
@@ -38,7 +38,7 @@ class Insert(Protocol):
     """Something of our own in the page: a script, and the socket that it opens."""
 
     path: str
-    """Of the socket."""
+    """Path of the socket."""
     script: str
 
     async def serve(self, connection: Any) -> None:
@@ -171,7 +171,7 @@ def _only(request: Request, header: str) -> str:
 
 
 def _ask_for_plain(request: Request) -> None:
-    """Take out of a request that what is sent may be compressed."""
+    """Remove the permission to compress the response from a request."""
     if "Accept-Encoding" in request.headers:
         del request.headers["Accept-Encoding"]
 

@@ -41,7 +41,7 @@ _PERIOD_S: Final = 0.05
 _SERVOS_S: Final = 0.2
 _CURVES_S: Final = 0.5
 _SILENT_S: Final = 2.0
-"""A run that says nothing for so long is told."""
+"""A run that sends nothing for this time is reported."""
 _ROWS: Final = round(SPAN_S / _PERIOD_S)
 
 
@@ -92,7 +92,7 @@ class _LivePage:
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
 
     def step(self) -> None:
-        """Take what has come, draw it, and ask for more."""
+        """Read the rows that have come, draw them, and request more."""
         now_s = self._clock.now_s()
         if self._asked_s < self._told_s or self._asked_s < 0.0:
             self._clock.sleep_until_s(self._asked_s + _PERIOD_S)
@@ -123,7 +123,7 @@ class _LivePage:
             print(f"snakewalk: {plain(text)}", file=sys.stderr, flush=True)
 
     def _commands(self) -> list[str]:
-        """What was set in the page since the last call."""
+        """Inputs that were set in the page since the last call."""
         found = []
         if self._gait_panel is not None:
             found += self._gait_panel.commands(self._asked_s) + self._gamepad.commands()
@@ -185,7 +185,7 @@ class _LivePage:
         self._gait_panel.show(self._gait["name"], self._gait["parameters"])
 
     def _take_waypoints(self) -> None:
-        """Take clicks on the ground, once there is one; of a run whose waypoints may be set."""
+        """Accept clicks on the ground, once it is drawn; only if the run's waypoints may be set."""
         if self._takes_waypoints and self._scene is not None and self._dashboard is not None:
             self._waypoint_panel = WaypointPanel(self._server, self._dashboard.tabs, self._scene)
 
@@ -213,7 +213,7 @@ class _LivePage:
                 scene.show_trail(past.pose.centre_m)
 
     def _record(self, rows: dict[str, list[dict[str, Any]]]) -> RunRecord:
-        """What is known, of rows by topic."""
+        """Known values, from rows by topic."""
         return record_of(rows, complete=False, note="", header=self._header)
 
     def _press(self, who: str) -> str:

@@ -46,27 +46,27 @@ class LiveView(WatcherProcess):
         return self._dead_man.held
 
     def pressed(self) -> list[str]:
-        """What was set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
+        """Inputs set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
         return self._dead_man.sort_out(self._end.commands())
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
-        """Take the gait that an operator runs: the page then has its sliders."""
+        """Show in the page the sliders of the gait that an operator runs."""
         row = {"name": name, "parameters": parameters}
         self._end.add(GAIT, json.dumps(row).encode())
 
     def on_course(self) -> None:
-        """Take it that the run's waypoints may be set: the page then takes clicks."""
+        """Let the page accept clicks: the run's waypoints may be set."""
         self._end.add(COURSE, b"{}")
 
     def on_row(self, topic: str, row: bytes) -> None:
-        """Take a row of the log; returns at once."""
+        """Accept a row of the log; returns at once."""
         if topic == PoseTable.topic.name and self._picture is not None:
             picture, self._picture = self._picture, None
             self._end.add(PICTURE, picture)
         self._end.add(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:
-        """Take a picture (H, W, 3), blue first, of the run's camera, from its thread."""
+        """Accept a picture (H, W, 3), blue first, of the run's camera, from its thread."""
         if time_s - self._picture_s < _PICTURE_S:
             return
         import cv2  # noqa: PLC0415  an extra

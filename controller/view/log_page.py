@@ -122,7 +122,7 @@ class LogPage:
 
     def step(self, dt_s: float, now_s: float) -> None:
         """Go on by ``dt_s`` of real time and draw what has changed."""
-        if abs(self._slider.value - self.time_s) > 0.02:  # somebody has moved it
+        if abs(self._slider.value - self.time_s) > 0.02:  # a user has moved it
             self.time_s = float(self._slider.value)
         elif self.playing:
             self.time_s = min(self.time_s + dt_s * float(self._speed.value), self._end_s)
@@ -137,7 +137,7 @@ class LogPage:
                 each.draw(self.time_s - self._begin_s, curves=curves, again=moved)
 
     def _lay_out(self) -> bool:
-        """Put the second log beside the first, or onto it; whether that has changed."""
+        """Put the second log next to the first, or onto it; return whether that has changed."""
         if self._apart is None:
             return False
         apart, other = self._apart.value, self._shown[1].scene

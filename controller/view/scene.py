@@ -46,11 +46,11 @@ _FLOOR_M: Final = 12.0
 """Side of the piece of a flat floor that is drawn (ours)."""
 _TRAIL_POINTS: Final = 400
 _SEEN_M, _RAY_STEP_M = 60.0, 0.02
-"""How far a click reaches, and in what steps the ground is looked for (ours)."""
+"""Reach of a click, and the steps in which the ground is searched (ours)."""
 
 
 class BodyScene:
-    """What is drawn of one run; everything moves below one frame, which can follow the body."""
+    """Drawn objects of one run; everything moves below one frame, which can follow the body."""
 
     def __init__(self, server: viser.ViserServer, header: Header, number: int = 0) -> None:
         """Draw ground and waypoints; ``number`` is that of the run in its page."""
@@ -59,7 +59,7 @@ class BodyScene:
         self._frames_body = False
         self._root = f"/run{number}"
         self.aside_m: Floats = np.zeros(3)
-        """(3,) by which all is moved: where another run is drawn beside it."""
+        """(3,) offset of all objects: for another run that is drawn next to it."""
         self._robot, self._ground = header.robot, header.ground
         self._limit_a = header.run.safety.current_limit_of_a(header.robot)
         self._frame = self._scene.add_frame(self._root, show_axes=False)

@@ -15,7 +15,7 @@ _BAD: Final = "#b3121a"
 
 
 class WaypointPanel:
-    """A tab of buttons; what is clicked is commanded of the run, which says what it made of it."""
+    """A tab of buttons; a click commands the run, which reports its result."""
 
     def __init__(
         self, server: viser.ViserServer, tabs: viser.GuiTabGroupHandle, scene: BodyScene
@@ -41,7 +41,7 @@ class WaypointPanel:
         server.scene.on_click(modifier="shift")(self._clicked)
 
     def commands(self) -> list[str]:
-        """What was clicked since the last call, for a ``LiveCourse``."""
+        """Clicks since the last call, for a ``LiveCourse``."""
         found = []
         while not self._commands.empty():
             found.append(self._commands.get())
@@ -53,7 +53,7 @@ class WaypointPanel:
             self._show(text, _BAD if kind == "refused" else "inherit")
 
     def _arming(self, word: str) -> Callable[[object], None]:
-        """What a button does that waits for a click, or waits no longer."""
+        """Callback of a button that waits for a click, or stops waiting."""
 
         def pressed(event: object) -> None:
             self._armed = "" if self._armed == word else word

@@ -40,7 +40,7 @@ def vertex(bends: Floats, cost: float, costs: list[float]) -> Vertex:
     """Vertex of the parabola through ``cost`` at ``bends`` (2,) and ``costs`` at its hexagon.
 
     At most a step away; at ``bends`` itself where the parabola has no least value. A hexagon that
-    the limit cuts off is taken for a whole one: what comes out is judged like all others.
+    the limit cuts off is treated as a whole one: the result is judged like all others.
     """
     pairs = list(zip(costs[::2], costs[1::2], strict=True))
     slopes = [0.5 * (ahead - back) for ahead, back in pairs]

@@ -21,13 +21,14 @@ from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.replanning import PathPlanner, PathRequest, Replanning
 
 _OFF_PATH_BODIES = 0.75
-# Body lengths of travel before another path may be planned: turning back takes about as much.
+# Body lengths of travel before another path may be planned: turning back needs about as much.
 _REPLAN_AFTER_BODIES = 2.0
 # A body that gains less than this on its path over so much travel stands still.
 _STALL_BODIES = 0.25
 _STALL_AFTER_BODIES = 5.0
 _KEPT_M = 0.3
-"""Of the path before the head that stays when the rest is renewed: the body is on it by then."""
+"""Length of the path before the head that stays when the rest is renewed: the body is on it by
+then."""
 _BEND_RAD = 0.8
 """By which a renewed path may bend where it goes on (ours)."""
 _BEYOND = 1.5
@@ -60,7 +61,7 @@ class _Onward:
 
 
 class OnCourse:
-    """What a motion along a course tells of it: part of ``PathProgress``."""
+    """Progress that a motion along a course reports: part of ``PathProgress``."""
 
     def __init__(self, course: "Course") -> None:
         self.course = course
@@ -119,7 +120,7 @@ class Course:
             start_m: (2,) where the head is.
             radius_m: how near to a waypoint the centre has to come.
             length_m: of the body.
-            travel_per_body: what the motion counts as a body length of travel, in its own unit.
+            travel_per_body: a body length of travel, in the motion's own unit.
             travel: of the motion at its begin.
             feedback: whether another path is laid where one failed.
 
@@ -135,7 +136,7 @@ class Course:
         self._per_body, self._feedback = travel_per_body, feedback
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._along_m = np.zeros(2)
-        """Of the body's centre on the path, and of its head."""
+        """Place of the body's centre on the path, and of its head."""
         self._travel, self._replan_after = travel, 0.0
         self._gained_m, self._gained_at = 0.0, travel
         self._stalls_m: list[Floats] = []
@@ -401,7 +402,7 @@ class Course:
         return _Onward(whole, [*behind, *passes], whole.length_m + _BEYOND * beyond_m)
 
     def _failing(self, centre_m: Floats) -> str | None:
-        """Why the path in force is none any more; None while it is."""
+        """Why the path in force has failed; None while it holds."""
         if self._is_stalled:
             return "no advance on the path"
         if self._has_passed(centre_m):

@@ -74,7 +74,7 @@ class JointTrack:
         return self.first + len(self._q) - 1
 
     def grow(self) -> bool:
-        """Take in what was appended to the track; true if anything was."""
+        """Read the samples that were appended to the track; return true if there were any."""
         if self.track.end == self.last:
             return False
         bodies = self.track.bodies_rad(self.last + 1, self.track.end)
@@ -82,7 +82,7 @@ class JointTrack:
         return True
 
     def goal_rad(self, head: float) -> Floats:
-        """(J,) joint angles; at both ends of what is known the spline runs on straight."""
+        """(J,) joint angles; beyond both ends of the known track the spline runs on straight."""
         goal = np.empty(self._q.shape[1])
         _spline(self._q, head - self.first, goal)
         return goal

@@ -1,8 +1,8 @@
 """Landing: a body swims along its course until it meets the ground, and walks on from there.
 
-What tells the ground is the measured pose alone: a body that swims makes the same way in every
-cycle, and hardly any once its head lies on the beach. Legs unfold and the spine changes its wave in
-one join without a step (``controller.motion.source_switch``).
+The measured pose alone shows the ground: a body that swims makes the same way in every cycle, and
+hardly any once its head lies on the beach. Legs unfold and the spine changes its wave in one join
+without a step (``controller.motion.source_switch``).
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class Landing(MotionWrapper, OnCourse):
             make_walk: of the cycles so far; the gait on land, on the same course.
             robot: that both move.
             headway: share of the best way of a cycle; a cycle that makes less is the last.
-            on_ashore: told in words when the ground is met.
+            on_ashore: called with a text when the ground is met.
 
         """
         OnCourse.__init__(self, swim.course)

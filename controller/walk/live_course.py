@@ -29,7 +29,7 @@ CLEAR: Final = "clear"
 END: Final = "end"
 """Leave them out, and end the run where the motion comes to rest."""
 WAYPOINTS_MAX: Final = 1000
-"""That a run takes (ours)."""
+"""Most waypoints that a run accepts (ours)."""
 _COMMANDS_MAX: Final = 10
 """Commands that are carried out in a step (ours): a person clicks less often."""
 _APART_M: Final = 0.05
@@ -37,7 +37,7 @@ _APART_M: Final = 0.05
 
 
 class MotionOnCourse(MotionSource, PathProgress, Protocol):
-    """What a live course steers."""
+    """A motion that a live course steers."""
 
     @property
     def course(self) -> Course:
@@ -63,7 +63,8 @@ class LiveCourse(MotionWrapper, OnCourse):
                 those that could not be read, are reported as rejected.
             check: raises ``InputError`` for a point (2,) where no waypoint may be, whatever path
                 leads there.
-            on_event: takes ("operator", text) of what was done, ("refused", text) of what was not.
+            on_event: called with ("operator", text) for an action that was done, ("refused", text)
+                for one that was not.
 
         """
         OnCourse.__init__(self, motion.course)
@@ -160,7 +161,7 @@ class LiveCourse(MotionWrapper, OnCourse):
         """(2,) of X,Y in metres.
 
         Raises:
-            InputError: it is no such point, none may be there, or nothing leads on to it.
+            InputError: the point does not exist, none may be there, or no path leads on to it.
 
         """
         try:

@@ -1,8 +1,8 @@
 """A walk over ground that it gets to know on its way, from a map that grows.
 
-All that the walk does by the ground - its path, its predictions, the pitch that fits it to what is
-under it - is done by the map; what the map does not know is taken as it is filled in there, and no
-path leads over it.
+The map replaces the ground for all parts of the walk: its path, its predictions, and the pitch that
+fits it to the ground under it. Unknown places of the map are used as they are filled in there, and
+no path leads over them.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ class MapWalk(MotionWrapper, OnCourse):
             pilot: of the walk, whose course plans by ``planner``.
             ground_map: someone else adds pictures to it.
             planner: the pilot's.
-            change_ground: takes the ground by which the pilot predicts and bends.
+            change_ground: called with the ground by which the pilot predicts and bends.
             replan_m: travel of the walk between two plans of a path that ends before a waypoint.
 
         """

@@ -1,6 +1,6 @@
 """The pilot: the snake walk along a path, as a motion source with path progress.
 
-It takes the measured body and returns joint goals, has the walker decide on the next shape before
+It reads the measured body and returns joint goals, has the walker decide on the next shape before
 the track runs out, and counts waypoints.
 
 With ``feedback`` off it believes that the body goes where the track goes, without slip: the printed
@@ -64,7 +64,7 @@ class ShapeChooser(Protocol):
         ...
 
     def decide(self, pose: PathPose) -> Decision:
-        """Append the next piece, of what was thought if there was time for that."""
+        """Append the next piece; it is thought out beforehand if there was time for that."""
         ...
 
 
@@ -111,10 +111,10 @@ class AsksAboutPieces(Protocol):
 
 @runtime_checkable
 class UsesFriction(Protocol):
-    """A motion, or a ``ShapeChooser``, that reckons with friction."""
+    """A motion, or a ``ShapeChooser``, whose predictions use friction."""
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Reckon with this friction from now on."""
+        """Use this friction from now on."""
         ...
 
 
@@ -203,7 +203,7 @@ class Pilot(OnCourse):
         return np.asarray(speed + 0.5 * self._last_s * gain_rad_s2)
 
     def pace(self) -> Pace:
-        """The robot's limits: what comes next is not known."""
+        """The robot's limits: the next motion is not known."""
         return self._pace
 
     def begin(self, view: BodyView) -> Floats:
@@ -234,7 +234,7 @@ class Pilot(OnCourse):
         self.decision = None
 
     def restart(self, view: BodyView, restart: Callable[[Floats], None]) -> None:
-        """Go on, from rest, with the body as it lies; ``restart`` of the chooser takes it (N,)."""
+        """Go on, from rest, with the body as it lies; ``restart`` of the chooser gets it (N,)."""
         points = self._chooser.track.points
         at = (np.arange(points) + 0.5) * self._links / points - 0.5
         restart(np.interp(at, np.arange(self._links), view.headings_rad))
@@ -320,7 +320,7 @@ class Pilot(OnCourse):
             self._chooser.ask, self._chooser.answers = self._ask, asker.results
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Reckon with this friction from now on: the chooser, and the twin."""
+        """Use this friction from now on, in the chooser and in the twin."""
         if isinstance(self._chooser, UsesFriction):
             self._chooser.use_friction(friction)
         if self._twin is not None:
@@ -345,7 +345,7 @@ class Pilot(OnCourse):
         return other
 
     def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
-        """What becomes of the body on a piece (n,) that would be appended to the track."""
+        """Predict the body on a piece (n,) that would be appended to the track."""
         return self.tried_from(
             Coasting(self._time_law, self._roll, self._pitch_rad), pose, piece_rad
         )
@@ -386,7 +386,7 @@ class Pilot(OnCourse):
         return goal_rad + self._pitch_rad
 
     def _ahead(self, view: BodyView) -> tuple[Floats, Floats]:
-        """Head (2,) and headings (L,) of the links when goals of now have become the pitch.
+        """Head (2,) and headings (L,) of the links when the current goals have become the pitch.
 
         The body is taken to follow its track: goals for the ground under it now would come late.
         """

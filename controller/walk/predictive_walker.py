@@ -1,9 +1,9 @@
 """The snake walk that predicts: W proposes shapes, a rollout says where each would carry the body.
 
-[PT] 2.6.2 with what a body on a slope needs. A state is walked for a part of its length; every
-tenth of a body the rest of it is bent anew, as far as the head has not been there. States and bends
-are judged by ``Steering``. W orders the states, so that the walk never repeats itself; the rollout
-chooses among the first of them.
+[PT] 2.6.2 with additions for a body on a slope. A state is walked for a part of its length; every
+tenth of a body the rest of it is bent again, as far as the head has not been there. States and
+bends are judged by ``Steering``. W orders the states, so that the walk never repeats itself; the
+rollout chooses among the first of them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,11 +33,11 @@ CLIMBING = (
     SerpenoidParameters(amplitude_rad=1.3, waves=1.0),
 )
 """Carriers of states uphill. On paper a slope of 15 degrees leaves the first 0.27 of the progress
-without slip, one of 18 degrees the second 0.17, and a fifth of a state takes 0.02 of that."""
+without slip, one of 18 degrees the second 0.17; a fifth of a state costs 0.02 of that."""
 SERPENOIDS = (SerpenoidParameters(), *CLIMBING)
-"""What it falls back on."""
+"""Carriers that the walk falls back on."""
 _JOIN = 0.1
-"""Of a body: in this a state that repeats itself goes from its head's angle to its tail's."""
+"""Share of a body over which a repeated state blends from its head angle to its tail angle."""
 _REST = 20
 """Decisions in which no state comes again."""
 _BATCH = 6
@@ -92,7 +92,7 @@ class PredictiveWalker:
 
         Args:
             shapes_rad: the library; zero means.
-            walk: limits of what is proposed.
+            walk: limits of the proposed states.
             make_steering: for the track that this walker grows.
             joints: of yaw, along the body.
             accept: whether a body (N,) may be made: joints within limits, nothing touches.
@@ -117,7 +117,7 @@ class PredictiveWalker:
         self._thinking: Iterator[bool] | None = None
         self._lost = False
         self.try_piece: Callable[[PathPose, Floats], Rolled] | None = None
-        """Tries a piece (n,) on a simulated body; None where there is none."""
+        """Tries a piece (n,) on a simulated body; None without a twin."""
         self.ask: Callable[[PathPose, Sequence[Floats]], None] | None = None
         """Asks a simulated body elsewhere about pieces (n,); None without one."""
         self.answers: Callable[[], Mapping[int, Rolled | None]] = dict
@@ -202,7 +202,7 @@ class PredictiveWalker:
         return next(filter(self._may_be_made, ranked), ranked[0])
 
     def _may_be_made(self, tried: _Tried) -> bool:
-        """Whether the body at the end of what would be appended may be made."""
+        """Whether the body at the end of the proposed piece may be made."""
         old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
         return self._accept(np.concatenate([tried.piece_rad[: self._keep][::-1], old]))
 
@@ -222,7 +222,7 @@ class PredictiveWalker:
         return found
 
     def _on_twin(self, pose: PathPose, piece: _Tried) -> _Tried:
-        """Return the piece with what it costs on the simulated body, and its progress there."""
+        """Return the piece with its cost on the simulated body, and its progress there."""
         assert self.try_piece is not None
         cost_m2, progress = self.steering.cost(self.try_piece(pose, piece.piece_rad))
         return piece._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
@@ -353,7 +353,7 @@ class PredictiveWalker:
         ]
 
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
-        """What may come next: the rest of the state, or another."""
+        """Possible next pieces: the rest of the state, or another."""
         if self._option is not None and not self._is_new:
             state, going_on = self._option.state, self._option.wave_rad[self._at :]
             return [_Option(state, self._option.near, self._base_rad, going_on)]
@@ -405,7 +405,7 @@ class PredictiveWalker:
         return np.take(whole, np.arange(1, count + 1), axis=1, mode="wrap")
 
     def _roughness(self, angles_rad: Floats) -> Floats:
-        """Mean square (n,) of what joints on angles (n, m) accelerate, in a unit of their own."""
+        """Mean square (n,) of the joints' accelerations on angles (n, m), in a unit of its own."""
         tail_rad = self.track.samples(self.track.end - 2 * self._span)
         rough = np.empty(len(angles_rad))
         _roughness(tail_rad, angles_rad, self._span, rough)

@@ -17,18 +17,18 @@ FREQUENCY_HZ = 1.0
 """Turns a second (ours); joints at their limit slow it."""
 MOST_TURNS = 16
 JOIN_S = 1.5
-"""What joining costs, there and back."""
+"""Cost of joining, there and back."""
 _UPHILL = 0.7
 """Cosine between a roll and the way straight up, at least."""
 _LEAST_SLOPE = 0.07
 _TURNS_RAD = np.array([1.2, 2.4])
 """Turns of the walk away from the arc, before it, of which one is chosen (ours)."""
 _AT_ONCE_RAD = np.array([-2.6, -2.0, -1.4, 1.4, 2.0, 2.6])
-"""Bends that the joints take at once, without a piece of track (ours)."""
+"""Bends that the joints make at once, without a piece of track (ours)."""
 _TRIES = 6
 """Plans that are tried on a twin, those first that are fastest on paper (ours)."""
 _STEPS_M = 0.05 * np.eye(2)
-"""In x and in y, to either side: what the slope under the body is taken from."""
+"""Steps in x and in y, to either side: the slope under the body is computed from them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class RollPlan:
     """An arc to lie in, and whole turns in it."""
 
     bend_rad: float
-    """Of the whole body, positive to the left; it rolls to the side to which it bends."""
+    """Bend of the whole body, positive to the left; it rolls to the side to which it bends."""
     piece_rad: Floats
     """(n,) the walk's last piece of track; empty where the joints bend at once."""
     turns: int
@@ -108,8 +108,8 @@ class RollPlanner:
     ) -> list[RollPlan]:
         """Return plans that are worth a try, the fastest on paper first.
 
-        Of arcs that are laid by the track, at once or after a turn away from them, and of bends
-        that the joints take at once.
+        The plans are arcs that are laid by the track, at once or after a turn away from them, and
+        bends that the joints make at once.
 
         Args:
             pose: of the body.

@@ -17,13 +17,13 @@ from snakewalk.controller.shape.crossing import self_touches
 from snakewalk.controller.shape.library import ShapeFilter
 
 MADE = ("joint limits", "self-contact")
-"""Tests of what the robot can make at all; the others say which shapes are worth making."""
+"""Tests of the robot's limits; the others say which shapes are worth making."""
 
 
 def shape_filters(
     robot: RobotConfig, friction: FrictionConfig, states: StatesConfig, points: int = 100
 ) -> dict[str, ShapeFilter]:
-    """Tests by reason, cheapest first: each takes shapes (S, points) to a mask (S,) of bad ones.
+    """Tests by reason, cheapest first: each maps shapes (S, points) to a mask (S,) of bad ones.
 
     No turn beyond ``states.turn_limit_rad``: a walk decides again after a part of a shape, so that
     a coil's turn is never completed as it was aimed. Joints inside the limits after retargeting, no

@@ -2,11 +2,11 @@
 
 Straight up a slope of 18 degrees the best wave makes 0.05 m/s, and a body that stands at the foot
 of such a slope stays there. The same body in an arc, its ends uphill, rolls up 20 degrees as fast
-as it turns, by its girth a turn. (An arc that opens downhill stands on its bend, and tips over.) So
+as it turns, by its girth a turn. An arc that opens downhill stands on its bend, and tips over. So
 where the way to a waypoint was missed, each decision compares two predictions of how fast the
-waypoint comes nearer: of the best rollout, and of a roll. To roll, the last piece of the walk's
-track is an arc, laid out by the same rollout; rolling is joined to it, and the walk to rolling,
-without a step in speed.
+waypoint comes nearer: that of the best rollout, and that of a roll. To roll, the last piece of the
+walk's track is an arc, laid out by the same rollout; rolling is joined to it, and the walk to
+rolling, without a step in speed.
 """
 
 from collections.abc import Callable
@@ -50,7 +50,7 @@ _UPRIGHT_RAD = 0.6
 _DROP_M = 0.1
 """A body that has come down by so much since it was highest rolls down: it stops."""
 _EARLY_RAD = 0.3
-"""Of a whole turn, left to the join."""
+"""Angle of the last turn that is left to the join."""
 _AGAIN_BODIES = 0.5
 """Travel of the walk between two rolls."""
 _SLOW = 0.3
@@ -58,13 +58,13 @@ _SLOW = 0.3
 _TRY_AGAIN_BODIES = 0.4
 """Travel of the walk between two times that rolls are tried."""
 _LAID_S = 12.0
-"""Longest that the walk may take to its last piece's end."""
+"""Longest time until the walk's last piece ends."""
 _WALK_ON_S = 1.5
-"""What it costs to walk again after a roll."""
+"""Cost of walking again after a roll."""
 _LOST_M = 0.15
 """A body that is so much farther from its target than it was rolls away: it stops."""
 _GAIN_M, _GAIN_S = 0.03, 3.0
-"""A body that has come nearer by less for so long rolls on the spot: it stops (ours)."""
+"""A body that has come nearer by less for this time rolls on the spot: it stops (ours)."""
 _OFF_PATH_M = 0.2
 """A body that a roll has left so far off its path goes on by another (ours)."""
 
@@ -94,8 +94,8 @@ class SideRolls(MotionWrapper, OnCourse):
             robot: round, with yaw and pitch joints.
             planner: of rolls, for the same robot.
             climb_progress: predicted progress of the walk from which on it needs no roll.
-            pulse_m_s: wanted of the walk: what its progress is a share of.
-            on_event: takes the kind of an event, and a line of text.
+            pulse_m_s: wanted speed of the walk: its progress is a share of this.
+            on_event: called with the kind of an event, and a line of text.
 
         """
         OnCourse.__init__(self, pilot.course)
@@ -112,7 +112,7 @@ class SideRolls(MotionWrapper, OnCourse):
 
     @property
     def needs(self) -> Needs:
-        """Those of the walk, and pitch joints."""
+        """Needs of the walk, and pitch joints."""
         return Needs(yaw=True, pitch=True, wheels=True)
 
     @property
@@ -131,7 +131,7 @@ class SideRolls(MotionWrapper, OnCourse):
         return 0.0 if self.rolling or self._switch.blending else self._pilot.pulse_m_s
 
     def pace(self) -> Pace:
-        """The robot's limits: what comes next is not known."""
+        """The robot's limits: the next motion is not known."""
         return self._pilot.pace()
 
     def use_twin(self, twin: TwinRollout) -> None:
@@ -143,7 +143,7 @@ class SideRolls(MotionWrapper, OnCourse):
         self._pilot.use_asker(asker)
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Let the walk reckon with this friction from now on."""
+        """Let the walk use this friction from now on."""
         self._pilot.use_friction(friction)
 
     def begin(self, view: BodyView) -> Floats:
@@ -189,7 +189,7 @@ class SideRolls(MotionWrapper, OnCourse):
     def _target_m(self, view: BodyView) -> Floats:
         """(2,) the next waypoint if it is near, else a point of the path before it.
 
-        A path that turns a body about leads away from a waypoint beside it.
+        A path that turns a body about leads away from a waypoint at its side.
         """
         next_one = self.course.next_waypoint
         if next_one is not None and np.hypot(*(next_one[0] - view.centre_m[:2])) <= _TARGET_M:
@@ -277,7 +277,7 @@ class _RollOnTwin:
     def __init__(
         self, pilot: Pilot, cycle: GaitCycle, robot: RobotConfig, *, at_once: bool
     ) -> None:
-        """Take a pilot that coasts; ``at_once``: it rolls from where the body is."""
+        """Accept a pilot that coasts; ``at_once``: it rolls from where the body is."""
         self._pilot, self._cycle, self._robot = pilot, cycle, robot
         self._at_once = at_once
         self._roll: Blend | None = None
@@ -313,7 +313,7 @@ class _Rolling:
         self._turned_rad = self._time_s = 0.0
 
     def is_over(self, dt_s: float, view: BodyView, planner: RollPlanner) -> bool:
-        """Whether the turns are made, or it takes too long, or the body rolls down."""
+        """Whether the turns are made, or the time limit has passed, or the body rolls down."""
         roll_rad = body_roll_rad(view)
         self._turned_rad -= self._plan.side * float(wrap(roll_rad - self._roll_rad))
         self._roll_rad = roll_rad

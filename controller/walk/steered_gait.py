@@ -1,7 +1,8 @@
 """A steered gait: a gait with a turn goes along a path through waypoints.
 
 The straight motion is turned along the path, as [KP] 4.4 bends the motion of its animals along
-theirs; here by a parameter of the gait's own, from where the body is measured in every cycle.
+theirs. Here a parameter of the gait's own turns it, from the measured place of the body in every
+cycle.
 """
 
 import numpy as np
@@ -28,8 +29,8 @@ from snakewalk.controller.motion.turned_gait import (
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 
 TURN_LIMIT = 1.4
-"""Of the gait's turn (ours): with it a trot turns on an arc of 0.4 m; a spine that swims is bent
-by as many radians."""
+"""Limit of the gait's turn (ours): with it a trot turns on an arc of 0.4 m; a spine that swims is
+bent by as many radians."""
 TURN_PER_RAD = 3.0
 """Turn per error of the heading (ours)."""
 CYCLES_PER_BODY = 4.0
@@ -79,7 +80,7 @@ class SteeredGait(OnCourse):
 
     @property
     def needs(self) -> Needs:
-        """Those of the gait."""
+        """Needs of the gait."""
         return self._gait.needs
 
     @property
@@ -146,8 +147,8 @@ def check_turns(gait: Gait, robot: RobotConfig) -> None:
     """Refuse a gait that cannot be steered by its turn on this robot.
 
     Raises:
-        InputError: it is none of those, its turn is given, joints are missing or do not bend so far
-            at the largest turn.
+        InputError: the gait cannot be steered, its turn is given, joints are missing or do not bend
+            so far at the largest turn.
 
     """
     if gait.steered_by is None:

@@ -1,7 +1,8 @@
 """Predictive steering: of several pieces of track, the one whose rollout follows the path best.
 
-What the body does beside the prediction, per length of pulse, is identified while it moves and
-added to every rollout: friction that differs from the configured, uneven loads, a soft joint.
+The difference between the body's motion and the prediction, per length of pulse, is identified
+during the motion and added to every rollout. Its causes are friction that differs from the
+configured, uneven loads, or a soft joint.
 """
 
 from collections import deque
@@ -53,7 +54,7 @@ class PathPose:
 
 @dataclass(frozen=True, slots=True)
 class SteeringWeights:
-    """What a rollout costs, in square metres; chosen on seeds that no table shows."""
+    """Weights of a rollout's cost, in square metres; chosen on seeds that no table shows."""
 
     off_path: float = 1.0
     """Mean square distance of the centre from the path."""
@@ -64,7 +65,8 @@ class SteeringWeights:
     heading_m: float = 0.3
     """Lever on which the heading error at the end counts as a distance."""
     pass_by: float = 4.0
-    """Square of what is passed by farther from the next waypoint than ``near_m``."""
+    """Weight of the square of the distance beyond ``near_m`` at which the next waypoint is
+    passed."""
     near_m: float = 0.2
     """Within this a waypoint is passed well."""
     delay_m2: float = 0.1
@@ -124,9 +126,9 @@ class Steering:
         )
 
     def roll_out(self, pose: PathPose, pieces_rad: Floats) -> Rolled:
-        """What becomes of the body on pieces (C, n) that would be appended to the track.
+        """Predict the body on pieces (C, n) that would be appended to the track.
 
-        What pieces have in common is rolled out once for a pose, until another one is observed.
+        The common part of the pieces is rolled out once for a pose, until another one is observed.
         """
         if self._tree is None or self._tree_of is not pose:
             self._tree, self._tree_of = self._begin(pose, self.drift, self._tree), pose
@@ -138,7 +140,7 @@ class Steering:
         return self._rollout.steepest(points_m + pose.centre_m - points_m[0]) > _STEEP
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Roll out with this friction, from the next decision on; what is left is drift."""
+        """Roll out with this friction, from the next decision onwards; the rest is drift."""
         self._rollout.use_friction(friction)
 
     def forget(self) -> None:

@@ -1,9 +1,9 @@
 """Time law: how fast the head may travel along the track within joint speed and acceleration.
 
 Joint speed alone, ``u = min(u0, limit / max |dq/dS|)``, would make the head's speed jump where the
-shape bends quickly. Here half of the acceleration limit is left to the bending
-(``q'' u^2``) and half to speeding up and braking (``q' du/dt``), and the brake looks ahead over all
-of the track that is known.
+shape bends quickly. Here half of the acceleration limit is left to the bending (``q'' u^2``), and
+half to speeding up and braking (``q' du/dt``). The brake looks ahead over all of the track that is
+known.
 """
 
 import copy
@@ -46,7 +46,7 @@ class TimeLaw:
         """Segments travelled."""
         self.speed_segments_s = 0.0
         self._first = self.joints.first
-        self._allowed = np.zeros(1)  # nothing is known of what comes
+        self._allowed = np.zeros(1)  # the next motion is not known
         self._slope = np.zeros(1)
 
     def on(self, track: AngleTrack) -> "TimeLaw":
@@ -106,7 +106,7 @@ class TimeLaw:
         self._slope = slope
         allowed = np.empty(len(slope))
         _allow(slope, turn, self._speed_limit, self._half_acceleration, self._cruise, allowed)
-        # what comes behind the end may be as steep as the steepest so far: be able to brake for it
+        # the track behind the end may be as steep as the steepest so far: be able to brake for it
         self._least = min(self._least, float(allowed.min()))
         allowed[-1] = self._least
         _brake(allowed, slope, self._half_acceleration)

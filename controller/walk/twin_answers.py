@@ -77,7 +77,7 @@ class TwinAsker:
         self._results: dict[int, Rolled | None] = {}
 
     def observe(self, view: BodyView, dt_s: float) -> None:
-        """Take the measured body, ``dt_s`` after the last."""
+        """Process the measured body, ``dt_s`` after the last."""
         self._seen, self._cycle_s = [*self._seen[-1:], view], dt_s
 
     def forget(self) -> None:

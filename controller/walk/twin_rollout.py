@@ -1,4 +1,4 @@
-"""A rollout on a twin: what becomes of a body on a piece of track, tried on a simulated one.
+"""A rollout on a twin: a piece of track is tried on a simulated body.
 
 The balance of forces on paper knows no weight that rests on few links of a body on rough ground; a
 body that physics moves does. It costs a hundred times as much.
@@ -16,7 +16,7 @@ from snakewalk.controller.walk.steering import PathPose
 from snakewalk.drivers.types import BodyPose
 
 LENGTH_BODIES = 1.0
-"""Of pulse that is rolled out."""
+"""Length of pulse that is rolled out."""
 _LONGEST_S = 6.0
 
 
@@ -56,7 +56,7 @@ class TwinRollout:
         """``make_twin`` is asked before each rollout, and may return the same one."""
         self._robot, self._make_twin = robot, make_twin
         self.friction = friction
-        """Of the ground that the twin is laid on."""
+        """Friction of the ground that the twin is laid on."""
         self._seen: list[BodyView] = []
         self._dt_s = 0.0
 
@@ -66,7 +66,7 @@ class TwinRollout:
         return self._dt_s
 
     def observe(self, view: BodyView, dt_s: float) -> None:
-        """Take the measured body, ``dt_s`` after the last."""
+        """Process the measured body, ``dt_s`` after the last."""
         self._seen = [*self._seen[-1:], view]
         self._dt_s = dt_s
 
@@ -82,7 +82,7 @@ class TwinRollout:
         Args:
             pose: with the path to measure by.
             is_over: asked before each cycle; not yet at once.
-            move: takes the length of a cycle and the body; returns goals (J,).
+            move: called with the length of a cycle and the body; returns goals (J,).
 
         """
         followed, view = Followed(pose.path, pose.path_at), self._seen[-1]

@@ -91,10 +91,10 @@ class ControlCycle:
             latency_s: how long adapter and driver may hold bytes back, at most.
             pending: pending replies of this port, shared by all who send requests on it; None: only
                 this cycle does.
-            line: what this port's line carries, shared likewise.
-            spin_s: on a device, sleep until this long before the reply should be complete, then
-                poll without sleeping, at most twice as long: shorter cycles, more CPU; 0: always
-                sleep; None: ``SPIN_S`` from ``SPIN_FROM_BAUD`` on, below it 0.
+            line: reservation of this port's line, shared in the same way.
+            spin_s: on a device, sleep until this long before the reply should be complete. Then
+                poll without sleeping, at most twice as long: shorter cycles, more CPU. 0: always
+                sleep. None: ``SPIN_S`` from ``SPIN_FROM_BAUD`` upwards, 0 below it.
 
         """
         self._port = port

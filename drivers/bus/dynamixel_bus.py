@@ -6,8 +6,8 @@ Defects of dynamixel-sdk 4.1.0 that are avoided here:
 status packet with an error and without data as success, and the CRC of a short packet as data.
   So registers are read and written by our own strict codec; the SDK pings and reboots only.
 - An exception in the port leaves the SDK's port busy for ever: it is freed again.
-- A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones. The SDK's spins
-  meanwhile, and does not tell of what came damaged: ``drivers.bus.probe`` has ours.
+- A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones. The SDK's ping
+  polls without sleeping meanwhile, and does not report damaged replies: ``drivers.bus.probe`` does.
 
 The control cycle does not go through the SDK: see ``drivers.bus.control_cycle``.
 """
@@ -189,7 +189,7 @@ class DynamixelBus:
         servo that refuses a block is asked register by register.
 
         Args:
-            servo_id: who is asked.
+            servo_id: ID of the servo.
             names: the registers.
             optional: those of them that a firmware may lack; they are left out where it says so,
                 and 0 where it says nothing of it.

@@ -61,7 +61,7 @@ def probe(
 
     Args:
         port: the line.
-        servo_id: who is asked.
+        servo_id: ID of the servo.
         requests: how often.
         latency_s: how long adapter and driver may hold bytes back, at most.
         block: first and last register of a block to read; None: ping.

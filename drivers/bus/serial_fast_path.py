@@ -95,15 +95,15 @@ def _receive(
 
     Args:
         fd: descriptor, non-blocking.
-        work: packets, what is expected, and the reply, in the order of the plan.
+        work: the packets, the expected reply, and the received one, in the order of the plan.
         data: (N, length) filled, unless irregular.
         with_goals: whether the request was sent behind goals.
         plan: (``PLAN_SIZE``,) the numbers above.
         free_s: (1,) of the line's ``LineReservation``.
 
     Returns:
-        What the frame reader says of a complete reply; ``-1 - n``: ``n`` bytes arrived, too few or
-        one too many: more than the reply is on the line.
+        Result of the frame reader for a complete reply. ``-1 - n``: ``n`` bytes arrived, either too
+        few or one too many; one too many means that the line carries more than the reply.
 
     """
     begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])

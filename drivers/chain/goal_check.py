@@ -76,7 +76,7 @@ class GoalCheck:
         """Read the goals back and compare them.
 
         Args:
-            explain: returns another reason why the servo of a joint does not take goals, or None.
+            explain: returns another reason why the servo of a joint does not accept goals, or None.
 
         Raises:
             BusError: a servo holds another goal in ``FOREIGN_READS`` or ``OWN_READS`` reads in a

@@ -73,7 +73,7 @@ class ServoChain:
         Args:
             bus: servos of the robot's models.
             robot: ids, limits, gains.
-            watchdog_s: after so long without an instruction the servos stop by themselves.
+            watchdog_s: after this time without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
             fingerprint_file: compared with the servos at each ``enable``; None: not compared.
             can_hold: ``hold_softly`` may be called, so every joint has a limit of its current.
@@ -386,7 +386,7 @@ class ServoChain:
     def check_servos(self) -> None:
         """Check torque, watchdogs and settings of the servos, one register in a cycle.
 
-        Call it once the goals of a cycle are sent. After a read without a reply there is no check.
+        Call it once the goals of a cycle are sent. A read without a reply skips the check.
 
         Raises:
             BusError: a servo has lost its torque or a setting (it has rebooted, or another program
@@ -406,7 +406,7 @@ class ServoChain:
         """Make a check; return whether all servos were read.
 
         An alarm that switches a servo off may come between the group read and the check; then the
-        alarm is the reason for what the check finds.
+        alarm is the reason for the findings of the check.
         """
         if not self._armed or self._readings.alert:
             return False

@@ -250,8 +250,8 @@ def configure(
         robot: the settings.
         units: of its joints.
         joints: only these; None is all.
-        on_event: gets a line for each setting that another program has left behind, and for what
-            is unusual and stays.
+        on_event: gets a line for each setting that another program has left behind, and for each
+            unusual setting that stays.
 
     Returns:
         The settings of each joint's servo.

@@ -2,7 +2,7 @@
 
 The port offers what the DYNAMIXEL SDK's packet handlers call (the SDK's own method names,
 milliseconds), and what the control cycle needs (seconds, deadlines). So one object serves both, and
-nothing above it can tell whether metal or simulation replies.
+the code above it cannot distinguish hardware from simulation.
 """
 
 # ruff: noqa: N802 - the SDK chose the names

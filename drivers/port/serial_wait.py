@@ -101,8 +101,9 @@ def receive(
         begun_ns: when the request was sent.
         least_ns: from then until the last byte can have arrived at the earliest.
         wait_ns: from then until the deadline.
-        spin_ns: for so long before and after the expected end, poll without sleeping; 0: sleep
-            until the earliest possible end, then until bytes arrive, until the reply is complete.
+        spin_ns: for this duration before and after the expected end, poll without sleeping; 0:
+            sleep until the earliest possible end, then until bytes arrive, until the reply is
+            complete.
         latency_estimate: (2,) from ``new_latency_estimate``; updated.
 
     """

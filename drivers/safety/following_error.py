@@ -120,7 +120,7 @@ def _judge(
         current_a: (J,)
         valid: (J,) whether the joint was read.
         time_s: time of the state.
-        last_s: time of the state before; infinite if there is none.
+        last_s: time of the previous state; infinite for the first state.
         rules: (5, J) limit of the error, rad; current towards the goal that excuses it, A; and
             ``SafetyLimits.output``.
         memory: (2, J) time since which a joint does not follow, or NaN; time without current, s.

@@ -39,8 +39,8 @@ class MeasuredSteps:
             believed: the last state that was believed.
 
         Returns:
-            The state, with old values and ages where a joint was not read or is not believed; what
-            is not believed, or None.
+            The state, with old values and ages where a joint was not read or is not believed; and a
+            description of the values that are not believed, or None.
 
         """
         limits, doubted_rad = self._limits, self._doubted_rad

@@ -44,21 +44,23 @@ the watchdogs would leave the servos holding with torque on."""
 class SafeLink:
     """A ``JointLink`` around another; use as a context manager, which switches torque off at exit.
 
-    On a veto, on an error of the link below, on ``request_stop``, or when ``stop_requested``
-    (called at each read and write) returns a reason, it latches: torque goes off, ``tripped`` says
-    why, ``write`` raises; ``read`` goes on, for the log, and asks a few times more for a torque off
-    that was not confirmed. Only ``reset`` by an operator and a new ``enable`` let it move again.
-    Inside the context SIGTERM, SIGINT, SIGHUP, SIGQUIT and SIGTSTP unwind the program through the
-    exit, but for SIGHUP where it is ignored, as under nohup; if it is killed, the servos' bus
-    watchdog stops them.
+    It latches on a veto, on an error of the link below, on ``request_stop``, or when
+    ``stop_requested`` (called at each read and write) returns a reason. Then torque goes off,
+    ``tripped`` contains the reason, and ``write`` raises. ``read`` goes on, for the log, and
+    requests a few times more a torque off that was not confirmed. Only ``reset`` by an operator and
+    a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP, SIGQUIT and
+    SIGTSTP unwind the program through the exit, but for SIGHUP where it is ignored, as under nohup;
+    if it is killed, the servos' bus watchdog stops them.
 
-    With a ``recovery`` it does not latch at once when the line or a servo goes away: the chain
-    holds, and goes on from where it stands if the policy of the recovery allows it; the same with a
-    servo that an overload has shut down, slowly, if the recovery may reboot it.
+    With a ``recovery`` it does not latch at once when the line or a servo goes away. The chain
+    holds, and goes on from its current position if the policy of the recovery allows it. If the
+    recovery may reboot a servo that an overload has shut down, the same applies to that servo,
+    slowly.
 
     With a ``hold`` a trip with a valid state holds with low currents for a while before torque goes
-    off: after a joint that does not follow, and after ``request_stop(..., may_hold=True)``, which
-    the first Ctrl-C is then. ``is_holding`` is true meanwhile, and ``read`` ends it in time.
+    off. This applies after a joint that does not follow, and after
+    ``request_stop(..., may_hold=True)``, which is then the effect of the first Ctrl-C.
+    ``is_holding`` is true meanwhile, and ``read`` ends it in time.
 
     A ``stop_output`` is activated if torque off is not confirmed.
     """

@@ -4,9 +4,9 @@ A program that moves servos makes one and keeps it locked. The lock is gone when
 an unlocked file is not a button. It is mapped into memory, so that looking at it in every cycle
 costs no call of the system, and who presses it can never delay the run.
 
-Layout: a byte that is 1 once pressed, a byte that is 1 once the run has ended, the name of the
-person who pressed it and the end of the run (length and text each), and a description of the run as
-JSON. A text is written before its byte.
+Layout: a byte that is 1 once pressed, and a byte that is 1 once the run has ended. Then come the
+name of the person who pressed it and the end of the run (length and text each), and a description
+of the run as JSON. A text is written before its byte.
 """
 
 import getpass

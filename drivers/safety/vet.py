@@ -1,9 +1,9 @@
 """Vetting: a pure function that decides which command passes, below every source of motion.
 
 Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which makes the
-torque). States that no healthy run shows are vetoed: values that are not numbers, a joint forced
-beyond its limit, an alarm, lasting over-current, heat, a supply that is too high or too low for a
-while, a state that is too old.
+torque). States that no healthy run shows are vetoed. These are values that are not numbers, a
+joint forced beyond its limit, an alarm, lasting over-current, and heat. A supply that is too high
+or too low for a while and a state that is too old are vetoed as well.
 """
 
 import math

@@ -63,8 +63,9 @@ class GroupRead(ABC):
 
         Args:
             table: of the servos.
-            request: what the host expects.
-            data: (N, length) filled with what is read, unless the replies are irregular.
+            request: the request that the host expects.
+            data: (N, length) filled with the values that are read, unless the replies are
+                irregular.
             error: (N,) filled likewise.
 
         """

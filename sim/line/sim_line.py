@@ -153,8 +153,8 @@ class SimLine(Wire):
             limit_s: until when it is awaited.
 
         Returns:
-            What ``drivers.protocol.frames`` finds; ``IRREGULAR`` where ``read_until`` has what
-            arrives.
+            Result of ``drivers.protocol.frames``; ``IRREGULAR`` if ``read_until`` has to read the
+            bytes that arrive.
 
         """
         sent, read = self._sent, self._group.read_of(request.packet)

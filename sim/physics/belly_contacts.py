@@ -156,7 +156,7 @@ def write_contacts(
     Their frames get the normal alone: without friction nobody reads the rest.
 
     Args:
-        reals: room for all contacts, as numbers.
+        reals: space for all contacts, as numbers.
         at: where in a contact stand distance, place and normal, in words; begin
             and end of the words that stay as they are: contacts without friction do not use them.
         words: of ``BellyContacts``, and the two below.

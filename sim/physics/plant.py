@@ -24,7 +24,7 @@ from snakewalk.sim.plant import LinkMotion, ServoDrive
 
 FLOOR_STEP_S = 0.002
 FIELD_STEP_S = 0.001
-"""On hills a body creeps and falls from link to link: in 4 s of a wave the error is 1 to 3 % of the
+"""On hills a body creeps and falls from link to link. In 4 s of a wave the error is 1 to 3 % of the
 distance at 2 ms, and 0.1 to 2 % at 1 ms (``python -m benchmarks step_length``)."""
 
 

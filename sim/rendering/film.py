@@ -79,14 +79,14 @@ def render_film(
     """Write an MP4 (H.264 where PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,).
 
     Args:
-        robot: what was recorded.
+        robot: the recorded robot.
         world: where.
         ground: its height field, None if flat.
         time_s: increasing, s.
         qpos: ``MujocoPlant.qpos`` at these times; of a free look, (T, 7 L).
         path: of the film; its folder exists.
         style: how it is drawn.
-        marks: what is drawn on the ground.
+        marks: objects that are drawn on the ground.
         on_frame: called with (frames done, of) after each.
 
     Returns:

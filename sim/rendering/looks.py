@@ -25,7 +25,7 @@ TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
 AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
 REACHED: Rgba = (0.10, 0.62, 0.38, 1)
 HIDDEN: Rgba = (0.0, 0.0, 0.0, 0.0)
-"""Colour of what is not drawn."""
+"""Colour of hidden objects."""
 RING_PARTS = 32
 LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]

@@ -28,7 +28,7 @@ def add_shade(
     """Append one patch per link to a scene that was just updated and has enough free geoms.
 
     Args:
-        scene: what is about to be drawn.
+        scene: the scene that is drawn next.
         links_m: (L, 3) centres of the links.
         forward: (L, 3) their axes.
         robot: length and radius of the body.

@@ -74,7 +74,7 @@ class Cabling:
 
         Args:
             source_v: of the source without load.
-            source_ohm: of what all leads share.
+            source_ohm: resistance that all leads share.
             drawn_a: (S,) what each servo draws at 0 V, ampere, if it went on as its slope says.
             slope_s: (S,) how much more it draws for each volt, siemens; 0: as much at any voltage.
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.prose.findings import LONG, count
 from tests.prose.patterns import EXAMPLES, PATTERNS
-from tests.prose.texts import KINDS, page_paragraphs, sentences
+from tests.prose.texts import KINDS, docstring_paragraphs, page_paragraphs, sentences
 
 MOST = json.loads((Path(__file__).parent / "most_findings.json").read_text(encoding="utf-8"))
 """Findings that are left by kind and pattern. A count that falls is lowered here; none rises."""
@@ -38,4 +38,29 @@ def test_a_page_is_divided_into_its_sentences() -> None:
     page = "# A title\n\nOne. Two\nlines.\n\n```\nnot this\n```\n- item\n\n| a | b |\n| - | - |\n"
     assert [one for text in page_paragraphs(page) for one in sentences(text)] == [
         "A title", "One.", "Two lines.", "item", "a", "b",
+    ]  # fmt: skip
+
+
+def test_each_item_of_a_docstring_is_a_text() -> None:
+    docstring = """Summary.
+
+    Text of
+    two lines:
+    - an item
+      of two lines
+    - another
+
+        a = code
+
+    Args:
+        beside: folder of
+            the file.
+        low, high: limits.
+
+    Raises:
+        ConfigError: the file is missing.
+    """
+    assert list(docstring_paragraphs(docstring)) == [
+        "Summary.", "Text of two lines:", "an item of two lines", "another",
+        "folder of the file.", "limits.", "the file is missing.",
     ]  # fmt: skip

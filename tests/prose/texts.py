@@ -1,6 +1,7 @@
 """Sentences of pages, help texts, messages and docstrings."""
 
 import ast
+import inspect
 import io
 import re
 import tokenize
@@ -65,14 +66,36 @@ def sources() -> tuple[tuple[str, str, list[ast.AST]], ...]:
     )
 
 
+def docstring_paragraphs(text: str) -> Iterator[str]:
+    """Paragraphs and list items of a docstring, without code blocks and names of arguments."""
+    block: list[str] = []
+    section = None
+    for line in [*inspect.cleandoc(text).splitlines(), ""]:
+        indent = len(line) - len(line.lstrip())
+        heading = re.fullmatch(r"\s*(Args|Attributes|Raises|Returns|Yields):", line)
+        if heading:
+            section = indent + 4
+        elif line.strip() and section is not None and indent < section:
+            section = None
+        named = re.match(r"\s*[*\w.]+(?:, [*\w.]+)*: ", line) if indent == section else None
+        starts = named or re.match(r"\s*(?:[-*]|\d+\.) ", line)
+        if heading or starts or not line.strip():
+            if block:
+                yield " ".join(block)
+            block = []
+        is_code = indent >= 4 and section is None and not block and not starts
+        if line.strip() and not heading and not is_code:
+            block.append(line[starts.end() :].strip() if starts else line.strip())
+
+
 def docstrings() -> Iterator[tuple[str, str]]:
     """Place and paragraph of docstrings, strings below attributes, and comments."""
     for name, source, nodes in sources():
         for node in nodes:
             value = node.value if isinstance(node, ast.Expr) else None
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
-                for paragraph in re.split(r"\n\s*\n", value.value):
-                    yield f"{name}:{value.lineno}", " ".join(paragraph.split())
+                for paragraph in docstring_paragraphs(value.value):
+                    yield f"{name}:{value.lineno}", paragraph
         for token in tokenize.generate_tokens(io.StringIO(source).readline):
             if token.type == tokenize.COMMENT and "noqa" not in token.string:
                 yield f"{name}:{token.start[0]}", token.string.lstrip("#: ")

@@ -35,7 +35,7 @@ def render(
         motion: a recording to render; a scripted fish without one.
         build: carp or eel.
         length_px: body length.
-        frames: at most so many.
+        frames: the largest number of frames.
         side: also film from the side; a recording of midlines has no height and swims level.
         fins: length of the pectoral fins, body lengths; 0: folded away.
         seed: of patterns and noise.

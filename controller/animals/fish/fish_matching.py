@@ -72,7 +72,7 @@ def match_footage(
         background: picture of the scene without the fish, from above.
         side_background: the same from the side.
         build: carp or eel.
-        rate_hz: frames a second, instead of what the file says.
+        rate_hz: frames a second, instead of the rate in the file.
         length_m: of the body; without it the unit is the body length.
         on_progress: called with the frames done, and in all.
 

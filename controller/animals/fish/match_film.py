@@ -139,10 +139,10 @@ def track_film(
 ) -> Iterator[TrackedFrame]:
     """Match every frame.
 
-    A search starts from three postures: the last one moved on by the last step ([TH]: around the
-    prolongation of the head), the last one itself, and the silhouette's skeleton with its head at
-    the same end. The third one finds a fish that beats its tail fast. Where V falls below
-    ``LEAST_VALUE`` the head may be at either end again.
+    A search starts from three postures. They are the last one moved on by the last step ([TH]:
+    around the prolongation of the head), the last one itself, and the silhouette's skeleton with
+    its head at the same end. The third one finds a fish that beats its tail fast. Where V falls
+    below ``LEAST_VALUE`` the head may be at either end again.
 
     Args:
         frames: grey pictures and silhouettes.

@@ -86,7 +86,7 @@ class FishModel:
         return points
 
     def with_fins(self, length: float) -> Self:
-        """Return the same body with pectoral fins; it is no wider where they stand than beside."""
+        """Return the same body with pectoral fins; between their ends its width is interpolated."""
         first, last = (round(at * (STATIONS - 1)) for at in PECTORAL)
         wide = self.half_width.copy()
         if length > 0.0:

@@ -26,7 +26,7 @@ def pattern_search(
         start: (P,) where to begin.
         steps: (P,) first steps; 0 keeps a parameter as it is.
         halvings: how often the steps are halved when none of them helps.
-        evaluations: after so many no new round begins.
+        evaluations: after this number of evaluations no new round begins.
 
     Returns:
         The best parameters and their value, never less than at ``start``.

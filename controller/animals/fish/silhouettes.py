@@ -53,14 +53,15 @@ class FishFilm:
 def open_film(path: Path, background: Path | None = None, rate_hz: float | None = None) -> FishFilm:
     """Open a video or a folder of images.
 
-    Without a background the ground is found as of any animal (``make_detector``): the median of
-    frames where the fish swims about, and where it holds station that of frames in which it is
-    painted out, or what each frame shows around it.
+    Without a background the ground is found as for any animal (``make_detector``). If the fish
+    swims about, the ground is the median of the frames. If it holds station, the ground is the
+    median of frames in which the fish is painted out, or the surroundings of the fish in each
+    frame.
 
     Args:
         path: of the film.
         background: picture of the empty scene.
-        rate_hz: frames a second, instead of what the file says.
+        rate_hz: frames a second, instead of the rate in the file.
 
     Raises:
         InputError: nothing that can be read, or no ground on which a whole body is seen.
@@ -92,7 +93,7 @@ def silhouette_frame(
     """Cut the fish out of one frame; the mask is empty where nothing stands out.
 
     A tail fin seen on edge is thinner than the blur of the picture and has not half the body's
-    contrast: what is connected to the body at a lower threshold belongs to it.
+    contrast. So an area that is connected to the body at a lower threshold belongs to it.
 
     Args:
         image: (H, W) or (H, W, 3), 8 bit.

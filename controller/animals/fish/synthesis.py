@@ -80,7 +80,7 @@ def sequence_through(
     within a piece as well as at its end.
 
     Args:
-        pieces: what can be done.
+        pieces: the pieces that can be joined.
         points: (n, 2), or with heights (n, 3), in the recording's unit, from where the motion
             starts, x along the head.
         radius: how near is near enough.
@@ -247,8 +247,8 @@ def join(pieces: list[Floats], samples: int) -> Floats:
 
     Args:
         pieces: joint angles over time, two or more samples each.
-        samples: how long the difference takes to fade; what is left of it at the end of a shorter
-            piece is part of the difference there.
+        samples: number of samples over which the difference fades. If a piece is shorter, the rest
+            of the difference at its end is part of the difference there.
 
     Returns:
         (sum of T_k - 1, plus 1; K). The first piece is unchanged; so is everything if the pieces

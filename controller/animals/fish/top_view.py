@@ -151,7 +151,7 @@ def refine(
         picture: the blurred area of parameters (P,).
         target: the blurred silhouette.
         start: (P,) two positions in pixels, then angles in rad.
-        rounds: at most so many steps.
+        rounds: the largest number of steps.
         nudge: pixels of the frame per pixel of the canvas, for the derivative.
         stiffness: cost, per rad squared, of spine angles that alternate; a noisy outline shows
             little of them.

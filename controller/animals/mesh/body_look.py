@@ -53,8 +53,8 @@ def skin_look(look: str, header: Header) -> SkinLook:
     """Make the skin of a run's film.
 
     Args:
-        look: ``animal``, which is the run's own recording where it holds widths, else a
-            plain snake; or what ``body_skin`` takes.
+        look: ``animal``, which is the run's own recording if it contains widths, else a plain
+            snake; or a value that ``body_skin`` accepts.
         header: of the run.
 
     Raises:
@@ -75,7 +75,7 @@ def rig_look(rig: Rig, texture: Image | None, *, free: bool = True) -> SkinLook:
 
     Args:
         rig: its size is the motion's.
-        texture: what it wears; None is one colour.
+        texture: the texture of the skin; None is one colour.
         free: whether its bones float, for a motion that no robot makes.
 
     """

@@ -118,7 +118,7 @@ def body_model(
 
     Args:
         top: seen from above.
-        side: seen from the side, of the same body; None takes ``aspect``.
+        side: the same body seen from the side; None uses ``aspect``.
         aspect: height over width.
 
     Raises:

@@ -40,7 +40,8 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
         skin: at rest.
         source: a gait of ``SPINE_GAITS``; a log (``.mcap``, ``.mcap.part``, or a run's folder); or
             what ``load_track`` reads.
-        fps: frames a second, of those there are; None takes all of a recording and 25 of a log.
+        fps: frames a second, of the recorded ones; None uses all frames of a recording and 25 of a
+            log.
 
     Raises:
         InputError: the source cannot be used, or holds fewer than two frames.

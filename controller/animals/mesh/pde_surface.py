@@ -63,7 +63,7 @@ class PdeSurface:
 
         Args:
             curves_m: metres; of slopes, metres per unit of u.
-            modes: M of the series; None takes all, which leaves nothing for the remainder.
+            modes: M of the series; None uses all, which leaves nothing for the remainder.
             spread: a.
             at: (2N,) default: evenly from 0 to 1.
             slopes: (2N,) default: all places.

@@ -1,8 +1,8 @@
 """Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
 
 States are joined by distance, and a walk by ``deg / 2^v`` visits them. Coefficients between two are
-interpolated linearly: the angles ``A_c``. On land the angles of the head are handed down the body
-by a point a frame: ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``, with m
+interpolated linearly: the angles ``A_c``. On land the angles of the head pass down the body, one
+point a frame: ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``. Here m falls
 from 1 at the head to 0 behind. Correction: the text wants m "close to 1" at the head. It must be 1
 there, as nothing is in front of the head that the rest of it could come from.
 """
@@ -85,7 +85,7 @@ def graph_motion(
         segment_m: r, the body's length over N.
         dt_s: time between frames.
         until: ends the motion early.
-        on_state: told (frame, state) whenever another state is left.
+        on_state: called with (frame, state) whenever the motion enters another state.
 
     """
     state, body = next(shapes)

@@ -88,7 +88,7 @@ def film_over(
         file: the film, ends in .mp4.
         bones: the motion.
         look: the skin.
-        robot: what the camera frames: a body of the skin's length.
+        robot: the body that the camera frames; it has the skin's length.
         reached_s: when each waypoint was reached.
         paths: paths (P, 2) from a time on.
         title: in the picture.

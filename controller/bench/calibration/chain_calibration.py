@@ -156,7 +156,7 @@ def calibrate(
     Args:
         port: the line.
         like: a robot with the same axes and links; its IDs, signs and zeros do not matter.
-        observer: who sees the robot.
+        observer: the observer that sees the robot.
         name: of the robot that is found.
         latency_s: how long adapter and driver may hold bytes back.
         current_a: goal current of every servo.

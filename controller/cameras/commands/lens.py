@@ -115,7 +115,7 @@ def _from_files(
 def _from_device(
     name: str, size: str, board: CalibrationBoard, count: int
 ) -> tuple[list[BoardView | None], tuple[int, int]]:
-    """Take pictures one after another and report for each whether the board was found in it."""
+    """Record pictures one after another and report for each whether the board was found in it."""
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
         raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")

@@ -120,7 +120,7 @@ class SimulatedTags:
         self._coming: deque[TagPicture] = deque()
 
     def arrived(self, now_s: float) -> list[TagPicture]:
-        """Take a picture if one is due; return those that have arrived."""
+        """Record a picture if one is due; return those that have arrived."""
         if now_s >= self._next_s - 1e-9:
             head, joint_rad = self._body()
             picture: Image = self._drawn.picture(head, joint_rad)

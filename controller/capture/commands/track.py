@@ -1,4 +1,4 @@
-"""``snakewalk track``: what recordings are, and what of them a robot can do."""
+"""``snakewalk track``: properties of recordings, and the share of them that a robot can do."""
 
 import json
 from pathlib import Path

@@ -35,7 +35,7 @@ def draw_analysis(found: Analysis, file: Path) -> None:
     """Write one picture in the format of its ending.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending does not belong to a picture.
 
     """
     check_picture(file)

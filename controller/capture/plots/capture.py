@@ -1,4 +1,4 @@
-"""What was captured, to look at: a contact sheet, a film with the skeleton on it, single steps."""
+"""Pictures of a capture: a contact sheet, a film with the skeleton on it, single steps."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path

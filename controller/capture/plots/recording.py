@@ -19,7 +19,7 @@ def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
     """One row for each (recording, caption); written to ``file`` in the format of its ending.
 
     Raises:
-        InputError: an ending that is no picture's.
+        InputError: the ending does not belong to a picture.
 
     """
     check_picture(file)

@@ -16,7 +16,7 @@ _LEAST_AROUND_PX = 12.0
 _SOFTEN = 0.4  # working px, before pixels are left out
 _OWN_BLUR = 0.5  # working px: with that of going between pixels
 _WORKING_PX = 48.0  # length of the body while it is fitted, at most
-_REACH = 6.0  # working pixels beside the body that are fitted
+_REACH = 6.0  # working pixels on each side of the body that are fitted
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """One body for a whole film: length, widths, blur and shadow are the same in every frame.
 
 They are found together with the bends of a sample of frames by damped least squares on the grey
-values; the frames' own parameters are eliminated, so that the cost grows with the frames only
+values. The frames' own parameters are eliminated, so that the cost grows with the frames only
 linearly. With the body known, a frame fixes its place far better than its two blurred ends do.
 """
 
@@ -30,15 +30,15 @@ _LEARNING = 4  # rounds in which the noise is learnt
 _LEAST_NOISE2 = 1.0
 _LEVEL = 0.35  # prior standard deviation of the log of the mean width
 _EVEN = 0.3  # of second differences of the logs of the widths
-_TIP = (-0.55, 0.3)  # of the log of the width at a tip beside that before it: a round cap
+_TIP = (-0.55, 0.3)  # of the log of the width at a tip against that before it: a round cap
 _BLUR = 0.5  # of the log of the blur
 _STIFF = 1.0  # rad, of second differences of the bends
-_CONTRAST = 0.15  # of the contrast of one frame beside the film's
+_CONTRAST = 0.15  # of the contrast of one frame against the film's
 _DIRECTIONS = 8
 _AWAY = (0.5, 1.0, 1.8, 3.0)  # of the greatest half width
 _LOOKED_AT = 12  # frames
 _WORTH = 30.0  # by how much the fit must gain, in squares of the noise
-_UNSEEN = 1e-6  # of a parameter of which no pixel tells: an error of 1,000
+_UNSEEN = 1e-6  # of a parameter that no pixel shows: an error of 1,000
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class FilmBody:
-    """What all frames share."""
+    """Parameters that all frames share."""
 
     values: Floats
     """Length, log of the blur, log half widths; the shadow's four where there is one."""
@@ -135,7 +135,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
         cost = squares / noise2 + float(soft @ soft)
         if cost < best:
             done = best - cost < _SETTLED * cost
-            if turn < _LEARNING:  # what is residual is noise only near the end
+            if turn < _LEARNING:  # the residual is noise only near the end
                 noise2 = max(squares / seen, _LEAST_NOISE2)
                 cost = squares / noise2 + float(soft @ soft)
             best, kept, damp = cost, values, 0.3 * damp
@@ -158,7 +158,8 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
 
 def _correlation(residual: Floats, spot: float) -> float:
     """Variance of the blurred residual, over that of as much white noise; at least 1."""
-    # of white noise a Gaussian leaves 1 / (4 pi spot^2); less blur than that of a pixel is none
+    # of white noise a Gaussian leaves 1 / (4 pi spot^2); less blur than that of a pixel does not
+    # count
     spot = max(spot, 0.8)
     smooth = gaussian_filter(residual, spot, mode="constant")
     white = float((residual**2).mean()) / (4.0 * np.pi * spot * spot)
@@ -237,7 +238,7 @@ def film_body(
 
 
 def _solvable(normal: Floats) -> Floats:
-    """Normal equations that can be solved where no pixel tells of a parameter.
+    """Normal equations that can be solved even if no pixel shows a parameter.
 
     A body that a step took out of its patch moves nothing in it: it stays, with an error of 1,000.
     """
@@ -301,7 +302,7 @@ def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) 
         rows = np.concatenate([slopes, (patch.picture - shown)[None], shades]) * patch.use
         products = gram(rows.reshape(len(rows), -1))
         known = len(slopes)
-        # what the body itself could explain is taken away from the rest and from the shades
+        # subtract the part that the body itself could explain from the rest and from the shades
         own = products[:known, :known] + 1e-9 * np.trace(products[:known, :known]) * np.eye(known)
         others = products[known:, known:] - products[known:, :known] @ np.linalg.solve(
             own, products[:known, known:]

@@ -34,15 +34,15 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 ROUGH = 0.01
-"""Of the length: a frame of a larger expected error is ``ROUGH``."""
+"""Share of the length: a frame of a larger expected error is ``ROUGH``."""
 _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
 _FEWEST, _MOST = 8, 40
 _PASSES = 2
-_FORM = 0.004  # of the length: what the model of the tips may be wrong by
-_UNLIKE = 10.0  # times misfit and blur: error of what all frames share; measured on rendered films
+_FORM = 0.004  # of the length: possible error of the model of the tips
+_UNLIKE = 10.0  # times misfit and blur: error of the shared parameters; measured on rendered films
 _SHARP = 62.0  # times the blur: a longer body's medial axis is as good
 _LONG, _WIDE = 50.0, 2.4  # times the blur: so is that of a wide body, by length and half width
-_BY_BLUR = 0.6  # of the blur of all of the body, what its edges show: ``edge_blur_px``
+_BY_BLUR = 0.6  # of the blur of all of the body, the blur at its edges: ``edge_blur_px``
 _LOST = 2.0  # times the median noise: the picture shows something else
 _FOUND = 1.5  # the same for a frame that had no skeleton
 _ALIKE = 0.3  # of the usual contrast
@@ -78,7 +78,7 @@ def fit_film(
     Args:
         skeletons: (T) the same end first in all.
         crops: by frame.
-        margin: (T,) how surely the ends were told apart: ``identity.margins``.
+        margin: (T,) how surely the ends were distinguished: ``identity.margins``.
         expected_px: (T,) error of frames that are not fitted, NaN where it is not known.
         fixed: whether the ground stands still, so that its pattern is learnt from all frames.
 
@@ -176,8 +176,9 @@ def expected_error(fit: Fit, body: FilmBody) -> float:
 def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
     """How far the body's picture is from its model, of its contrast: median over the frames.
 
-    Noise is the same beside the body. What is stronger on the body and at its edge (a saturated
-    ground, the blocks of a JPEG, stains) shifts it alike in all frames, which no covariance shows.
+    Noise is the same on the body and around it. A stronger residual on the body and at its edge (a
+    saturated ground, the blocks of a JPEG, stains) shifts it alike in all frames, which no
+    covariance shows.
     """
     ribbon = Ribbon(body.grid)
     found = []
@@ -280,7 +281,7 @@ class FilmGround:
 
     @classmethod
     def of(cls, views: Mapping[int, View], fits: Mapping[int, Fit], body: FilmBody) -> "FilmGround":
-        """Take the mean residual where the body was not, over all frames that have a fit."""
+        """Compute the mean residual where the body was not, over all frames that have a fit."""
         firsts = np.array([views[k].first for k in fits])
         lasts = np.array([np.add(views[k].first, views[k].picture.shape[::-1]) for k in fits])
         low, high = firsts.min(axis=0), lasts.max(axis=0)
@@ -297,13 +298,14 @@ class FilmGround:
             window = (slice(y, y + shape[0]), slice(x, x + shape[1]))
             total[window] += free * (view.picture - shown)
             count[window] += free
-        # a place seen in few frames is weighted less; one never seen takes its surroundings
+        # a place seen in few frames is weighted less; one never seen gets the value of its
+        # surroundings
         around = gaussian_filter(total, 1.0) / (gaussian_filter(count, 1.0) + 1.0)
         pattern = (total + _PRIOR_FRAMES * around) / (count + _PRIOR_FRAMES)
         return cls(np.asarray(pattern), (int(low[0]), int(low[1])))
 
     def visible(self, view: View, fit: Fit, body: FilmBody) -> Floats:
-        """(h, w) the part of the pattern that a frame shows beside the body."""
+        """(h, w) the part of the pattern that a frame shows outside the body."""
         x, y = np.subtract(view.first, self.first)
         rows, columns = view.picture.shape
         cover = Ribbon(body.grid).cover(fit.frame, body.values, view.picture.shape)

@@ -2,7 +2,7 @@
 
 A ribbon of half width ``h(s)`` along a curve of fixed length is a few rows of Gaussian spots, so
 that bends, tips and width are blurred as a camera blurs them. Its shadow is a second, wider ribbon
-beside it that darkens the ground where the body does not cover it:
+that darkens the ground where the body does not cover it. The model is
 ``I = A c + K t (1 - c) + b``, with the covers ``c`` of the body and ``t`` of the shadow.
 """
 
@@ -26,7 +26,7 @@ FRAME = 2 + BENDS + 1 + GROUND
 BODY = 2 + len(STATIONS)
 """Parameters of a body without a shadow: length, log of the blur, log half widths."""
 SHADOW = 4
-"""Further ones of a shadow: contrast, x, y beside the body, log of its blur."""
+"""Further ones of a shadow: contrast, x, y relative to the body, log of its blur."""
 _APART = 1.2  # of the blur: distance of spots
 _ROWS = 7
 
@@ -77,7 +77,7 @@ def curve_slopes(frame: Floats, length: float, pieces: int = 40) -> Floats:
 
 
 class Ribbon:
-    """Pictures of one body; what depends on the grid alone is kept."""
+    """Pictures of one body; values that depend on the grid alone are kept."""
 
     def __init__(self, grid: Grid) -> None:
         n, m = grid.along, grid.across

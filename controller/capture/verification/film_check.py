@@ -26,7 +26,7 @@ _FAINT = 0.15  # of the usual contrast there: the body does not stand out
 _STRETCH = 5  # stations that are averaged
 _ONE_SIDE, _BOTH_SIDES = 25, 10  # stations of a stretch that does not stand out
 _KNOWN = 0.4  # of the stations: with fewer that show ground a side is not judged
-_BEYOND = 0.5  # of the contrast at a tip: what goes on beyond it is body
+_BEYOND = 0.5  # of the contrast at a tip: with more contrast beyond the tip the body goes on
 _LENGTH, _SPREADS = 0.08, 6.0  # of the usual length; standard deviations
 _FEWEST = 5
 _CONTRADICTS = 0.2  # margin of the ends from which one frame says which is which
@@ -35,7 +35,7 @@ _NEAR = 3  # frames, at most, between those whose ends are compared
 
 @dataclass(frozen=True, slots=True)
 class _Usual:
-    """What the film's bodies usually show."""
+    """Usual values of the film's bodies."""
 
     direction: Floats
     """(C,) how the channels are weighted: the body is above 0."""
@@ -76,8 +76,8 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
 def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
     """The skeletons, reversed where head and tail contradict the frame before for sure.
 
-    A body does not change its ends from one frame to the next. Of both directions the one of most
-    frames is kept.
+    A body does not change its ends from one frame to the next. The function keeps the direction
+    that most frames have.
     """
     used = [k for k, one in enumerate(skeletons) if one.status.has_points]
     sign = np.ones(len(skeletons), dtype=int)

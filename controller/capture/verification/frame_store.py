@@ -58,7 +58,7 @@ class FrameStore:
         self._end += len(data)
 
     def get(self, number: int) -> CutOut | None:
-        """The cut-out of a frame; None where there is none."""
+        """The cut-out of a frame; None for a frame without one."""
         place = self._places.get(number)
         if place is None:
             return None

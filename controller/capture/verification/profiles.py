@@ -12,19 +12,19 @@ from snakewalk.controller.capture.verification.frame_store import CutOut
 from snakewalk.controller.images.medial_axis import Skeleton
 
 _ON = 0.5  # of the half width on both sides of the line: the body
-_BESIDE_PX = 1.5  # beside the boundary and half of the half width: the ground begins
+_BESIDE_PX = 1.5  # off the boundary and half of the half width: the ground begins
 _ACROSS = 6  # samples of the ground on each side
 _OWN_PX = 2.0  # nearer to another part of the body than its half width and this: no ground
 _APART = 3.0  # half widths along the body from which a part is another one
 _RINGS = 6  # distances beyond a tip
 _RING_FROM, _RING_TO = (1.0, 1.5), (2.5, 3.0)  # widths and px from a tip
 _FAN = np.radians(np.linspace(-70.0, 70.0, 29))
-_AT_TIP = slice(5, 16)  # stations that tell a tip's width and contrast
+_AT_TIP = slice(5, 16)  # stations that show a tip's width and contrast
 
 
 @dataclass(frozen=True, slots=True)
 class BodyProfile:
-    """What a frame shows along a line; C channels, NaN where the frame shows no ground."""
+    """Values of a frame along a line; C channels, NaN where the frame shows no ground."""
 
     sides: Floats
     """(2, 101, C) ground minus body on each side."""
@@ -73,7 +73,7 @@ def _mean(seen: Floats) -> Floats:
 
 
 def _own(places: Floats, line: Floats, half: Floats) -> Floats:
-    """(P, A) whether places beside the line lie on another part of the same body."""
+    """(P, A) whether places next to the line lie on another part of the same body."""
     chord = float(np.hypot(*np.diff(line, axis=0).T).mean())
     away = max(2, int(np.ceil(_APART * float(half.max()) / max(chord, 1e-9))) + 4)
     square = ((places[:, :, None] - line[None, None]) ** 2).sum(axis=-1)

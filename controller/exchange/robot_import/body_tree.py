@@ -48,7 +48,7 @@ class Branch:
     """A chain of bodies that hangs on a link of the spine."""
 
     link: int
-    """Of the spine, 0 is the first body."""
+    """Number along the spine, 0 is the first body."""
     hinges: list[Hinge]
     groups: list[list[int]]
     """Bodies behind each hinge."""
@@ -80,8 +80,8 @@ def body_tree(model: mujoco.MjModel, data: mujoco.MjData, source: ModelSource) -
     """Find the spine of a model that stands at zero angles.
 
     Raises:
-        InputError: what moves is not one chain of hinges that is free in the world, with nothing
-            but pairs of legs and passive wheels at its sides.
+        InputError: the moving bodies are not one chain of hinges that is free in the world, with
+            nothing but pairs of legs and passive wheels at its sides.
 
     """
     if model.neq:
@@ -236,7 +236,7 @@ def _others(here: MovingBody, path: list[MovingBody]) -> list[MovingBody]:
 
 
 def _is_pair(children: list[MovingBody]) -> bool:
-    """Whether these are no bodies, or two chains with the same number of hinges."""
+    """Whether these are not bodies, or are two chains with the same number of hinges."""
     if not children:
         return True
     if len(children) != 2:

@@ -39,10 +39,10 @@ def chain_directions(
 
     Args:
         hinges: of the spine.
-        first_to_last_m: from the centre of mass of the first body to that of the last, which tells
-            the direction where all hinges are at one place.
+        first_to_last_m: from the centre of mass of the first body to that of the last; it shows the
+            direction if all hinges are at one place.
         reverse: the first body is the tail.
-        notes: what was changed is added.
+        notes: list to which each change is added.
 
     Raises:
         InputError: an axis lies along the body, or is neither parallel to its neighbour nor at a

@@ -15,7 +15,7 @@ from snakewalk.controller.exchange.robot_import.chain_directions import ROUNDED_
 from snakewalk.controller.exchange.robot_import.link_figures import LinkFigures
 
 _ASIDE: Final = 0.02
-"""Of a leg's reach that a joint may be off the straight leg (ours)."""
+"""Share of a leg's reach that a joint may be off the straight leg (ours)."""
 _MOST_JOINTS: Final = 4
 _MOST_RAD: Final = 3.05
 _FOOT_M: Final = 0.012
@@ -27,7 +27,7 @@ class LegPair:
     """One pair, with its joints left before right and hip before foot."""
 
     table: dict[str, object]
-    """Of ``[[limbs]]``."""
+    """Keys of ``[[limbs]]``."""
     hinges: list[Hinge]
     signs: list[int]
     limits_rad: list[float]
@@ -44,7 +44,7 @@ class _Leg:
     signs: list[int]
     limits_rad: list[float]
     ahead_m: float
-    """Of its link's middle."""
+    """Distance ahead of its link's middle."""
 
 
 def leg_pairs(

@@ -14,7 +14,7 @@ from snakewalk.controller.exchange.robot_import.chain_directions import ChainDir
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 
 _ASIDE: Final = 1e-3
-"""Of the body's length that a joint may be beside the line of the others (ours)."""
+"""Share of the body's length that a joint may be off the line of the others (ours)."""
 _SHORTEST_M: Final = 0.005
 """Length of a link that a robot file accepts."""
 _ALIKE: Final = 2e-3
@@ -37,7 +37,7 @@ class LinkFigures:
 
     length_m: float
     mass_kg: float
-    """0 for what lies between two hinges of one body."""
+    """0 for a link between two hinges of one body."""
     radius_m: float
     offset: float
     """Distance of the centre of mass from the middle over the length."""

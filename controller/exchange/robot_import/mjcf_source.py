@@ -22,7 +22,7 @@ _NOT_READ: Final = frozenset(
      "light", "camera", "texture", "material", "hfield", "skin", "extension"}
 )  # fmt: skip
 _SILENT: Final = frozenset({"option", "size", "visual", "statistic"})
-"""Of those, what says nothing of the robot."""
+"""Elements that do not describe the robot."""
 _OLD: Final = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
 """Attributes of older MuJoCo versions that this one does not know."""
 _FILES: Final = ("file",)

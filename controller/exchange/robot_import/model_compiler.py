@@ -21,7 +21,7 @@ from snakewalk.controller.exchange.robot_import.model_source import (
 from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
 
 _MOST_MEMORY_BYTES, _MOST_CPU_S = 2_000_000_000, 10
-"""Of MuJoCo's compiler and of xacro (ours)."""
+"""Limits of MuJoCo's compiler and of xacro: memory and CPU time (ours)."""
 _SAID: Final = 3
 _LIMITS: Final = """
 import sys
@@ -98,7 +98,7 @@ def _expanded(path: Path) -> str:
     """URDF of a xacro file, by the xacro that is installed.
 
     Raises:
-        InputError: there is none, or it cannot expand the file.
+        InputError: the program is missing, or cannot expand the file.
 
     """
     wait_s = 6.0 * _MOST_CPU_S

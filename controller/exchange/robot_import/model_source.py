@@ -41,7 +41,7 @@ class ModelSource:
 
     root: LineElement
     notes: list[str] = field(default_factory=list)
-    """What was dropped or changed."""
+    """Parts that were dropped or changed."""
     actuated: frozenset[str] | None = None
     """Names of joints with an actuator; None if the file lists no actuators."""
     stated_mass_kg: dict[str, float] | None = None
@@ -55,7 +55,8 @@ class ModelSource:
     speed_rad_s: dict[str, float] = field(default_factory=dict)
     """Speed limit that the file states, by joint."""
     friction: dict[str, float] | None = None
-    """Sliding friction by name of a moving body, where it is stated beside the links (URDF)."""
+    """Sliding friction by name of a moving body, if the model states it outside the links
+    (URDF)."""
 
     def text(self) -> tuple[str, list[str]]:
         """XML with one start tag in a line, and the user's place of each line."""

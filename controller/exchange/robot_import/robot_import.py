@@ -2,7 +2,7 @@
 
 MuJoCo reads the model. The joints' axes, order and ranges, and the links' lengths, masses and radii
 are taken from it. Links here are straight, have their joints on one line and their mass spread
-evenly about it: what a model has beyond that is rejected, or reported in a note. An anchor may lie
+evenly about it. Other properties of a model are rejected, or reported in a note. An anchor may lie
 anywhere along its own axis, which changes no motion: anchors are moved there to the line.
 """
 
@@ -43,14 +43,14 @@ from snakewalk.drivers.types import BodyPose
 _MOST_RAD: Final = 3.05
 """Half range of a joint that may turn for ever: a servo in position mode knows one turn."""
 _NEXT_TO_NOTHING_KG: Final = 2e-4
-"""Of what lies between two hinges of one body (ours): physics needs a mass."""
+"""Mass of a link between two hinges of one body (ours): physics needs a mass."""
 _POSES: Final = 20
 _TORQUE_N_M, _SPEED_RAD_S = (0.1, 100.0), (0.1, 20.0)
 """Beyond these, a stated limit is a placeholder (ours)."""
 _HELD_SHARE: Final = 2.0 / 2.3
-"""Of a servo's stall torque, up to which a run goes on: as of its current (ours)."""
+"""Share of a servo's stall torque, up to which a run goes on: as for its current (ours)."""
 _LENGTH_M, _MASS_KG, _RADIUS_M = (0.0, 1.0), (0.0001, 20.0), (0.002, 0.5)
-"""What a robot file accepts of a link."""
+"""Range that a robot file accepts for a link."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class ImportedRobot:
     joint_names: tuple[str, ...]
     """As the model has them, in the order of the servos' IDs."""
     notes: tuple[str, ...]
-    """What was dropped, changed or assumed."""
+    """Parts that were dropped, changed or assumed."""
     kinematics_error_m: float
     """Largest distance of a joint's axis from the model's, in random poses within the ranges."""
 
@@ -86,8 +86,8 @@ def import_robot(
         assumed: values that the model does not state.
 
     Raises:
-        InputError: it is no model, does not state what matters, or holds what a robot's file
-            cannot express.
+        InputError: the file is not a model, lacks a necessary value, or contains something that a
+            robot's file cannot express.
 
     """
     assumed = Assumptions() if assumed is None else assumed
@@ -247,7 +247,7 @@ def _limb_keys(pair: LegPair, scale: float) -> dict[str, object]:
 def _plan_limits(
     source: ModelSource, joints: set[str], servo_model: str, notes: list[str]
 ) -> dict[str, object]:
-    """Torque and speed that a plan may ask, of what the model states for its joints."""
+    """Torque and speed that a plan may use, from the limits of the model's joints."""
     keys: dict[str, object] = {}
     efforts = [value for name, value in source.effort_n_m.items() if name in joints]
     speeds = [value for name, value in source.speed_rad_s.items() if name in joints]
@@ -319,7 +319,7 @@ def _joints(
 
 
 def _sign(hinge: Hinge, yaw: bool, directions: ChainDirections, reverse: bool) -> int:
-    """1 where the model's angle counts as ours: what is behind turns about down, or to the left."""
+    """1 if the model's angle counts as ours: the part behind turns about down, or to the left."""
     side = -float(hinge.axis @ directions.up) if yaw else float(hinge.axis @ directions.left)
     return int(math.copysign(1.0, -side if reverse else side))
 

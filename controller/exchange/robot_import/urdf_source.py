@@ -121,7 +121,7 @@ def _first_link(source: ModelSource, path: Path) -> str:
     """Name of the link on which all hang; a ``world`` that only holds it is dropped.
 
     Raises:
-        InputError: there is none, there are several, or it is bolted to the world.
+        InputError: no link is the root, several are, or the root is bolted to the world.
 
     """
     root = source.root

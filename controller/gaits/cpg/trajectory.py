@@ -94,7 +94,7 @@ def trajectory(
 
     Args:
         t_s: (T,)
-        clock: (5,) the pattern's phase at time 0; its frequency's goal, what is left to that, slope
+        clock: (5,) the pattern's phase at time 0; its frequency's goal, the difference to it, slope
             and half gain.
         goal: (rows, J)
         left: (rows, J) to the goal.

@@ -35,7 +35,7 @@ Picture = Annotated[
     Path | None, typer.Option(help="draw the map with heights, holes and safe ground here")
 ]
 _LEAST, _MOST = 1e-6, 1e6
-"""Of lengths, m, and of factors: what is beyond is in another unit (ours)."""
+"""Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
 _UNITS = ("m", "cm", "mm", "km", "ft", "us-ft")
 _POINTS = ("lowest", "median", "highest")
 _AXES = ("z", "y", "x", "-z", "-y", "-x")
@@ -168,7 +168,7 @@ def _facts(read: "FileMap", options: "MapOptions", notes: list[str]) -> dict[str
 
 
 def _not_chosen(options: Mapping[str, tuple[str | None, Sequence[str]]]) -> list[str]:
-    """Faults of options whose value is none of their choices."""
+    """Faults of options whose value is not among their choices."""
     return [
         f"{option} {value}: is none of {', '.join(choices)}"
         for option, (value, choices) in options.items()
@@ -187,7 +187,7 @@ def _numbers_of(classes: str, faults: list[str]) -> tuple[int, ...]:
 def check_world_files(
     out: Path, picture: Path | None, sources: Sequence[Path], force: bool
 ) -> None:
-    """Refuse files that exist, endings that are none, and to write over what is read.
+    """Refuse files that exist, unknown endings, and to write over a file that is read.
 
     Raises:
         InputError: one line each.

@@ -1,4 +1,4 @@
-"""What the robot's IMU said: roll, pitch and heading of its link, and how fast it turned."""
+"""Readings of the robot's IMU: roll, pitch and heading of its link, and how fast it turned."""
 
 import numpy as np
 from matplotlib.figure import Figure

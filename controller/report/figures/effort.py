@@ -1,4 +1,4 @@
-"""What it cost the servos: current and torque, temperature, voltage."""
+"""Load of the servos: current and torque, temperature, voltage."""
 
 import numpy as np
 from matplotlib.axes import Axes

@@ -1,4 +1,4 @@
-"""Who was held back, and when: clamps, vetoes and unanswered reads by joint."""
+"""Interventions of the safety layer over time: clamps, vetoes and unanswered reads by joint."""
 
 import numpy as np
 from matplotlib.axes import Axes

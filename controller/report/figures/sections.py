@@ -1,4 +1,4 @@
-"""The figures of the page, in order, each with what to see in it."""
+"""The figures of the page, in order, each with a caption that says how to read it."""
 
 from collections.abc import Callable
 from typing import Final
@@ -20,7 +20,7 @@ from snakewalk.controller.report.page import Section
 from snakewalk.controller.runlog.record import RunRecord
 
 _IN_CURVES: Final = frozenset({"Speed and path", "Effort", "Time on the bus"})
-"""What the curves of the page show as well, to be zoomed."""
+"""Quantities that the curves of the page show as well, to be zoomed."""
 _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (
         "The way",
@@ -84,7 +84,7 @@ def drawn(record: RunRecord) -> tuple[list[Section], str]:
 
 
 def sections(record: RunRecord) -> list[Section]:
-    """Draw what the log has something for; what the curves have as well is folded."""
+    """Draw the figures for which the log has data; those in the curves as well are folded."""
     with style():
         drawn = [(title, caption, draw(record)) for title, caption, draw in _ALL]
         return [

@@ -28,7 +28,7 @@ FACTS: Final = (
 
 
 class PoseCheckPage:
-    """Shows poses in a page that takes the rows of a log; use it in a ``with``.
+    """Shows poses in a page that accepts the rows of a log; use it in a ``with``.
 
     The joint angles are unknown before torque, so the body is straight.
     """

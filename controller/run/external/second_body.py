@@ -1,4 +1,4 @@
-"""The second body of a run: in this process beside a simulated robot, in a worker for a port."""
+"""The second body of a run: in this process next to a simulated robot, in a worker for a port."""
 
 from collections.abc import Callable
 from contextlib import ExitStack

@@ -129,8 +129,8 @@ class FrictionLog:
         """Return what a simulated robot would have logged.
 
         Args:
-            goals: what is sent.
-            deviation: in what the robot differs from its file and its world.
+            goals: the goals that are sent.
+            deviation: differences of the robot from its file and its world.
             seen: makes of its links (T, L, 3) what is measured of them.
 
         """
@@ -247,7 +247,7 @@ def fit_friction(
         logs: of one robot.
         mass: whether to find the mass of its links as well.
         workers: processes that simulate.
-        on_progress: takes simulations done, and of how many.
+        on_progress: called with the number of simulations done, and of all.
 
     Raises:
         InputError: the mass is requested, and a log does not allow it.

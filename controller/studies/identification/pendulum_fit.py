@@ -86,11 +86,11 @@ def fit_pendulum(
 
     Args:
         logs: of one servo.
-        start: constants to begin with; by default the middle of what such servos have.
+        start: constants to begin with; by default the middle of the usual range of such servos.
         seed: of the starts and steps.
         starts: fits from constants drawn around the start.
         hops: fits from constants drawn around the best ones.
-        on_progress: takes the number of fits done, and of all.
+        on_progress: called with the number of fits done, and of all.
 
     """
     rng = np.random.default_rng(seed)

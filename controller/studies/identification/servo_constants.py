@@ -1,12 +1,13 @@
 """Results of the identification of a servo, with name, BAM name, range and unit; BAM's JSON.
 
-BAM ("Better Actuator Models", Rhoban) writes the constants of a servo with a friction of this form:
-the greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``, and while the shaft
-is slow ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|`` more, times
-``exp(-(|w| / stribeck_rad_s)^exponent)``; ``viscous w`` beside it. Where motor and load strive
-against each other, the slow share has a square as well: ``by_load_square t_load^2`` while the motor
-is the stronger, ``by_motor_square t_motor^2`` while the load is. (Duclusaud et al., "Extended
-Friction Models for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to M6.)
+BAM ("Better Actuator Models", Rhoban) writes the constants of a servo with a friction of this form.
+The greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``. While the shaft is
+slow it is ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|`` more, times
+``exp(-(|w| / stribeck_rad_s)^exponent)``. The term ``viscous w`` is added. Where motor and load
+strive against each other, the slow share has a square as well: ``by_load_square t_load^2`` while
+the motor is the stronger, ``by_motor_square t_motor^2`` while the load is. (Duclusaud et al.,
+"Extended Friction Models for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to
+M6.)
 """
 
 import json
@@ -64,7 +65,8 @@ CONSTANTS: Final = (
     Constant("by_load_square", "load_friction_external_quad", 0.0, 1.0, 0.0, 0.0),
 )
 """``p_unit_per_rad`` is the share of the supply that a radian of error gets for each unit of the P
-gain; ``offset_rad`` and ``delay_s`` are the bench's: of its zero, and until a goal takes effect."""
+gain. ``offset_rad`` and ``delay_s`` are the bench's: the offset of its zero, and the delay until a
+goal has an effect."""
 NAMES: Final = tuple(constant.name for constant in CONSTANTS)
 LOW: Final = np.array([constant.low for constant in CONSTANTS])
 HIGH: Final = np.array([constant.high for constant in CONSTANTS])

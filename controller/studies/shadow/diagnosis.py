@@ -323,9 +323,9 @@ class Signatures:
     """How the answers to some goals change with each thing that may be wrong.
 
     Args:
-        goals: what was sent.
+        goals: the goals that were sent.
         workers: processes that simulate.
-        on_progress: takes simulations done, and of how many.
+        on_progress: called with the number of simulations done, and of all.
 
     """
 

@@ -23,7 +23,7 @@ class Shadow:
         world: the ground that it is believed to be on.
         ground: the world's height field, where it has one.
         initial_pose: heading of the head link, and the joint angles to begin with.
-        deviation: in what it differs.
+        deviation: differences of the simulated robot and its ground.
 
     """
 

@@ -93,7 +93,7 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
 
 
 def _unpacked_mat(data: bytes) -> int:
-    """Bytes that a MATLAB file takes unpacked; variables are packed one by one."""
+    """Size of a MATLAB file's unpacked content in bytes; variables are packed one by one."""
     order = "<" if data[126:128] == b"IM" else ">"
     at, size = _MAT_HEAD, 0
     while at + 8 <= len(data):
@@ -108,7 +108,7 @@ def _unpacked_mat(data: bytes) -> int:
 
 
 def _unpacked(packed: memoryview) -> int:
-    """Bytes that a zlib stream takes unpacked, counted piece by piece; stops where it is broken."""
+    """Unpacked bytes of a zlib stream, counted piece by piece; stops where it is broken."""
     stream, size = zlib.decompressobj(), 0
     rest: bytes | memoryview = packed
     try:
@@ -129,11 +129,11 @@ def track_from_arrays(
 ) -> Track:
     """Make a track of named arrays, as .npz and .mat hold them.
 
-    ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P), in metres where ``length_m`` is
-    a number; ``angles_rad`` are the (T, P) directions of equally long pieces, and ``length_m`` is
-    then the body's length. Frames a second are ``rate_hz``, or ``time_s`` or ``t`` in seconds
-    say when each frame was taken, evenly or not. ``score`` (T, P)
-    is how sure the tracker was. ``skeletons`` are pixels, rows downwards.
+    ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P), in metres if ``length_m`` is a
+    number. ``angles_rad`` are the (T, P) directions of equally long pieces, and ``length_m`` is
+    then the body's length. Frames a second are ``rate_hz``, or ``time_s`` or ``t`` in seconds say
+    when each frame was taken, evenly or not. ``score`` (T, P) is how sure the tracker was.
+    ``skeletons`` are pixels, rows downwards.
     """
     time_s = None if rate_hz is not None else _times(file, held)
     given = rate_hz

@@ -13,12 +13,12 @@ KNOWN = (
     "an .npy of joint angles (frames, joints). Or markers: QTM's TSV, Vicon's CSV, a TRC or a C3D. "
     "Or a BVH skeleton"
 )
-"""What a file of a recording may be, for faults and help."""
+"""Supported files of a recording, for faults and help."""
 
 Format = Literal[
     "zip", "npy", "hdf5", "mat", "json", "csv", "qtm", "c3d", "trc", "bvh", "empty", "binary"
 ]
-"""``zip`` is an .npz or a zipped WCON; ``binary`` and ``empty`` are no recordings."""
+"""``zip`` is an .npz or a zipped WCON; ``binary`` and ``empty`` cannot be recordings."""
 
 HEAD_BYTES = 128
 """First bytes of a file that ``format_of`` needs."""

@@ -1,8 +1,8 @@
 """Shipped recordings: tracks made by formula from figures of real animals (``config/recordings``).
 
-What the head does at a moment runs down the body at pulse speed, scaled by the envelope measured on
-the animal: ``theta(s, t) = a(s) g(tau) sin(phase(tau)) + heading(tau)``, ``tau = t - s / pulse``.
-Same figures, same numbers: nothing is random.
+The motion of the head at a moment runs down the body at pulse speed, scaled by the envelope
+measured on the animal. The angle is ``theta(s, t) = a(s) g(tau) sin(phase(tau)) + heading(tau)``,
+``tau = t - s / pulse``. Same figures, same numbers: nothing is random.
 """
 
 import numpy as np
@@ -50,7 +50,7 @@ def embedded(name: str) -> Track:
     """Make a shipped recording by name.
 
     Raises:
-        ConfigError: there is none of that name.
+        ConfigError: the name is unknown.
 
     """
     return generate(load(locate("recordings", name), RecordingConfig))

@@ -20,21 +20,21 @@ KEYPOINT_RATE_HZ = 30.0
 """Default where a file of keypoints holds no frame rate."""
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 """Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
-_MISSING = 0.25  # of the keypoints, at least one: so many may be missing in a frame
+_MISSING = 0.25  # of the keypoints, at least one: this share may be missing in a frame
 FEWEST = 4  # points that a curve goes through
-_ZIGZAG = 1.5  # from which the order is none of a body
+_ZIGZAG = 1.5  # from which the order cannot be a body's
 _TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What of a file is taken: the options ``--individual``, ``--keypoints`` and ``--plane``."""
+    """Used part of a file: the options ``--individual``, ``--keypoints`` and ``--plane``."""
 
     individual: str | None = None
     keypoints: tuple[str, ...] | None = None
     """Names along the midline, head first; None: all, in the order of the file."""
     plane: str | None = None
-    """Of ``PLANES``; for markers in space. None is xy."""
+    """One of ``PLANES``; for markers in space. None is xy."""
 
     def only(self, file: Path, kind: str, *allowed: str) -> None:
         """Refuse what a file of this kind does not have.
@@ -151,7 +151,7 @@ class Keypoints:
             raise InputError(f"{file}: holds no scores to compare with a least score of {least}")
         if self.scores is not None:
             scores = self.scores[:, order]
-            unsure = scores < least  # NaN is no score: points set by hand have none
+            unsure = scores < least  # NaN means no score: points set by hand have none
             bad = int(unsure.any(axis=1).sum())
             if least > 0.0 and bad > len(unsure) - 2:
                 worst = np.nanmedian(scores, axis=0)
@@ -174,7 +174,7 @@ class Keypoints:
         """Make a track of those along the midline; an unknown rate is assumed, and marked as such.
 
         Raises:
-            InputError: as of ``sure``, no such keypoint, or an order that is none of a body.
+            InputError: as of ``sure``, an unknown keypoint, or an order that cannot be a body's.
 
         """
         places = self.sure(choice.order(self.file, self.nodes))

@@ -24,7 +24,7 @@ def check_rate(rate_hz: float | None, names: Sequence[str]) -> None:
     """Check an option ``--rate`` that is given for the files among ``names``.
 
     Raises:
-        InputError: it is no rate, or none of the names is a file.
+        InputError: it is not a rate, or none of the names is a file.
 
     """
     if rate_hz is None:
@@ -46,7 +46,7 @@ def load_track(
     Args:
         name_or_path: a name of ``EMBEDDED``; or figures in a ``.toml`` (``RecordingConfig``); or a
             file of one of the formats of ``formats.KNOWN``.
-        rate_hz: frames a second of a file, taken instead of what it (or its format) says.
+        rate_hz: frames a second of a file, used instead of the rate that it (or its format) states.
         least_score: keypoints of a file whose score is below it count as missing.
         choice: which animal, keypoints and plane of a file that has several.
 
@@ -86,7 +86,7 @@ def load_file(
 
     Args:
         path: of the file.
-        rate_hz: frames a second, taken instead of what the file (or its format) says.
+        rate_hz: frames a second, used instead of the rate that the file (or its format) states.
         least_score: keypoints whose score is below it count as missing; default 0, and for
             DeepLabCut its own 0.6.
         choice: which animal, keypoints and plane, where there are several.
@@ -105,7 +105,7 @@ def load_keypoints(
     least_score: float | None = None,
     choice: Choice = ALL,
 ) -> Keypoints:
-    """Load all keypoints of one animal, those beside its midline as well; see ``load_file``.
+    """Load all keypoints of one animal, also those off its midline; see ``load_file``.
 
     Raises:
         InputError: as of ``load_file``, or the file holds midlines.

@@ -1,9 +1,9 @@
 """Marker trajectories as tables: Vicon's CSV and OpenSim's TRC.
 
-Vicon Nexus writes blocks; that of the markers begins with ``Trajectories`` and the frame rate, then
-lines of marker names, of column names (Frame, Sub Frame, X, Y, Z, ...) and of units, then rows up
-to an empty line. A TRC has two lines of names and values (``DataRate``, ``Units``, ...), lines of
-marker and column names, then rows of frame, time and places.
+Vicon Nexus writes blocks. The block of the markers begins with ``Trajectories`` and the frame rate.
+Then come lines of marker names, of column names (Frame, Sub Frame, X, Y, Z, ...) and of units, then
+rows up to an empty line. A TRC has two lines of names and values (``DataRate``, ``Units``, ...),
+lines of marker and column names, then rows of frame, time and places.
 """
 
 import csv

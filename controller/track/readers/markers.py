@@ -1,9 +1,9 @@
 """Markers in space, as motion capture has them, projected onto a plane: QTM's TSV, and C3D.
 
-A TSV begins with lines of a name and its values (``FREQUENCY``, ``MARKER_NAMES``, ...), a line of
-column names may follow, then rows of x, y, z of each marker, mm; some exports begin rows with frame
-and time. 0, 0, 0 and nothing are missing. C3D is read by ezc3d. ``marker_tables`` reads Vicon's CSV
-and OpenSim's TRC.
+A TSV begins with lines of a name and its values (``FREQUENCY``, ``MARKER_NAMES``, ...). A line of
+column names may follow, then rows of x, y, z of each marker, mm. Some exports begin rows with frame
+and time. The values 0, 0, 0 and an empty cell mean a missing marker. C3D is read by ezc3d.
+``marker_tables`` reads Vicon's CSV and OpenSim's TRC.
 """
 
 import csv

@@ -67,7 +67,7 @@ def load_table(
 
 
 def _one_a_frame(file: Path, frame: Floats, scores: Floats | None) -> Ints:
-    """Indices of rows, by frame: what was set by hand, without scores, replaces the prediction."""
+    """Indices of rows, by frame: a row set by hand, without scores, replaces the prediction."""
     by_hand = np.zeros(len(frame), bool)
     if scores is not None:
         by_hand[:] = np.isnan(scores).all(axis=1)
@@ -133,7 +133,7 @@ def _stated_rate(held: Any) -> float | None:
 
 
 def _stated(held: Any, name: str) -> Any:
-    """What an attribute says as JSON; None where it is not there or no JSON."""
+    """Content of an attribute as JSON; None if it is missing or cannot be parsed."""
     try:
         return parse_json(_text(held.attrs[name]))
     except (KeyError, ValueError):
@@ -194,7 +194,7 @@ def load_project(
                 else f"{file}: {mine} is twice in frame {at}; correct it in SLEAP"
             )
         if taken[at] and predicted:
-            continue  # what was set by hand replaces the prediction
+            continue  # a row set by hand replaces the prediction
         taken[at], by_hand[at] = True, not predicted
         hidden = ~np.asarray(rows["visible"], dtype=bool)
         places[at] = np.column_stack([rows["x"], rows["y"]]) + shift

@@ -1,8 +1,9 @@
 """WCON, the worm trackers' JSON: midlines with their units, one or more records of an animal.
 
-As the format's text has it: ``units`` of t, x, y; ``data`` is one record or a list of them, each
-with an ``id``, one or more times ``t`` and as many lists ``x`` and ``y``; ``head`` "L" is the first
-point and "R" the last; ``ox, oy`` (else ``cx, cy``) is added to the points; null is missing.
+The format's text defines: ``units`` of t, x, y; ``data`` is one record or a list of them, each with
+an ``id``, one or more times ``t`` and as many lists ``x`` and ``y``. The ``head`` "L" is the first
+point and "R" the last. The value of ``ox, oy`` (else ``cx, cy``) is added to the points; null is
+missing.
 """
 
 import math
