@@ -1,6 +1,6 @@
 """Compile every loop in advance: two child processes share the packages.
 
-A module is imported to compile its loops; numba stores the machine code beside the module.
+A module is imported to compile its loops; numba stores the machine code next to the module.
 """
 
 import importlib
