@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 
-.PHONY: setup lock loops fallbacks run test lint types unit docs bench campaign failures clean
+.PHONY: setup lock loops fallbacks run test lint types unit docs bench campaign lerobot failures clean
 
 setup: $(STAMP)
 
@@ -22,7 +22,7 @@ lock: setup
 
 # The loops are compiled once, by two processes, before many would compile them each for itself.
 loops: setup
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python .ci/loops
+	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk compile
 
 run: loops
 	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk run
@@ -57,6 +57,12 @@ bench: setup
 
 campaign: setup
 	$(BIN)/python -m tests.campaign
+
+# make lerobot   teleoperate, record and replay with the real LeRobot, in an environment of its own (several GB)
+LEROBOT_VENV ?= .venv-lerobot
+
+lerobot:
+	.ci/lerobot $(PY) $(LEROBOT_VENV)
 
 # make failures  where the walk still fails and why: maps over grounds, frictions and robots (hours; SEEDS=1
 # is a first look; docs/failures.md). A stopped one goes on where it was; FAILURES is where the tables are.

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from snakewalk.drivers.compilation import report_compiled
 from snakewalk.drivers.fallbacks import is_forced, report_fallback
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -62,6 +63,9 @@ def compiled(
         made: F = numba.njit(signature, nogil=nogil, error_model=model, cache=cached, **options)(
             function
         )
+        stats = getattr(made, "stats", None)
+        if cached and stats is not None and stats.cache_misses:
+            report_compiled(f"{function.__module__}.{function.__name__}")
         return made
 
     return decorate

@@ -12,6 +12,7 @@ PLUGINS = (
     ("command", "bus set", "Change settings of one servo that persist without power; shows them and asks first.", "snakewalk.controller.bench.commands.bus_set:bus_set", ""),
     ("command", "bus sniff", "Decode a live or recorded exchange packet by packet.", "snakewalk.controller.bench.commands.bus_sniff:sniff", ""),
     ("command", "calibrate", "Move one servo at a time weakly, ask which joint moved, and write the robot's file.", "snakewalk.controller.bench.commands.calibrate:calibrate", "The bus"),
+    ("command", "compile", "Compile all loops once, after installation, so that no later command waits for it.", "snakewalk.controller.bench.commands.compile_all:compile_all", "The job"),
     ("command", "doctor", "Examine adapter, bus and servos; list every fault with its remedy.", "snakewalk.controller.bench.commands.doctor:doctor", "The bus"),
     ("command", "robot power", "Compute the voltage of each servo under a load, and where to inject power.", "snakewalk.controller.bench.commands.cable_drop:power", ""),
     ("command", "scan", "List the servos on a bus, at every baud rate; changes nothing.", "snakewalk.controller.bench.commands.scan:scan", "The bus"),

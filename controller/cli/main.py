@@ -10,7 +10,9 @@ from types import FrameType
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.config.plain_text import plain
+from snakewalk.controller.cli.compilation_notice import CompilationNotice
 from snakewalk.controller.console.safe_path import make_path_safe
+from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.errors import DriverError, PortError
 
 _ENDING = tuple(
@@ -57,6 +59,7 @@ def main() -> None:
         from snakewalk.controller.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
         _tell_of_pipes()
+        observe_compilation(CompilationNotice(_print_line))
         app(prog_name="snakewalk")
     except PortError as error:
         began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished

@@ -41,7 +41,10 @@ ORDER: Final = {
 }
 """All packages, from the bottom up."""
 VOCABULARY: Final = frozenset(
-    {"types", "clock", "errors", "link", "compiling", "fallbacks", "least_squares", "attitude"}
+    {
+        *("types", "clock", "errors", "link", "compiling", "compilation", "fallbacks"),
+        *("least_squares", "attitude"),
+    }
 )
 """Modules of the drivers that every core package may import."""
 JOINING: Final = frozenset({"run", *FEATURES})

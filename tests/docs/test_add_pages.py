@@ -97,7 +97,7 @@ def test_a_page_touches_as_many_files_as_it_says(name: str, count: int) -> None:
     touched = {path for path in steps.touched if "/" in path}
     touched |= {"docs/export.md"} if "`docs/export.md`" in steps.text else set()
     assert len(touched) == count
-    assert f"\n{count} file" in steps.text.partition("\n## Files\n")[2]
+    assert f"{count} file" in steps.text.partition("\n## Files\n")[2]
 
 
 def test_a_gait_is_found_shown_and_run(extended: Extended) -> None:

@@ -101,7 +101,7 @@ ROWS = [
     ("trials flat-slalom --robot nosuch --seeds 1", "nosuch: no such robot"),
     (
         "run flat-square --live",
-        "--live: waypoints come from the page or from ROS; add --view or --ros",
+        "--live: waypoints come from the page or from ROS; add",
     ),
     ("run flat-square --set run.seed", "--set run.seed: expected KEY=VALUE"),
     ("run flat-square --set run.seed=-1", "run flat-square: seed: "),

@@ -1,0 +1,23 @@
+"""``snakewalk compile``: compile all loops in advance."""
+
+import importlib.util
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.loop_compiler import compile_loops
+from snakewalk.controller.console.options import Json, show
+from snakewalk.controller.console.progress import ProgressBar
+
+
+@command("compile", group=JOB, examples=("compile", "compile --json"))
+def compile_all(as_json: Json = False) -> None:
+    """Compile all loops once, after installation, so that no later command waits for it."""
+    if importlib.util.find_spec("numba") is None:
+        raise InputError("compile: numba is not installed, and loops run uncompiled")
+    with ProgressBar("compiling loops") as bar:
+
+        def on_module(done: int, total: int, name: str) -> None:
+            bar.update(done, total, note=name.rpartition(".")[2])
+
+        count = compile_loops(on_module)
+    show({"compiled_loops": count}, as_json)

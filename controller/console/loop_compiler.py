@@ -1,0 +1,118 @@
+"""Compile every loop in advance: two child processes share the packages.
+
+A module is imported to compile its loops; numba stores the machine code next to the module.
+"""
+
+import importlib
+import importlib.util
+import pkgutil
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.console.child_process import child_environ
+from snakewalk.drivers.compilation import observe_compilation
+
+_SHARES: Final = (("drivers", "sim"), ("controller",))
+"""Packages of each child: they compile about equally long, and no loop of both."""
+_COMPILED: Final = "snakewalk.drivers.compiling"
+"""A module with a loop imports its decorator from here."""
+
+
+def loop_modules(package: str) -> list[str]:
+    """Return the names of the modules of a package that have a loop; none is imported."""
+    found: list[str] = []
+    folder = Path(__file__).resolve().parents[2]
+    for part in package.split(".")[1:]:
+        folder /= part
+    for each in pkgutil.iter_modules([str(folder)], f"{package}."):
+        if each.ispkg:
+            found += loop_modules(each.name)
+            continue
+        file = folder / f"{each.name.rpartition('.')[2]}.py"
+        if file.exists() and f"from {_COMPILED} import" in file.read_text(encoding="utf-8"):
+            found.append(each.name)
+    return found
+
+
+def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
+    """Compile all loops and return the number that the cache did not contain.
+
+    Args:
+        on_module: called with the number of modules that are done, their total, and a name.
+
+    Raises:
+        RuntimeError: a child failed; its output is above.
+
+    """
+    total = sum(len(loop_modules(f"snakewalk.{each}")) for share in _SHARES for each in share)
+    lock, done, compiled = threading.Lock(), 0, 0
+    children = [
+        subprocess.Popen(
+            [sys.executable, "-m", __name__, *share],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=child_environ(),
+        )
+        for share in _SHARES
+    ]
+
+    def follow(child: "subprocess.Popen[str]") -> None:
+        nonlocal done, compiled
+        assert child.stdout is not None
+        for line in child.stdout:
+            kind, _, name = line.strip().partition(" ")
+            with lock:
+                compiled += kind == "loop"
+                done += kind == "module"
+                on_module(min(done, total), total, name)
+
+    threads = [threading.Thread(target=follow, args=(child,), daemon=True) for child in children]
+    for thread in threads:
+        thread.start()
+    try:
+        codes = [child.wait() for child in children]
+        for thread in threads:
+            thread.join()
+    finally:
+        for child in children:
+            child.kill()
+    if any(codes):
+        raise RuntimeError("a loop was not compiled; the reason is above")
+    return compiled
+
+
+def _step_a_body() -> None:
+    """Compile the steps of the physics, whose types are MuJoCo's, by a first call."""
+    if importlib.util.find_spec("mujoco") is None:
+        return
+    plant = importlib.import_module("snakewalk.sim.physics.plant")
+    motor = importlib.import_module("snakewalk.sim.servo.motor")
+    robot = load_robot("yaw16")
+    body = plant.MujocoPlant(robot, load_world("flat"), None, 0.002)
+    drive = motor.make_drive([motor.MOTORS[model] for model in robot.servo_models], 12.0)
+    body.advance(0.002, drive)
+
+
+def _compile_share(packages: list[str]) -> None:
+    """Run in a child: import the modules, and print a line for each module and compiled loop."""
+    observe_compilation(lambda loop: print("loop", loop, flush=True))
+    for package in packages:
+        for name in loop_modules(f"snakewalk.{package}"):
+            try:
+                importlib.import_module(name)
+            except ModuleNotFoundError as error:
+                if (error.name or "").startswith("snakewalk"):
+                    raise
+                # a package of an extra is not installed; its commands are not available either
+            print("module", name, flush=True)
+    if "sim" in packages:
+        _step_a_body()
+
+
+if __name__ == "__main__":
+    _compile_share(sys.argv[1:])

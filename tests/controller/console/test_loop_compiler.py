@@ -1,0 +1,80 @@
+"""All loops are found and compiled in advance; a command that compiles reports it."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from snakewalk.controller.cli.compilation_notice import CompilationNotice
+from snakewalk.controller.console.loop_compiler import compile_loops, loop_modules
+from snakewalk.drivers.compilation import observe_compilation, report_compiled
+
+ROOT = Path(__file__).resolve().parents[3]
+PROGRAM = """
+from snakewalk.drivers.compilation import observe_compilation
+observe_compilation(print)
+from snakewalk.drivers.compiling import compiled
+
+@compiled("float64(float64)", makes_arrays=True)
+def doubled(value):
+    return 2.0 * value
+"""
+
+
+def test_every_module_with_a_loop_is_found() -> None:
+    written = {
+        "snakewalk." + ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        for top in ("drivers", "sim", "controller")
+        for file in (ROOT / top).rglob("*.py")
+        if any(
+            line.startswith("from snakewalk.drivers.compiling import")
+            for line in file.read_text(encoding="utf-8").splitlines()
+        )
+    }
+    found = [
+        name
+        for top in ("drivers", "sim", "controller")
+        for name in loop_modules(f"snakewalk.{top}")
+    ]
+    assert len(found) > 40
+    assert sorted(found) == sorted(written)
+
+
+def test_a_failed_child_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    with pytest.raises(RuntimeError, match="not compiled"):
+        compile_loops(lambda done, total, name: None)
+
+
+@pytest.mark.parametrize("runs", [2])
+def test_only_a_loop_that_is_not_cached_is_reported(tmp_path: Path, runs: int) -> None:
+    """The first process compiles; the second one uses the cache and reports nothing."""
+    file = tmp_path / "loop.py"
+    file.write_text(PROGRAM)
+    environ = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"), PYTHONPATH=str(tmp_path))
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", "import loop"],
+            env=environ, check=True, capture_output=True, text=True,
+        ).stdout.split()
+        for _ in range(runs)
+    ]  # fmt: skip
+    assert "loop.doubled" in outputs[0]
+    assert outputs[1] == []
+
+
+def test_the_notice_is_one_line_and_then_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines: list[str] = []
+    notice = CompilationNotice(lines.append)
+    times = iter([0.0, 1.0, 4.0, 4.5, 9.0])
+    monkeypatch.setattr(notice._clock, "now_s", lambda: next(times))
+    remove = observe_compilation(notice)
+    for name in "abcde":
+        report_compiled(name)
+    remove()
+    report_compiled("f")
+    assert "snakewalk compile" in lines[0]
+    assert lines[1:] == ["compiled 3 loops; last: c", "compiled 5 loops; last: e"]
