@@ -226,6 +226,12 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             save_capture(part, held)
         _write_pictures(options, footage, region, detector, held, bar, scale, in_colour)
     facts = _facts(options, footage, detector, captured, m_per_px)
+    _warn(options, footage, facts)
+    return facts
+
+
+def _warn(options: CaptureOptions, footage: Footage, facts: CaptureFacts) -> None:
+    """Warn of missing images, and of the reason for which a capture needs attention."""
     if footage.missing:
         LOGGER.warning(
             "%s: %d image numbers are missing; the times of the other frames keep the gaps",
@@ -234,7 +240,6 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         )
     if facts.warning is not None:
         LOGGER.warning(facts.warning)
-    return facts
 
 
 def _marker_scale(

@@ -39,6 +39,16 @@ def child_environ() -> dict[str, str]:
     return environ
 
 
+def start_module(module: str, *arguments: str) -> "subprocess.Popen[str]":
+    """Start a Python module in a child; its output is a pipe of text."""
+    return subprocess.Popen(
+        [sys.executable, "-m", module, *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=child_environ(),
+    )
+
+
 def run_code(
     code: str, *arguments: str, folder: Path | None = None, timeout_s: float | None = None
 ) -> "subprocess.CompletedProcess[str]":

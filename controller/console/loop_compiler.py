@@ -6,15 +6,14 @@ A module is imported to compile its loops; numba stores the machine code next to
 import importlib
 import importlib.util
 import pkgutil
-import subprocess
 import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.controller.console.child_process import child_environ
+from snakewalk.controller.console.child_process import start_module
 from snakewalk.drivers.compilation import observe_compilation
 
 _SHARES: Final = (("drivers", "sim"), ("controller",))
@@ -51,27 +50,20 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
     """
     total = sum(len(loop_modules(f"snakewalk.{each}")) for share in _SHARES for each in share)
     lock, done, compiled = threading.Lock(), 0, 0
-    children = [
-        subprocess.Popen(
-            [sys.executable, "-m", __name__, *share],
-            stdout=subprocess.PIPE,
-            text=True,
-            env=child_environ(),
-        )
-        for share in _SHARES
-    ]
+    children = [start_module(__name__, *share) for share in _SHARES]
 
-    def follow(child: "subprocess.Popen[str]") -> None:
+    def follow(lines: IO[str] | None) -> None:
         nonlocal done, compiled
-        assert child.stdout is not None
-        for line in child.stdout:
+        for line in lines or ():
             kind, _, name = line.strip().partition(" ")
             with lock:
                 compiled += kind == "loop"
                 done += kind == "module"
                 on_module(min(done, total), total, name)
 
-    threads = [threading.Thread(target=follow, args=(child,), daemon=True) for child in children]
+    threads = [
+        threading.Thread(target=follow, args=(child.stdout,), daemon=True) for child in children
+    ]
     for thread in threads:
         thread.start()
     try:

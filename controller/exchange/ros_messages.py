@@ -225,10 +225,9 @@ class RosMessages:
         nothing = self._xyz("Vector3", [0.0, 0.0, 0.0])
         for k, time_s in enumerate(frames.time_s.tolist()):
             at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
-            stamped = self._pose(time_s, world, at.tolist(), turn.tolist())
             pose = self._new(
                 "geometry_msgs/msg/PoseWithCovariance",
-                pose=stamped.pose,
+                pose=self._bare_pose(at.tolist(), turn.tolist()),
                 covariance=self._floats(np.diag(variance).ravel()),
             )
             twist = self._new(
@@ -238,7 +237,7 @@ class RosMessages:
             )
             yield self._row(
                 *(time_s, ODOMETRY, TYPES[ODOMETRY]),
-                header=stamped.header,
+                header=self._header(time_s, world),
                 child_frame_id=frames.names[0],
                 pose=pose,
                 twist=twist,
@@ -361,11 +360,14 @@ class RosMessages:
         return self._new(
             TYPES[HEAD_POSE],
             header=self._header(time_s, frame),
-            pose=self._new(
-                "geometry_msgs/msg/Pose",
-                position=self._xyz("Point", at),
-                orientation=self._quaternion(turn),
-            ),
+            pose=self._bare_pose(at, turn),
+        )
+
+    def _bare_pose(self, at: list[float], turn: list[float]) -> Any:
+        return self._new(
+            "geometry_msgs/msg/Pose",
+            position=self._xyz("Point", at),
+            orientation=self._quaternion(turn),
         )
 
     def _header(self, time_s: float, frame: str) -> Any:

@@ -36,6 +36,10 @@ from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.film_look import ANIMAL
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 
+_END = (
+    "--frames %s: the motion ends after %s frames, where the head leaves the ground of %s; "
+    "ask for fewer frames, or add waypoints"
+)
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
 """Endings of the files, by content."""
@@ -125,13 +129,8 @@ def synthesise(
                 f"{wrong[0]}: is for snakes; --animal {animal} has its own motion and skin"
             )
         facts, complete = _with_legs(prepared, frames, animal, files)
-    made = facts["frames"]
-    if frames is not None and made != frames:
-        LOGGER.warning(
-            "--frames %s: the motion ends after %s frames, where the head leaves the ground of %s; "
-            "ask for fewer frames, or add waypoints",
-            *(frames, made, prepared.world.name),
-        )
+    if frames is not None and facts["frames"] != frames:
+        LOGGER.warning(_END, frames, facts["frames"], prepared.world.name)
     show(facts | {what: str(files[what]) if what in files else None for what in _ENDINGS}, as_json)
     if frames is None and not complete:
         raise SystemExit(1)

@@ -21,7 +21,9 @@ def walked(folder: Path, run: str, **told: object) -> tuple[RunRecord, RunSummar
 PLANTED = {"deviation.friction_along": 1.5, "deviation.friction_across": 0.8}
 
 
-@pytest.mark.parametrize("run", ["flat-slalom", "jacksboro-traverse"])
+@pytest.mark.parametrize(
+    "run", ["flat-slalom", pytest.param("jacksboro-traverse", marks=pytest.mark.slow)]
+)
 def test_what_was_planted_is_found_told_and_summarised(run: str, tmp_path: Path) -> None:
     record, summary = walked(tmp_path / "run", run, **PLANTED)
     found = summary.friction_found
