@@ -45,7 +45,7 @@ unit: loops
 
 # make docs      the site, in build/docs; a link that leads nowhere inside it, or any other warning, is an error
 docs: setup
-	$(BIN)/sphinx-build -q -W --keep-going -b html docs build/docs
+	$(BIN)/sphinx-build -j 2 -q -W --keep-going -b html docs build/docs
 
 # make fallbacks the public fallbacks of private interfaces, which CI runs once; docs/decisions/0078
 fallbacks: loops

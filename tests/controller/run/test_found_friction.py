@@ -52,6 +52,7 @@ def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> N
         assert not [event for event in other.events if event.kind == "friction"]
 
 
+@pytest.mark.slow
 def test_the_same_run_finds_the_same(tmp_path: Path) -> None:
     one, _ = walked(tmp_path / "one", "flat-slalom", **PLANTED)
     two, _ = walked(tmp_path / "two", "flat-slalom", **PLANTED)
