@@ -19,7 +19,7 @@ from snakewalk.controller.walk.twin_answers import TwinAnswer, TwinQuestion
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
 PIECE_S: Final = 0.12
-"""Time that a twin needs for a piece in a rehearsal (ours): CPU time on one core of an EPYC."""
+"""Time that a twin needs for a piece in a rehearsal (ours): an assumption, not measured."""
 LARGEST_BYTES: Final = 60_000
 """Size of a question that a pipe accepts at once; a larger one is not asked."""
 
