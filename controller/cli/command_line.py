@@ -30,6 +30,7 @@ _FAMILIES: Final = {
     "policy": ("Learnt policies", MOTION),
     "repertoire": ("Actions recorded from the physics", MOTION),
     "robot": ("A robot", JOB),
+    "pose": ("External poses", JOB),
     "terrain": ("Worlds from real ground", JOB),
 }
 """Subject and group of commands of two words; those of other packages have a general subject."""
