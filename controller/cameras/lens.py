@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import check_matrices, read_json_lists, why_no_file
+from snakewalk.config.archive import check_matrices, why_no_file
 from snakewalk.config.arrays import Floats
+from snakewalk.config.calibration_lists import read_json_lists
 from snakewalk.config.errors import InputError
 
 _MATRICES: Final = "camera_matrix", "distortion_coefficients"

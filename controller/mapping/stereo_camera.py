@@ -13,8 +13,9 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from snakewalk.config.archive import check_matrices, read_arrays, read_json_lists
+from snakewalk.config.archive import check_matrices, read_arrays
 from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.calibration_lists import read_json_lists
 from snakewalk.config.errors import InputError
 
 _NAMES: Final = {

@@ -169,7 +169,7 @@ def test_a_good_camera_is_told_so() -> None:
          "the place of marker 1"),
         (replace(GOOD, floor=replace(FLOOR, side_m={1: 0.11})), LOCKED, "floor", "warn", "scaled"),
         (replace(GOOD, bump=Bump((4.0, 0.0))), LOCKED, "place", "warn", "moved by 4.0 px"),
-        (replace(GOOD, bump=Bump((9.0, 0.0), undone=False)), LOCKED, "place", "fail", "again"),
+        (replace(GOOD, bump=Bump((9.0, 0.0), undone=False)), LOCKED, "place", "fail", "up again"),
         (GOOD, {"exposure": "automatic"}, "exposure", "warn", "lock it"),
         (GOOD, {"exposure": "not told"}, "exposure", "warn", "does not report"),
         (replace(GOOD, light_spread=0.1), LOCKED, "light", "warn", "10.0 %"),

@@ -136,7 +136,10 @@ def test_the_command_writes_a_track_that_loads(
         ({"track": "another"}, "belong to another track"),
         ({"flipped": ["3"]}, "flipped"),
         ({"swapped": [3]}, "swapped"),
-        ({"redrawn": [{"frame": 3, "points_px": [[0, 0], [1, 0], [900, 0], [2, 0]]}]}, "redraw it"),
+        (
+            {"redrawn": [{"frame": 3, "points_px": [[0, 0], [1, 0], [900, 0], [2, 0]]}]},
+            "1798.0 px long",
+        ),
         ({"redrawn": [{"frame": 3, "points_px": [[0, 0], [1, 1]]}]}, "points_px"),
     ],
 )

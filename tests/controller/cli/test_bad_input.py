@@ -77,7 +77,10 @@ ROWS = [
     ("track bomb.npz", "bomb.npz: its 0.0197 MB would expand to 20 MB; at most 100 times"),
     ("run --track bomb.npz", "bomb.npz: its 0.0197 MB would expand to 20 MB; at most 100 times"),
     ("report bomb.mcap", "bomb.mcap: its 0.00"),
-    ("replay deep.mcap", "deep.mcap: is a complete MCAP of profile"),
+    (
+        "replay deep.mcap",
+        "deep.mcap: is a complete MCAP of profile '' with topics /config, but no log of snakewalk",
+    ),
     ("tune rolling -o /proc/a.toml", "/proc: takes no file"),
     ("bus serve --servos 1 --record nosuch/a", "nosuch: no such folder"),
     ("bus serve --servos 1 --link nosuch/a", "nosuch: no such folder"),
@@ -101,7 +104,7 @@ ROWS = [
     ("trials flat-slalom --robot nosuch --seeds 1", "nosuch: no such robot"),
     (
         "run flat-square --live",
-        "--live: waypoints come from the page or from ROS; add",
+        "--live: waypoints come from the page or from ROS; add --view or --ros",
     ),
     ("run flat-square --set run.seed", "--set run.seed: expected KEY=VALUE"),
     ("run flat-square --set run.seed=-1", "run flat-square: seed: "),

@@ -42,10 +42,7 @@ def files_and_output(folder: Path, arguments: list[str]) -> dict[str, bytes]:
     return {"output": done.stdout.encode(), **files}
 
 
-@pytest.mark.parametrize(
-    "command",
-    [pytest.param(each, marks=pytest.mark.slow) if each == "gait" else each for each in COMMANDS],
-)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_gives_the_same_bytes(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,9 +21,7 @@ def walked(folder: Path, run: str, **told: object) -> tuple[RunRecord, RunSummar
 PLANTED = {"deviation.friction_along": 1.5, "deviation.friction_across": 0.8}
 
 
-@pytest.mark.parametrize(
-    "run", ["flat-slalom", pytest.param("jacksboro-traverse", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("run", ["flat-slalom", "jacksboro-traverse"])
 def test_what_was_planted_is_found_told_and_summarised(run: str, tmp_path: Path) -> None:
     record, summary = walked(tmp_path / "run", run, **PLANTED)
     found = summary.friction_found
@@ -52,7 +50,6 @@ def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> N
         assert not [event for event in other.events if event.kind == "friction"]
 
 
-@pytest.mark.slow
 def test_the_same_run_finds_the_same(tmp_path: Path) -> None:
     one, _ = walked(tmp_path / "one", "flat-slalom", **PLANTED)
     two, _ = walked(tmp_path / "two", "flat-slalom", **PLANTED)

@@ -16,7 +16,7 @@ from snakewalk.sim.physics.plant import MujocoPlant
 SECONDS = 20.0
 
 
-@pytest.mark.parametrize("pose", ["simulator", pytest.param("imu", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("pose", ["simulator", "imu"])
 def test_a_body_on_its_back_turns_home_on_hills_and_says_so(
     pose: str, tmp_path: Path, mocker: MockerFixture
 ) -> None:

@@ -68,6 +68,11 @@ def state_of(cycle: dict[str, Any], slow: dict[str, Any], imu: dict[str, Any]) -
 
 ADDED = b',"carrier_rad":null'
 """Field of ``/walk`` that the old log lacks."""
+REWORDED = (
+    b"taken in by all motors so far; what they give back is lost",
+    b"consumed by all motors so far; energy that they return is lost",
+)
+"""The one description of a field that has other words than in the old log."""
 
 
 def _is_newer(table: type[Table]) -> bool:
@@ -80,17 +85,6 @@ def unknown_as_nan(value: Any) -> Any:
     if isinstance(value, list):
         return np.array(value, dtype=float)
     return float("nan") if value is None else value
-
-
-def formats(schema: bytes) -> dict[str, Any]:
-    """Return a schema without its descriptions, whose wording may change."""
-
-    def drop(each: dict[str, Any]) -> dict[str, Any]:
-        each.pop("description", None)
-        return each
-
-    found: dict[str, Any] = json.loads(schema, object_hook=drop)
-    return found
 
 
 def test_a_log_of_before_is_written_again_byte_by_byte(tmp_path: Path) -> None:
@@ -122,12 +116,11 @@ def test_a_log_of_before_is_written_again_byte_by_byte(tmp_path: Path) -> None:
                 log.add(table, values.pop("time_s"), **values)
     now, schemas = messages_of(tmp_path / "log.mcap")
     for name in ("/config", "/walk"):  # fields may be added
-        schema, old_schema = (formats(each.pop(name)) for each in (schemas, old_schemas))
+        schema, old_schema = (json.loads(each.pop(name)) for each in (schemas, old_schemas))
         assert old_schema["properties"].items() <= schema["properties"].items()
     now["/walk"] = [(time, data.replace(ADDED, b"")) for time, data in now["/walk"]]
-    assert {name: formats(schemas[name]) for name in old_schemas} == {
-        name: formats(each) for name, each in old_schemas.items()
-    }
+    old_schemas = {name: each.replace(*REWORDED) for name, each in old_schemas.items()}
+    assert {name: each for name, each in schemas.items() if name in old_schemas} == old_schemas
     assert set(before) == {table.topic.name for table in TABLES if not _is_newer(table)}
     del before[ConfigTable.topic.name]  # depends on the robot's and the run's fields
     assert now == before

@@ -168,7 +168,7 @@ def test_two_hinges_of_one_body_are_a_module_of_two_axes(tmp_path: Path) -> None
         ),
         (
             chain(yaw("a"), yaw("b", 'pos="0 0.03 0"'), yaw("c")),
-            "joint b: lies 0.03 m from the",
+            "b: lies 0.03 m from the line of the others",
         ),
         (
             chain(yaw("a"), yaw("b"), extra='<equality><joint joint1="a" joint2="b"/></equality>'),
