@@ -12,15 +12,7 @@ from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runtime.drive import Progress
-
-RUN = """
-name = "short"
-robot = "yaw16"
-world = "flat"
-motion = "serpenoid"
-waypoints_m = [[0.5, 0.0]]
-waypoint_radius_m = 0.3
-"""
+from tests.helpers.short_run import SHORT_RUN
 
 
 def later(record: RunRecord, by_s: float) -> RunRecord:
@@ -38,7 +30,7 @@ def test_terminal_summary_and_report_agree(tmp_path: Path) -> None:
     from snakewalk.controller.report.artifacts import make_artifacts
 
     file = tmp_path / "short.toml"
-    file.write_text(RUN, encoding="utf-8")
+    file.write_text(SHORT_RUN, encoding="utf-8")
     shown: list[Progress] = []
     finished = execute(prepare_job(str(file)), tmp_path / "out", on_progress=shown.append)
     record, numbers = finished.record, finished.summary

@@ -11,6 +11,7 @@ from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from tests.helpers.command import snakewalk
+from tests.helpers.short_run import SHORT_RUN
 
 OF_THE_POSE = {
     field.name.removeprefix("dead_reckoned_")
@@ -77,16 +78,6 @@ def test_the_other_assumptions_are_listed_with_their_source(record: RunRecord) -
     assert assumed["supply_v"]["source"] == f"robot {header.robot.name}"
 
 
-RUN = """
-name = "short"
-robot = "yaw16"
-world = "flat"
-motion = "serpenoid"
-waypoints_m = [[0.5, 0.0]]
-waypoint_radius_m = 0.3
-"""
-
-
 @pytest.mark.parametrize(
     ("words", "code", "source"),
     [
@@ -100,7 +91,7 @@ def test_a_run_states_its_evidence(
 ) -> None:
     pytest.importorskip("mujoco")
     file, folder = tmp_path / "short.toml", tmp_path / "out"
-    file.write_text(RUN, encoding="utf-8")
+    file.write_text(SHORT_RUN, encoding="utf-8")
     done = snakewalk("run", str(file), *words, "--no-film", "--json", "--out", str(folder))
     assert done.returncode == code, done.stderr
     said, numbers = json.loads(done.stdout), json.loads((folder / "summary.json").read_text())

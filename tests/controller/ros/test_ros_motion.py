@@ -25,21 +25,9 @@ from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_commanded, prepare_job
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
-from tests.helpers.ros_client import DOMAIN, LOOPBACK, Client
+from tests.helpers.ros_client import DOMAIN, Client
 
-
-@pytest.fixture(autouse=True)
-def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    for name, value in LOOPBACK.items():
-        monkeypatch.setenv(name, value)
-
-
-@pytest.fixture
-def client() -> Iterator[Client]:
-    made = Client()
-    yield made
-    made.close()
+pytestmark = pytest.mark.usefixtures("alone")
 
 
 class Graph:

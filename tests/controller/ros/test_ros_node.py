@@ -49,24 +49,13 @@ from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import PATIENT
-from tests.helpers.ros_client import DOMAIN, LOOPBACK, Client
+from tests.helpers.ros_client import DOMAIN, Client
 
 COMMAND = "from snakewalk.controller.cli.main import main; main()"
 ROBOT = 'name = "quartet"\njoint_axes = "yyyy"\nyaw_limit_rad = 1.4\n'
 
 
-@pytest.fixture(autouse=True)
-def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    for name, value in LOOPBACK.items():
-        monkeypatch.setenv(name, value)
-
-
-@pytest.fixture
-def client() -> Iterator[Client]:
-    made = Client()
-    yield made
-    made.close()
+pytestmark = pytest.mark.usefixtures("alone")
 
 
 class Graph:

@@ -18,6 +18,7 @@ from snakewalk.controller.studies import sweep_measure, trials
 from snakewalk.controller.studies.run_comparison import compared_run
 from snakewalk.controller.studies.sweep_points import Point
 from tests.helpers.command import snakewalk
+from tests.helpers.short_run import SHORT_RUN
 
 pytest.importorskip("mujoco")
 
@@ -36,14 +37,6 @@ COMMANDS = {
     "play": ("play", "still.csv"),
     "policy run": ("policy", "run", "wave-cma", "--seconds", "2"),
 }
-RUN = """
-name = "short"
-robot = "yaw16"
-world = "flat"
-motion = "serpenoid"
-waypoints_m = [[0.5, 0.0]]
-waypoint_radius_m = 0.3
-"""
 OF_THE_POSE = {
     field.name.removeprefix("dead_reckoned_")
     for field in dataclasses.fields(RunSummary)
@@ -93,7 +86,7 @@ def command(
 ) -> Run:
     """Run a command once, and return what it prints for each kind of evidence."""
     folder = tmp_path_factory.mktemp("command")
-    (folder / "short.toml").write_text(RUN, encoding="utf-8")
+    (folder / "short.toml").write_text(SHORT_RUN, encoding="utf-8")
     points = [f"{0.2 * k},{k},{p},{-0.05 * p},0" for k in range(8) for p in range(21)]
     text = "\n".join(["t,frame,point,x_m,y_m", *points])
     (folder / "still.csv").write_text(text, encoding="utf-8")
