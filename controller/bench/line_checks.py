@@ -88,7 +88,7 @@ def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) 
 def response(
     pings: Sequence[Probe], reads: Sequence[Probe], latency_s: float, *, noisy: bool
 ) -> list[Finding]:
-    """How much later than the wire allows replies come, and who is slower; none without replies.
+    """Delay of the replies beyond the wire time, and the slower servos; nothing without replies.
 
     The lower quartile is judged: an adapter holds every reply up, a busy computer some.
     """

@@ -187,7 +187,7 @@ def device_locks(device: cv2.VideoCapture) -> dict[str, Lock]:
 
 
 def _wiggle(time_s: float, joints: int) -> Floats:
-    """(J,) what is added to the goals: uneven, so that only one delay fits."""
+    """(J,) offset of the goals: uneven, so that only one delay fits."""
     grown = min(1.0, time_s / _RAMP_S)
     angle = sum(np.sin(2.0 * np.pi * hz * time_s) for hz in _WIGGLE_HZ) / len(_WIGGLE_HZ)
     return np.where(np.arange(joints) < _JOINTS, _WIGGLE_RAD * grown * angle, 0.0)

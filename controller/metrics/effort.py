@@ -86,7 +86,7 @@ _LEAST_CARRIED_J = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Means over the time at full rate; NaN where the log does not hold what is needed."""
+    """Means over the time at full rate; NaN if the log lacks the values for it."""
 
     power_w: float
     """Electrical, all motors, mean; returned energy is lost."""

@@ -67,6 +67,12 @@ class JointReader(Protocol):
         ...
 
 
+def likely_unit(angles: Floats) -> tuple[str, float]:
+    """Return the unit that angles without one probably have, and the largest of them."""
+    largest = float(np.nanmax(np.abs(angles), initial=0.0))
+    return ("deg" if largest > 2.0 * np.pi else "rad"), largest
+
+
 def joint_motion(
     path: Path,
     time_s: Floats,

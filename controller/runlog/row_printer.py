@@ -27,6 +27,7 @@ class RowPrinter:
     def __init__(self, topic: Topic) -> None:
         self._topic = topic
         columns = topic.columns
+        self._columns = tuple(columns.values())
         self._required = {name for name, each in columns.items() if each.default is REQUIRED}
         self._defaults = {name: each.default for name, each in columns.items()}
         self._arrays = [
@@ -108,7 +109,7 @@ class RowPrinter:
             ValueError: it is an exact number.
 
         """
-        column = list(self._topic.columns.values())[at]
+        column = self._columns[at]
         return text(value) if column.kind == "exact" else rounded_text(value)
 
     def _row_template(self, unknown: Sequence[int]) -> str:

@@ -28,8 +28,6 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
         safe: whether each of points (k, 2) is on safe ground.
 
     """
-    apart = np.concatenate([[True], np.hypot(*np.diff(corners_m, axis=0).T) > 1e-9])
-    corners_m, free = corners_m[apart], free[apart]
     sides = np.diff(corners_m, axis=0)
     length = np.hypot(*sides.T)
     pieces = [corners_m[:1]]

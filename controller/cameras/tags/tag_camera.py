@@ -13,14 +13,13 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.camera_frames import OnPicture
-from snakewalk.controller.cameras.device_camera import in_colour, open_device
+from snakewalk.controller.cameras.device_camera import PATIENCE_S, in_colour, open_device
 from snakewalk.controller.cameras.tags.drawn_tags import DrawnTags
 from snakewalk.controller.cameras.tags.tag_detector import TagDetector, TagPicture
 from snakewalk.controller.cameras.tags.tag_view import TagView
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.types import BodyPose
 
-_PATIENCE_S: Final = 5.0
 _LOOK_S: Final = 0.02
 
 
@@ -78,7 +77,7 @@ class DeviceTags:
     def close(self) -> None:
         """Stop the thread and release the device."""
         self._ended.set()
-        self._thread.join(timeout=_PATIENCE_S)
+        self._thread.join(timeout=PATIENCE_S)
         self._device.release()
 
     def _watch(self) -> None:
@@ -144,7 +143,7 @@ def first_picture(pictures: TagPictures, clock: Clock) -> TagPicture:
         InputError: none shows a tag within 5 s.
 
     """
-    until_s, seen = clock.now_s() + _PATIENCE_S, 0
+    until_s, seen = clock.now_s() + PATIENCE_S, 0
     while clock.now_s() < until_s:
         for picture in pictures.arrived(clock.now_s()):
             seen += 1
@@ -152,7 +151,7 @@ def first_picture(pictures: TagPictures, clock: Clock) -> TagPicture:
                 return picture
         clock.sleep_until_s(clock.now_s() + _LOOK_S)
     if not seen:
-        raise InputError(f"pose tags: no picture within {_PATIENCE_S:g} s; check the camera")
+        raise InputError(f"pose tags: no picture within {PATIENCE_S:g} s; check the camera")
     raise InputError(
         f"pose tags: {seen} pictures show no tag of tags.on; check light, focus, dictionary and "
         "the numbers of the tags"

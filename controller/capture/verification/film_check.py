@@ -59,12 +59,12 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
     _check_lengths(out)
     used = [k for k, one in enumerate(out) if one.status.has_points]
     some = used[:: max(1, len(used) // _SAMPLE)]
-    shown = [_profile(out[k], store, k) for k in some]
-    usual = _usual([one for one in shown if one is not None])
+    shown = {k: _profile(out[k], store, k) for k in some}
+    usual = _usual([one for one in shown.values() if one is not None])
     if usual is None:
         return out
     for k in used:
-        profile = _profile(out[k], store, k)
+        profile = shown[k] if k in shown else _profile(out[k], store, k)
         if profile is None:
             continue
         status = _verdict(profile, usual)

@@ -15,6 +15,7 @@ from snakewalk.controller.motion.joint_motion import (
     JointMotion,
     JointRequest,
     joint_motion,
+    likely_unit,
 )
 
 _TIME: Final = {
@@ -103,8 +104,7 @@ def _unit_of(path: Path, stated: set[str], request: JointRequest, angles: Floats
         return unit
     if request.unit is not None:
         return request.unit
-    largest = float(np.nanmax(np.abs(angles), initial=0.0))
-    likely = "deg" if largest > 2.0 * np.pi else "rad"
+    likely, largest = likely_unit(angles)
     raise InputError(
         f"{path}: does not state the unit of its angles, which go to {largest:.3g}; "
         f"say --unit {likely} (or name columns as joint_{likely})"

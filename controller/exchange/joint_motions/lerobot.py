@@ -21,6 +21,7 @@ from snakewalk.controller.motion.joint_motion import (
     JointMotion,
     JointRequest,
     joint_motion,
+    likely_unit,
 )
 
 _FEATURES: Final = ("observation.state", "action")
@@ -57,8 +58,7 @@ class LeRobotEpisode:
         if len(names) != values.shape[1]:
             raise InputError(f"{path}: {feature}: {len(names)} names of {values.shape[1]} values")
         if request.unit is None:
-            largest = float(np.nanmax(np.abs(values), initial=0.0))
-            likely = "deg" if largest > 2.0 * np.pi else "rad"
+            likely, largest = likely_unit(values)
             raise InputError(
                 f"{path}: {feature} does not state its unit; its values go to {largest:.3g}; say "
                 f"--unit {likely} (motors normalized to -100..100 are not angles)"

@@ -114,9 +114,9 @@ def _page(
     with (
         TemporaryDirectory() as folder,
         open_observer(PAGE, view_at) as page,
-        PoseCheckPage(RunLog(Path(folder) / LOG, page.on_row), prepared, config, source) as shown,
+        RunLog(Path(folder) / LOG, page.on_row) as log,
     ):
-        yield shown
+        yield PoseCheckPage(log, prepared, config, source)
 
 
 def _line(found: FeedStatistics) -> str:

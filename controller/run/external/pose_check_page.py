@@ -1,7 +1,6 @@
 """The live page of ``pose check``: the measured body on its ground, and facts of the feed."""
 
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 
@@ -28,7 +27,7 @@ FACTS: Final = (
 
 
 class PoseCheckPage:
-    """Shows poses in a page that accepts the rows of a log; use it in a ``with``.
+    """Shows poses in a page that accepts the rows of a log.
 
     The joint angles are unknown before torque, so the body is straight.
     """
@@ -50,18 +49,6 @@ class PoseCheckPage:
                 Kind.MEASURED, source, config.noise_m, float(np.radians(config.noise_deg))
             ),
         )
-
-    def __enter__(self) -> Self:
-        self._log.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._log.__exit__(kind, error, trace)
 
     def show(self, time_s: float, sample: PoseSample) -> None:
         """Draw the body at a pose."""

@@ -43,8 +43,7 @@ def use_worker(
     run, robot, world = prepared.run, prepared.robot, prepared.world
     if not isinstance(prepared, WalkRun) or not isinstance(source, AsksTwin):
         return
-    tries = run.walk.tries > 0 and prepared.ground is not None and run.mapping is None
-    if not tries or run.motion != "walk" or robot.limb_joints or find_spec("mujoco") is None:
+    if run.motion != "walk" or not _tries_pieces(prepared) or find_spec("mujoco") is None:
         return
     twin: RehearsedTwin | ProcessTwin
     if now_s is None:
@@ -67,11 +66,10 @@ def second_body(
 
     """
     run, world, robot = prepared.run, prepared.world, prepared.robot
-    if run.mapping is not None or robot.limb_joints:
+    if not _is_bare_on_known_ground(prepared):
         return None
     twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None
-    tries = run.walk.tries > 0 and prepared.ground is not None
-    if twin is not None and tries and isinstance(source, UsesTwin):
+    if twin is not None and _tries_pieces(prepared) and isinstance(source, UsesTwin):
         source.use_twin(TwinRollout(robot, twin, world.friction))
     finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
     measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
@@ -85,3 +83,13 @@ def second_body(
         return None
     use = cast(UsesFriction, source).use_friction
     return FrictionMonitor(world.friction, model, 1.0 / run.cycle_hz, use)
+
+
+def _tries_pieces(prepared: PreparedRun) -> bool:
+    """Whether a walk tries its pieces of track: on hills that are known, and if it may."""
+    may_try = prepared.run.walk.tries > 0 and prepared.ground is not None
+    return may_try and _is_bare_on_known_ground(prepared)
+
+
+def _is_bare_on_known_ground(prepared: PreparedRun) -> bool:
+    return prepared.run.mapping is None and not prepared.robot.limb_joints

@@ -47,10 +47,10 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, A
 
     config = PoseConfig(offset_m=(0.0, 0.0, 0.04))
     prepared = prepare_job("flat-square", motion="serpenoid")
-    with PoseCheckPage(RunLog(folder / "log.mcap", on_row), prepared, config, "udp") as page:
+    with RunLog(folder / "log.mcap", on_row) as log:
         watch(
             *(Feed(), SimClock(), 2.5, config, lambda line: None),
-            page=page,
+            page=PoseCheckPage(log, prepared, config, "udp"),
             judge=lambda sample: "the robot is elsewhere",
         )
     return found
