@@ -71,6 +71,20 @@ def compiled(
     return decorate
 
 
+def is_compiling() -> bool:
+    """Whether loops are compiled; without numba they run as they are written."""
+    return _numba() is not None
+
+
+def callable_in_loops(function: F) -> F:
+    """Let compiled loops call a function that also runs as it is written."""
+    numba = _numba()
+    if numba is None:
+        return function
+    registered: F = numba.extending.register_jitable(function)
+    return registered
+
+
 def _numba() -> Any:
     """Return the package numba; None in a light install."""
     try:

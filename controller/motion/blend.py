@@ -16,7 +16,6 @@ states, and those of the error, keep together within the limits.
 from dataclasses import dataclass
 
 import numpy as np
-from numba.extending import register_jitable
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.links import BodyView
@@ -30,7 +29,7 @@ from snakewalk.controller.kinematics.smoothstep import (
 )
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.motion.wrapper import MotionWrapper
-from snakewalk.drivers.compiling import compiled
+from snakewalk.drivers.compiling import callable_in_loops, compiled
 
 DURATIONS_S = np.geomspace(0.25, 32.0, 36)
 BRAKE_SHARE = 0.4
@@ -40,8 +39,8 @@ TOLERANCE = 0.02
 """A target at its limits and the last of an error add up to a little more than a limit."""
 DELAY = 0.3
 """Share of a join before a slowed target speeds up: most of the error should be gone by then."""
-register_jitable(cubic)  # the loops below call them
-register_jitable(cubic_slope)
+callable_in_loops(cubic)  # the loops below call them
+callable_in_loops(cubic_slope)
 _X = np.linspace(0.0, 1.0, 25)
 _Z = np.maximum(0.0, (_X - DELAY) / (1.0 - DELAY))
 _SHAPES = np.array(

@@ -6,11 +6,16 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.drivers.bus.budget import check_ages, robot_budget
+from snakewalk.drivers.compiling import is_compiling
 from snakewalk.drivers.protocol.registers import CURRENT_POSITION_MODE
 
 GAIT_PITCH_SHARE = 0.75
 """Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
 (1.5 A of an XM430; ours): soft ones would not carry the links."""
+
+UNCOMPILED_HZ = 50.0
+"""Highest rate of cycles without numba: it uses half of a core with 16 servos (ours;
+docs/how-to/small-computer.md)."""
 
 
 def check_supply(robot: RobotConfig) -> None:
@@ -47,6 +52,7 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
             raise InputError(f"run {run.name}: {fault}") from None
     _check_hold(run, robot)
     _check_fuse(robot)
+    _check_uncompiled_rate(run)
     budget, safety = robot_budget(robot, robot.servo.baud, fast=True), run.safety
     budget.check(run.cycle_hz)
     check_ages(
@@ -55,6 +61,16 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
         stale_limit_s=safety.stale_limit_s,
         watchdog_s=safety.watchdog_s,
     )
+
+
+def _check_uncompiled_rate(run: RunConfig) -> None:
+    """Reject a rate that the loops of a cycle do not sustain if nothing compiles them."""
+    if run.cycle_hz > UNCOMPILED_HZ and not is_compiling():
+        raise InputError(
+            f"run {run.name}: cycle_hz = {run.cycle_hz:g}: without numba the loops of a cycle "
+            f"sustain at most {UNCOMPILED_HZ:g} Hz; set --set run.cycle_hz={UNCOMPILED_HZ:g}, or "
+            "install it: pip install numba"
+        )
 
 
 def _check_hold(run: RunConfig, robot: RobotConfig) -> None:

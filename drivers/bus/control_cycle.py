@@ -28,6 +28,7 @@ from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
+from snakewalk.drivers.compiling import is_compiling
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 from snakewalk.drivers.protocol.frames import HEAD
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE, HEADER
@@ -121,6 +122,7 @@ class ControlCycle:
             and port.descriptor is not None
             and self._line.zero_s is not None
             and _IS_LINUX
+            and is_compiling()
         ):
             from snakewalk.drivers.bus.serial_fast_path import SerialFastPath  # noqa: PLC0415  its loops call Linux
 

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numba import boolean, float64, int32, int64, types, uint8, void
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Bytes, Floats, Int32s
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.group_read import GroupReadReply
-from snakewalk.drivers.compiling import compiled
+from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.control_table import ControlTable
 from snakewalk.drivers.protocol.packet import ALERT
@@ -24,8 +23,8 @@ from snakewalk.drivers.protocol.registers import LOAD_UNIT, VOLTAGE_UNIT_V, Serv
 from snakewalk.drivers.types import JointState
 
 S = TypeVar("S", bound=np.generic)
-_BLOCKS = types.Array(uint8, 2, "A", readonly=True)
-_GOALS = types.Array(float64, 1, "A", readonly=True)
+_BLOCKS = readonly_array("uint8", 2)
+_GOALS = readonly_array()
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +138,9 @@ class GoalEncoder:
         return raw
 
 
-@compiled(boolean(_GOALS, float64[:, ::1], int32[::1], int32[::1], int32[::1]), makes_arrays=False)
+@compiled(
+    f"boolean({_GOALS}, float64[:, ::1], int32[::1], int32[::1], int32[::1])", makes_arrays=False
+)
 def encode_goals(goal_rad: Floats, scale: Floats, low: Int32s, high: Int32s, raw: Int32s) -> bool:
     """Nearest positions of goals (J,) within ``low`` to ``high``; False if a goal is not finite.
 
@@ -181,7 +182,7 @@ class StateDecoder:
         decode_state(data, self._zero, self._scale, out)
 
 
-@compiled(int64(_BLOCKS, int64, int64, int64), makes_arrays=False)
+@compiled(f"int64({_BLOCKS}, int64, int64, int64)", makes_arrays=False)
 def _signed(data: Bytes, row: int, at: int, size: int) -> int:
     value = 0
     for k in range(size):
@@ -190,7 +191,7 @@ def _signed(data: Bytes, row: int, at: int, size: int) -> int:
     return value - 2 * half if value >= half else value
 
 
-@compiled(void(_BLOCKS, float64[::1], float64[:, ::1], float64[:, ::1]), makes_arrays=False)
+@compiled(f"void({_BLOCKS}, float64[::1], float64[:, ::1], float64[:, ::1])", makes_arrays=False)
 def decode_state(data: Bytes, zero: Floats, scale: Floats, out: Floats) -> None:
     """Current, velocity and position of blocks (J, 10) into ``out`` (3, J).
 

@@ -23,10 +23,10 @@ class Result(NamedTuple):
     err: str
 
 
-def call(folder: Path, *commands: tuple[str, ...]) -> list[Result]:
+def call(folder: Path, *commands: tuple[str, ...], without: tuple[str, ...] = ()) -> list[Result]:
     """Run commands one after the other in one interpreter without extras, in ``folder``."""
     ran = subprocess.run(
-        [sys.executable, str(SCRIPT)],
+        [sys.executable, str(SCRIPT), *without],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "100", "TERM": "dumb"},
         input=json.dumps(commands),
@@ -151,3 +151,16 @@ def test_help_of_every_command(results: dict[tuple[str, ...], Result]) -> None:
     for words in HELP:
         assert results[words].code == 0, results[words].err
         assert "Usage: " in results[words].out
+
+
+def test_servos_move_without_the_compiler_at_a_rate_that_it_sustains(tmp_path: Path) -> None:
+    fast = (*GAIT[:3], "--out", "fast", "--set", "run.cycle_hz=100", *ON_SERVOS)
+    scanned, examined, moved, rejected = call(
+        tmp_path, BASE[0], BASE[1], GAIT, fast, without=("numba", "llvmlite")
+    )
+    assert scanned.code == 0, scanned.err
+    assert examined.code == 0, examined.err
+    assert moved.code == 0, moved.err
+    assert json.loads(moved.out)["tripped"] is None
+    assert rejected.code == 2
+    assert "without numba the loops of a cycle sustain at most 50 Hz" in rejected.err

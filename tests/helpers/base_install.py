@@ -1,4 +1,4 @@
-"""Runs commands as the base install would: no extra's module can be found.
+"""Runs commands as the base install would, without the modules of extras and of the arguments.
 
 Standard input is a JSON list of commands (lists of words), standard output a JSON list of
 (exit code, standard output, standard error). The serial port ``./tty`` of a command is a line of 16
@@ -18,7 +18,7 @@ from typing import Any
 
 from snakewalk.config.extras import EXTRAS
 
-BLOCKED = frozenset(EXTRAS)
+BLOCKED = frozenset({*EXTRAS, *sys.argv[1:]})
 
 
 class BaseInstallFinder(PathFinder):
@@ -35,7 +35,7 @@ class BaseInstallFinder(PathFinder):
 
 
 def hide_extras() -> None:
-    """Make imports and ``find_spec`` blind to the extras' modules."""
+    """Make imports and ``find_spec`` blind to the blocked modules."""
     sys.meta_path[:] = [
         BaseInstallFinder if finder is PathFinder else finder for finder in sys.meta_path
     ]
