@@ -24,6 +24,7 @@ from snakewalk.controller.bench.unlisted_devices import (
 from snakewalk.controller.console.finding import Finding, shown_subject, worst
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.probe import Overheard, Probe, overhear, probe
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
@@ -95,7 +96,7 @@ def examine(
     noise = line_checks.noise(pings, reads, overheard)
     if noise is not None:
         patience_s = bus.latency_s
-        bus = DynamixelBus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
+        bus = servo_bus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
     findings += _presence(bus, expected, found, imu, noise, overheard, on_progress)
     if imu is not None:
         findings.append(imu_finding(bus, imu))
@@ -112,7 +113,7 @@ def examine(
         on_progress("group reads")
         fast = all(s.fast_reads for s in reports)
         port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to earlier requests
-        patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
+        patient = servo_bus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
         ids = [s.servo_id for s in reports for _ in range(_ASKED)]
         findings.append(
@@ -130,14 +131,14 @@ def _find(
     port: BytePort, robot: RobotConfig, expected: Sequence[int], latency_s: float
 ) -> tuple[DynamixelBus, Collection[int]]:
     """The bus, and the servos that reply; the bus waits longer if all replies are later."""
-    bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
+    bus = servo_bus(port, robot.models_by_id, latency_s=latency_s)
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
     for servo_id in [*pinged, *expected][:_TIMED]:
         timed = probe(port, servo_id, _TIMED, patience_s)
         late_s = timed.late_s
         if late_s and min(late_s) > latency_s and not timed.damaged:
-            patient = DynamixelBus(port, robot.models_by_id, latency_s=patience_s)
+            patient = servo_bus(port, robot.models_by_id, latency_s=patience_s)
             return patient, patient.find(expected)
         if late_s:
             break
@@ -242,7 +243,7 @@ def examine_segments(
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         parts = [
-            (DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s), ids)
+            (servo_bus(line, robot.models_by_id, latency_s=line.latency_s), ids)
             for line, ids in segments
         ]
         findings += supply_under_load(SegmentedBus(parts), robot, safety)

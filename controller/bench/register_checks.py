@@ -14,12 +14,11 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.console.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.chain_settings import ChainSetting, chain_settings
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import (
     ALL_REPLY,
     IDENTITY,
-    ChainSetting,
-    chain_settings,
     identity_fault,
     pose_faults,
 )

@@ -5,7 +5,7 @@ from typing import Final
 
 from snakewalk.controller.bench.emergency_stop import StopOutcome
 from snakewalk.controller.bench.scan import scan
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.errors import BusError, ControlTableError
 from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.serial_port import SerialPort
@@ -82,7 +82,7 @@ def torque_off(
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
     """Read a servo's torque, switch it off again if it is on; returns the fault, if any."""
     try:
-        bus = DynamixelBus(port, model, latency_s=port.latency_s, tries=_TRIES)
+        bus = servo_bus(port, model, latency_s=port.latency_s, tries=_TRIES)
         bus.write_verified(servo_id, "Torque Enable", 0)
     except (BusError, ControlTableError) as fault:
         return f"servo {servo_id}: not confirmed: {fault}"

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.byte_port import BytePort
@@ -129,7 +130,7 @@ def unlisted(
                 )
             )
             continue
-        bus = DynamixelBus(port, model, latency_s=latency_s)
+        bus = servo_bus(port, model, latency_s=latency_s)
         ping = bus.probe(servo_id)
         if ping.doubled or (not noisy and ping.damaged == ping.requests):
             shared.append(servo_id)
