@@ -7,6 +7,7 @@ from snakewalk.config.robot import ImuConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench import adapter, line_checks
 from snakewalk.controller.bench import servo_checks as servos
+from snakewalk.controller.bench.feetech_scan import find_feetech
 from snakewalk.controller.bench.imu_check import imu_finding
 from snakewalk.controller.bench.register_checks import (
     ServoRegisters,
@@ -37,6 +38,7 @@ from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, ServoUnits
 
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
+_FEETECH_MEASURED = ("Present Position", "Present Temperature")
 _PINGED = 6
 """Up to this number of missing servos are pinged at each baud rate; for more a broadcast is quicker
 (ours)."""
@@ -92,7 +94,8 @@ def examine(
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    reads = [bus.probe(i, _MEASURED) for i in found]
+    measured = _FEETECH_MEASURED if is_feetech(robot) else _MEASURED
+    reads = [bus.probe(i, measured) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
     if noise is not None:
         patience_s = bus.latency_s
@@ -127,6 +130,11 @@ def examine(
     return findings
 
 
+def is_feetech(robot: RobotConfig) -> bool:
+    """Whether the robot's servos speak Feetech's protocol."""
+    return robot.servo_records[0].protocol == "feetech"
+
+
 def _find(
     port: BytePort, robot: RobotConfig, expected: Sequence[int], latency_s: float
 ) -> tuple[DynamixelBus, Collection[int]]:
@@ -135,7 +143,10 @@ def _find(
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
     for servo_id in [*pinged, *expected][:_TIMED]:
-        timed = probe(port, servo_id, _TIMED, patience_s)
+        if is_feetech(robot):
+            timed = bus.probe(servo_id)
+        else:
+            timed = probe(port, servo_id, _TIMED, patience_s)
         late_s = timed.late_s
         if late_s and min(late_s) > latency_s and not timed.damaged:
             patient = servo_bus(port, robot.models_by_id, latency_s=patience_s)
@@ -165,12 +176,18 @@ def _presence(
     baud = port.getBaudRate()
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
-    old = protocol_1(port, silent, bus.latency_s) if silent else None
+    feetech = bus.table.facts.protocol == "feetech"
+    old = protocol_1(port, silent, bus.latency_s) if silent and not feetech else None
     findings += [] if old is None else [old]
     findings += servos.presence(expected, found, elsewhere, list(others), baud, port.name)
     findings += [] if noise is None else [noise]
-    findings += unlisted(port, others, bus.latency_s, noisy=noisy)
-    new = factory_servos(*(port, {*found, *others}, silent), noisy=noisy, on_progress=on_progress)
+    protocol = bus.table.facts.protocol
+    findings += unlisted(port, others, bus.latency_s, noisy=noisy, protocol=protocol)
+    new = None
+    if not feetech:
+        new = factory_servos(
+            *(port, {*found, *others}, silent), noisy=noisy, on_progress=on_progress
+        )
     already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
     findings += [] if new is None or already else [new]
     return findings
@@ -184,7 +201,7 @@ def _servo_findings(
     noise: Finding | None,
 ) -> list[Finding]:
     return [
-        servos.firmware(reports),
+        *([] if is_feetech(robot) else [servos.firmware(reports)]),
         servos.return_delay(reports),
         servos.alarms(reports, robot),
         servos.torque(reports),
@@ -342,8 +359,12 @@ def _at_other_bauds(
         return {}
     port = bus.port
     before = port.getBaudRate()
-    others = [baud for baud in BAUDS if baud != before]
+    feetech = bus.table.facts.protocol == "feetech"
+    others = [baud for baud in (bus.table.facts.bauds if feetech else BAUDS) if baud != before]
     if len(missing) > _PINGED:
+        if feetech:
+            replying = find_feetech(port, others, on_progress)
+            return {s.servo_id: s.baud for s in replying if s.servo_id in missing}
         answering = scan(port, others, on_progress=on_progress)
         return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
     found: dict[int, int] = {}

@@ -95,7 +95,12 @@ def _replies_in_protocol_1(port: BytePort, servo_id: int, latency_s: float) -> b
 
 
 def unlisted(
-    port: BytePort, others: Mapping[int, PingReply], latency_s: float, *, noisy: bool
+    port: BytePort,
+    others: Mapping[int, PingReply],
+    latency_s: float,
+    *,
+    noisy: bool,
+    protocol: int | str = 2,
 ) -> list[Finding]:
     """Findings about devices that replied and are not the robot's: presence, IDs, alarms, torque.
 
@@ -104,6 +109,7 @@ def unlisted(
         others: their replies to a broadcast ping, by ID.
         latency_s: how long adapter and driver may hold bytes back.
         noisy: damage on this line shows nothing about IDs.
+        protocol: of the servos on the line.
 
     """
     if not others:
@@ -116,7 +122,7 @@ def unlisted(
             "name a robot that has them with --robot, or remove them from the bus",
         )
     ]
-    numbers, alarms, torque, shared = model_numbers(), [], [], []
+    numbers, alarms, torque, shared = model_numbers(protocol), [], [], []
     for servo_id, reply in others.items():
         model = numbers.get(reply.model_number)
         if model is None:

@@ -77,16 +77,32 @@ class FeetechBus(DynamixelBus):
         number = self.read(servo_id, "Model Number")
         return PingReply(servo_id, number, None, bool(status.error & ALERT))
 
-    def scan(self) -> dict[int, PingReply]:
-        """All servos at the port's baud rate, each ID pinged in turn; lasts 3 seconds."""
-        found: dict[int, PingReply] = {}
+    def answering(self) -> list[int]:
+        """IDs that answer a ping at the port's baud rate, each asked once; lasts 3 seconds."""
+        found = []
         for servo_id in range(MAX_ID + 1):
             try:
                 self._exchange(servo_id, FeetechInstruction.PING, b"", 0)
             except NoAnswerError:
                 continue
-            found |= self.find([servo_id])
+            found.append(servo_id)
         return found
+
+    def scan(self) -> dict[int, PingReply]:
+        """All servos at the port's baud rate."""
+        return self.find(self.answering())
+
+    def read_bytes(self, servo_id: int, register: Register) -> bytes:
+        """Bytes of a register as they are on the wire.
+
+        Raises:
+            NoAnswerError: nobody answered.
+
+        """
+        span = bytes((register.address, register.size))
+        return self._retry(
+            lambda: self._exchange(servo_id, FeetechInstruction.READ, span, register.size)
+        ).params
 
     def probe(self, servo_id: int, block: tuple[str, str] | None = None) -> Probe:
         """Ping 5 times until quiet, or read from the first to the last register of a block.
@@ -228,11 +244,7 @@ class FeetechBus(DynamixelBus):
 
     def _read(self, servo_id: int, register: Register) -> bytes:
         facts = self.table_of(servo_id).facts
-        span = bytes((register.address, register.size))
-        status = self._retry(
-            lambda: self._exchange(servo_id, FeetechInstruction.READ, span, register.size)
-        )
-        raw = np.frombuffer(status.params, np.uint8)[None]
+        raw = np.frombuffer(self.read_bytes(servo_id, register), np.uint8)[None]
         return BlockFormat(facts, register.address, register.size).convert(raw).tobytes()
 
     def _send(self, packet: bytes) -> float:
