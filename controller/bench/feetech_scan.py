@@ -65,7 +65,7 @@ def find_feetech(
             on_progress(f"Feetech servos at {baud} baud, ID by ID")
             bus = FeetechBus(port, _ANY, latency_s=latency_s, tries=1)
             for servo_id in bus.answering():
-                servo = _identify(bus, servo_id, baud)
+                servo = identify(bus, servo_id, baud)
                 if servo is not None:
                     found.setdefault(servo_id, servo)
     finally:
@@ -84,7 +84,7 @@ def _anybody(port: BytePort) -> bool:
     return bool(raw) and (FeetechParser().feed(raw) != [] or raw != packet)
 
 
-def _identify(bus: FeetechBus, servo_id: int, baud: int) -> FeetechServo | None:
+def identify(bus: FeetechBus, servo_id: int, baud: int) -> FeetechServo | None:
     """Model of a servo; None for a DYNAMIXEL servo of Protocol 1.0, whose ID is register 3."""
     try:
         head = bus.read_bytes(servo_id, _HEAD)

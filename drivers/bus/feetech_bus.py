@@ -34,6 +34,7 @@ from snakewalk.drivers.protocol.feetech import (
 )
 from snakewalk.drivers.protocol.packet import ALERT, BITS_PER_BYTE, StatusPacket
 from snakewalk.drivers.protocol.protocol1 import frame
+from snakewalk.drivers.protocol.registers import bauds_of
 
 _REPLY_S = 0.005
 """Time for servo and adapter besides the wire and ``latency_s`` (ours); the longest return delay is
@@ -153,16 +154,21 @@ class FeetechBus(DynamixelBus):
     def write_kept(self, servo_id: int, name: str, value: int) -> None:
         """Write a register of the EEPROM so that it outlasts power-off: unlock, write, lock.
 
+        The port takes on a new baud rate.
+
         Raises:
             ControlTableError: no such register, or the value does not fit it.
             BusError: the servo does not reply.
 
         """
         self.write(servo_id, "Lock", 0)
-        try:
-            self.write(servo_id, name, value)
-        finally:
-            self.write(value if name == "ID" else servo_id, "Lock", 1)
+        self.write(servo_id, name, value)
+        if name == "Baud Rate":
+            self.port.setBaudRate(bauds_of(self.table_of(servo_id).facts)[value])
+        if name == "ID" and value != servo_id:
+            self._tables[value] = self.table_of(servo_id)
+            servo_id = value
+        self.write(servo_id, "Lock", 1)
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
         """Write one value to all servos at once, without confirmation.
