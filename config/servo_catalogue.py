@@ -76,8 +76,8 @@ def described_model(name_or_path: str, beside: Path | None) -> ServoModel | None
 def models_by_number(folder: Path | None = None, protocol: int | str = 2) -> Mapping[int, str]:
     """Names of the known models of a protocol by model number.
 
-    With a ``folder``, also those whose files are in its folder ``servos``. Of shipped models with
-    one number the first by name is listed.
+    With a ``folder``, also those whose files are in its folder ``servos``. If shipped models
+    share a number, the first by name is listed.
 
     Raises:
         ConfigError: the faults of such a file.

@@ -7,7 +7,6 @@ from snakewalk.config.robot import ImuConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench import adapter, line_checks
 from snakewalk.controller.bench import servo_checks as servos
-from snakewalk.controller.bench.feetech_scan import find_feetech
 from snakewalk.controller.bench.imu_check import imu_finding
 from snakewalk.controller.bench.register_checks import (
     ServoRegisters,
@@ -26,6 +25,7 @@ from snakewalk.controller.console.finding import Finding, shown_subject, worst
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.feetech_scan import find_feetech
 from snakewalk.drivers.bus.probe import Overheard, Probe, overhear, probe
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from serial.tools import list_ports
 
 from snakewalk.config.robot import ImuConfig
-from snakewalk.controller.bench.feetech_scan import feetech_bauds, find_feetech
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_scan import feetech_bauds, find_feetech
 from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.errors import BusError, ControlTableError, PortError

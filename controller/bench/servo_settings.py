@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.bench.feetech_scan import identify
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import FeetechBus
+from snakewalk.drivers.bus.feetech_scan import identify
 from snakewalk.drivers.errors import BusError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_of

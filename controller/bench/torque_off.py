@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from snakewalk.controller.bench.emergency_stop import StopOutcome
-from snakewalk.controller.bench.feetech_scan import feetech_bauds
 from snakewalk.controller.bench.scan import scan
 from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.feetech_scan import feetech_bauds
 from snakewalk.drivers.errors import BusError, ControlTableError
 from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.serial_port import SerialPort

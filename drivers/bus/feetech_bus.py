@@ -1,8 +1,8 @@
 """The bus of Feetech servos: ``DynamixelBus`` with Feetech's packets.
 
-Register values are those of the table: the bus converts byte order, signs and alarms. Registers of
-the EEPROM area that are written while Lock is 1 take effect and are forgotten at power-off, so a
-run never wears the EEPROM; ``write_kept`` unlocks for one write.
+Register values are those of the table: the bus converts byte order, signs and alarms. A servo
+forgets registers of the EEPROM area at power-off if they were written while Lock was 1. So a run
+never wears the EEPROM; ``write_kept`` unlocks for one write.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -154,7 +154,7 @@ class FeetechBus(DynamixelBus):
     def write_kept(self, servo_id: int, name: str, value: int) -> None:
         """Write a register of the EEPROM so that it outlasts power-off: unlock, write, lock.
 
-        The port takes on a new baud rate.
+        The port changes to a new baud rate as well.
 
         Raises:
             ControlTableError: no such register, or the value does not fit it.

@@ -83,7 +83,7 @@ def _feetech_settings(
 ) -> tuple[ChainSetting, ...]:
     """Settings of one joint's Feetech servo, in the order in which they are written.
 
-    Lock comes first: what is written in the EEPROM area from then on is forgotten at power-off.
+    Lock comes first: the servo forgets later writes to the EEPROM area at power-off.
     """
     facts = robot.servo_records[joint]
     low, high = units.limits_raw[joint]
@@ -107,7 +107,7 @@ def _feetech_settings(
 
 
 def limitations(robot: RobotConfig) -> list[str]:
-    """What safety has to do without on a robot's servos, one line for each model and reason."""
+    """Return protections that a robot's servos lack, one line for each model and reason."""
     lines = []
     for facts in {facts.model: facts for facts in robot.servo_records}.values():
         if not facts.measures_current:

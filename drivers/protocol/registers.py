@@ -53,7 +53,7 @@ class Alarm(IntFlag):
     ELECTRICAL_SHOCK = 0x10
     OVERLOAD = 0x20
     OVER_CURRENT = 0x40
-    """Of Feetech servos, whose alarms are converted to these bits (``feetech.alarm_of``)."""
+    """Feetech servos only; ``feetech.alarm_of`` converts their alarms to these bits."""
 
 
 def alarm_names(hardware_error: int) -> str:

@@ -3,7 +3,7 @@
 An alarm is a bit of the servo status (register 65) and of the error byte of every reply while its
 cause lasts. Alarms in the mask of Shutdown(19) stay until the torque is switched on again: heat,
 supply and encoder switch it off, and an overload lowers the output to Protective Torque(34).
-(Memory tables of STS, SCSCL and HLS; what ends an alarm is ours.)
+(Memory tables of STS, SCSCL and HLS; the end of an alarm is ours.)
 """
 
 from collections.abc import Callable, Mapping, Sequence

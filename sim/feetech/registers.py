@@ -11,12 +11,12 @@ from snakewalk.drivers.protocol.feetech import decode_word, encode_word
 TABLE_END = 256
 """Addresses that a packet can name; those without a register read 0 (ours)."""
 _FOLLOWS = {"Goal PWM": "PWM Limit", "Goal Current": "Current Limit", "Secondary ID": "ID"}
-"""Registers that take the value of another one at power-on."""
+"""Registers that have the value of another one after power-on."""
 _COPIES = {"Kp": "Position P Gain", "Kd": "Position D Gain", "Ki": "Position I Gain"}
 
 
 class FeetechRegisters:
-    """Values (S,) by name; what is written in the EEPROM area while Lock is 1 is not kept."""
+    """Values (S,) by name; a write to the EEPROM area while Lock is 1 is not kept."""
 
     def __init__(self, facts: ServoModel, servos: int) -> None:
         self.facts = facts
