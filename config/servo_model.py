@@ -85,7 +85,7 @@ class RegisterRow(Strict):
     def _values_fit(self) -> Self:
         bits = 8 * self.size
         if self.sign_bit is not None and (self.signed or self.sign_bit >= bits):
-            raise ValueError(f"sign_bit: {self.sign_bit} does not fit: {self.size} byte(s), without signed")
+            raise ValueError(f"sign_bit: {self.sign_bit} does not fit in {self.size} byte(s)")
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if self.signed else (0, (1 << bits) - 1)
         if self.sign_bit is not None:
             high = (1 << self.sign_bit) - 1

@@ -56,7 +56,8 @@ def find_feetech(
         PortError: the port is gone.
 
     """
-    before, found = port.getBaudRate(), {}
+    before = port.getBaudRate()
+    found: dict[int, FeetechServo] = {}
     try:
         for baud in bauds:
             on_progress(f"Feetech servos at {baud} baud")

@@ -4,14 +4,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from snakewalk.config.loader import load_robot
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench import torque_off as stopping
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.servo_settings import SettingsRequest, apply, open_servo, plan
 from snakewalk.controller.console.finding import Finding
+from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.feetech.line import FeetechLine
@@ -120,3 +124,19 @@ def test_settings_of_a_feetech_servo_outlast_power_off() -> None:
     line.servos.reboot(0)
     assert scan(line, [500_000]).servos[0].servo_id == 7
     assert line.servos["Lock"].tolist() == [1, 1]
+
+
+def test_a_run_reports_that_there_is_no_watchdog() -> None:
+    line, lines = a_line(), []
+    chain = ServoChain(servo_bus(line, ROBOT.models_by_id), ROBOT, rate_hz=50)
+    chain.on_event = lines.append
+    chain.enable()
+    chain.disable()
+    assert sum("STS3215: has no bus watchdog" in each for each in lines) == 1
+
+
+def test_one_chain_has_one_make() -> None:
+    joints = [{"axis": "y", "id": 1}, {"axis": "y", "id": 2, "model": "XL330-M288"}]
+    servo = {"model": "STS3215", "supply_v": 6.0, "over_current_a": 1.0}
+    with pytest.raises(ValidationError, match="one chain has servos of one series"):
+        RobotConfig.model_validate({"name": "two", "joints": joints, "servo": servo})
