@@ -73,26 +73,31 @@ def described_model(name_or_path: str, beside: Path | None) -> ServoModel | None
     return None if path is None or path.parent == FOLDER else _read(path)
 
 
-def models_by_number(folder: Path | None = None) -> Mapping[int, str]:
-    """Names of the known models of Protocol 2.0 by model number.
+def models_by_number(folder: Path | None = None, protocol: int | str = 2) -> Mapping[int, str]:
+    """Names of the known models of a protocol by model number.
 
-    With a ``folder``, also those whose files are in its folder ``servos``.
+    With a ``folder``, also those whose files are in its folder ``servos``. If shipped models
+    share a number, the first by name is listed.
 
     Raises:
         ConfigError: the faults of such a file.
 
     """
     files = [] if folder is None else sorted((folder / "servos").glob("*.toml"))
+    shipped = _shipped_by_number(protocol)
     if not files:
-        return _shipped_by_number()
+        return shipped
     own = [_read(path) for path in files]
-    return {**_shipped_by_number(), **{m.model_number: m.model for m in own if m.protocol == 2}}
+    return {**shipped, **{m.model_number: m.model for m in own if m.protocol == protocol}}
 
 
 @cache
-def _shipped_by_number() -> Mapping[int, str]:
-    models = {name: _shipped_data(name)[0] for name in shipped_models()}  # schemas are slower
-    numbers = {m["model_number"]: name for name, m in models.items() if m.get("protocol", 2) == 2}
+def _shipped_by_number(protocol: int | str) -> Mapping[int, str]:
+    numbers: dict[int, str] = {}
+    for name in shipped_models():
+        model = _shipped_data(name)[0]  # a schema is slower
+        if model.get("protocol", 2) == protocol:
+            numbers.setdefault(model["model_number"], name)
     return MappingProxyType(numbers)
 
 

@@ -18,6 +18,8 @@ TABLE_BYTES: Final = 1024
 MODES: Final = (0, 1, 3, 4, 5, 16)
 """Operating Mode of Protocol 2.0: current, velocity, position, extended position, current-based
 position, PWM."""
+FEETECH_MODES: Final = (0, 1, 2, 3)
+"""Operating Mode of Feetech servos: position, velocity, PWM or current, step or PWM."""
 ModelName = Annotated[
     str, StringConstraints(min_length=1, max_length=40, pattern=r"^[A-Z0-9][A-Z0-9.+()-]*$")
 ]
@@ -54,14 +56,26 @@ _OF_PROTOCOL_1: Final = (
     *("Present Temperature", "Registered", "Moving", "Lock"),
 )
 """Registers that a simulated servo of Protocol 1.0 needs."""
+_OF_FEETECH: Final = (
+    *("Firmware Version", "Model Number", "ID", "Baud Rate", "Status Return Level"),
+    *("Min Position Limit", "Max Position Limit", "Temperature Limit", "Max Voltage Limit"),
+    *("Min Voltage Limit", "PWM Limit", "Shutdown", "Position P Gain"),
+    *("Torque Enable", "Goal Position", "Goal Velocity", "Lock", "Present Position"),
+    *("Present Velocity", "Present Load", "Present Input Voltage", "Present Temperature"),
+    *("Registered Instruction", "Hardware Error Status", "Moving"),
+)
+"""Registers that a run on a port and the simulated servo need of a Feetech servo."""
 
 
 class RegisterRow(Strict):
     """Row of a control table."""
 
     address: int = Field(ge=0, lt=TABLE_BYTES)
-    size: Literal[1, 2, 4] = Field(description="bytes, little-endian")
+    size: Literal[1, 2, 4] = Field(description="bytes, in the model's byte order")
     signed: bool = Field(False, description="two's complement")
+    sign_bit: int | None = Field(
+        None, ge=0, le=15, description="bit of the sign, the bits below it are the magnitude"
+    )
     initial: int = Field(0, description="value of a new servo, in RAM after each start")
     range: tuple[int, int] | None = Field(
         None, description="lowest and highest value that a host may write; default: read-only"
@@ -70,7 +84,12 @@ class RegisterRow(Strict):
     @model_validator(mode="after")
     def _values_fit(self) -> Self:
         bits = 8 * self.size
+        if self.sign_bit is not None and (self.signed or self.sign_bit >= bits):
+            raise ValueError(f"sign_bit: {self.sign_bit} does not fit in {self.size} byte(s)")
         low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if self.signed else (0, (1 << bits) - 1)
+        if self.sign_bit is not None:
+            high = (1 << self.sign_bit) - 1
+            low = -high
         for key, value in (("initial", self.initial), *(("range", v) for v in self.range or ())):
             if not low <= value <= high:
                 raise ValueError(f"{key}: {value} does not fit in {self.size} byte(s)")
@@ -157,7 +176,11 @@ class ServoModel(Strict):
     without: tuple[str, ...] = Field(
         (), description="registers of that model that this model lacks"
     )
-    protocol: Literal[1, 2] = 2
+    protocol: Literal[1, 2, "feetech"] = Field(
+        2, description='DYNAMIXEL Protocol 1.0 or 2.0, or "feetech"'
+    )
+    byte_order: Literal["little", "big"] = Field("little", description="of registers of 2 bytes")
+    sync_read: bool = Field(True, description="whether a Feetech servo has sync read")
     source: str = Field(
         min_length=1, description="documents with these figures; mark your own with (ours)"
     )
@@ -203,15 +226,18 @@ class ServoModel(Strict):
 
     @model_validator(mode="after")
     def _tables_are_complete(self) -> Self:
-        needed = ("Model Number", "ID") if self.protocol == 2 else _OF_PROTOCOL_1
+        needed = {2: ("Model Number", "ID"), 1: _OF_PROTOCOL_1, "feetech": _OF_FEETECH}[
+            self.protocol
+        ]
         missing = [name for name in needed if name not in self.registers]
         if missing:
             raise ValueError(f"registers: {', '.join(missing)} missing")
         if len(set(self.bauds)) != len(self.bauds) or any(baud <= 0 for baud in self.bauds):
             raise ValueError("bauds: positive rates, each once")
-        unknown = [mode for mode in self.modes if mode not in MODES]
+        known = FEETECH_MODES if self.protocol == "feetech" else MODES
+        unknown = [mode for mode in self.modes if mode not in known]
         if unknown:
-            shown = ", ".join(map(str, MODES))
+            shown = ", ".join(map(str, known))
             raise ValueError(f"modes: {unknown[0]} is not known; known are {shown}")
         for address, data, count in self.indirect:
             ends = (address + 2 * count, data + count)
@@ -227,7 +253,8 @@ class ServoModel(Strict):
 
     def missing_for_a_run(self) -> list[str]:
         """Names of registers and keys without which a run cannot use the model."""
-        missing = self._missing(_FOR_A_RUN)
+        is_feetech = self.protocol == "feetech"
+        missing = [] if is_feetech else self._missing(_FOR_A_RUN)
         if not {"Present Current", "Present Load"} & set(self.registers):
             missing.append("Present Current or Present Load")
         if "Present Current" in self.registers and self.units.current_a is None:
@@ -236,8 +263,9 @@ class ServoModel(Strict):
             missing.append("units.full_pwm")
         if not self.bauds:
             missing.append("bauds")
-        if 3 not in self.modes:
-            missing.append("modes with 3")
+        position_mode = 0 if is_feetech else 3
+        if position_mode not in self.modes:
+            missing.append(f"modes with {position_mode}")
         return missing
 
     def _missing(self, names: Sequence[str]) -> list[str]:
@@ -284,3 +312,10 @@ class ServoModel(Strict):
         """Acceleration of one unit of Profile Acceleration; NaN if it is not known."""
         rpm2 = self.units.acceleration_rpm2
         return math.nan if rpm2 is None else rpm2 * 2.0 * math.pi / 3600.0
+
+
+def protocol_name(facts: ServoModel) -> str:
+    """Protocol of a model in words."""
+    if facts.protocol == "feetech":
+        return "Feetech's protocol"
+    return f"Protocol {facts.protocol}.0"

@@ -13,6 +13,7 @@ from snakewalk.config.robot.joint_values import JointValues
 from snakewalk.config.robot.keys import READ_INSTEAD, Unreadable
 from snakewalk.config.robot.servo import LAST_ID
 from snakewalk.config.robot.spelling import canonical_joints, canonical_links
+from snakewalk.config.servo_model import protocol_name
 
 _LIMIT_SHARE = 2.0 / 2.3
 """Share of the stall current at which a run stops (ours): 2 A for an XM430."""
@@ -190,7 +191,14 @@ class RobotConfig(JointValues):
             records = dict(zip(self.servo_models, self.servo_records, strict=True))
         except ConfigError as error:
             raise ValueError(f"servo: {error}") from None
+        first = next(iter(records.values()))
         for model, facts in records.items():
+            formats = (facts.protocol, facts.byte_order, facts.sync_read)
+            if formats != (first.protocol, first.byte_order, first.sync_read):
+                raise ValueError(
+                    f"servo: {first.model} speaks {protocol_name(first)} and {model} "
+                    f"{protocol_name(facts)} or other words: one chain has servos of one series"
+                )
             if facts.protocol == 1:
                 raise ValueError(
                     f"servo: model {model} speaks Protocol 1.0, which lacks group reads and a "

@@ -24,6 +24,8 @@ from snakewalk.controller.bench.unlisted_devices import (
 from snakewalk.controller.console.finding import Finding, shown_subject, worst
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.feetech_scan import find_feetech
 from snakewalk.drivers.bus.probe import Overheard, Probe, overhear, probe
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
@@ -36,6 +38,7 @@ from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, ServoUnits
 
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
+_FEETECH_MEASURED = ("Present Position", "Present Temperature")
 _PINGED = 6
 """Up to this number of missing servos are pinged at each baud rate; for more a broadcast is quicker
 (ours)."""
@@ -91,11 +94,12 @@ def examine(
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    reads = [bus.probe(i, _MEASURED) for i in found]
+    measured = _FEETECH_MEASURED if is_feetech(robot) else _MEASURED
+    reads = [bus.probe(i, measured) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
     if noise is not None:
         patience_s = bus.latency_s
-        bus = DynamixelBus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
+        bus = servo_bus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
     findings += _presence(bus, expected, found, imu, noise, overheard, on_progress)
     if imu is not None:
         findings.append(imu_finding(bus, imu))
@@ -112,7 +116,7 @@ def examine(
         on_progress("group reads")
         fast = all(s.fast_reads for s in reports)
         port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to earlier requests
-        patient = DynamixelBus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
+        patient = servo_bus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
         ids = [s.servo_id for s in reports for _ in range(_ASKED)]
         findings.append(
@@ -126,18 +130,26 @@ def examine(
     return findings
 
 
+def is_feetech(robot: RobotConfig) -> bool:
+    """Whether the robot's servos speak Feetech's protocol."""
+    return robot.servo_records[0].protocol == "feetech"
+
+
 def _find(
     port: BytePort, robot: RobotConfig, expected: Sequence[int], latency_s: float
 ) -> tuple[DynamixelBus, Collection[int]]:
     """The bus, and the servos that reply; the bus waits longer if all replies are later."""
-    bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s)
+    bus = servo_bus(port, robot.models_by_id, latency_s=latency_s)
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
     for servo_id in [*pinged, *expected][:_TIMED]:
-        timed = probe(port, servo_id, _TIMED, patience_s)
+        if is_feetech(robot):
+            timed = bus.probe(servo_id)
+        else:
+            timed = probe(port, servo_id, _TIMED, patience_s)
         late_s = timed.late_s
         if late_s and min(late_s) > latency_s and not timed.damaged:
-            patient = DynamixelBus(port, robot.models_by_id, latency_s=patience_s)
+            patient = servo_bus(port, robot.models_by_id, latency_s=patience_s)
             return patient, patient.find(expected)
         if late_s:
             break
@@ -164,12 +176,18 @@ def _presence(
     baud = port.getBaudRate()
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
-    old = protocol_1(port, silent, bus.latency_s) if silent else None
+    feetech = bus.table.facts.protocol == "feetech"
+    old = protocol_1(port, silent, bus.latency_s) if silent and not feetech else None
     findings += [] if old is None else [old]
     findings += servos.presence(expected, found, elsewhere, list(others), baud, port.name)
     findings += [] if noise is None else [noise]
-    findings += unlisted(port, others, bus.latency_s, noisy=noisy)
-    new = factory_servos(*(port, {*found, *others}, silent), noisy=noisy, on_progress=on_progress)
+    protocol = bus.table.facts.protocol
+    findings += unlisted(port, others, bus.latency_s, noisy=noisy, protocol=protocol)
+    new = None
+    if not feetech:
+        new = factory_servos(
+            *(port, {*found, *others}, silent), noisy=noisy, on_progress=on_progress
+        )
     already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
     findings += [] if new is None or already else [new]
     return findings
@@ -183,7 +201,7 @@ def _servo_findings(
     noise: Finding | None,
 ) -> list[Finding]:
     return [
-        servos.firmware(reports),
+        *([] if is_feetech(robot) else [servos.firmware(reports)]),
         servos.return_delay(reports),
         servos.alarms(reports, robot),
         servos.torque(reports),
@@ -242,7 +260,7 @@ def examine_segments(
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         parts = [
-            (DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s), ids)
+            (servo_bus(line, robot.models_by_id, latency_s=line.latency_s), ids)
             for line, ids in segments
         ]
         findings += supply_under_load(SegmentedBus(parts), robot, safety)
@@ -341,8 +359,12 @@ def _at_other_bauds(
         return {}
     port = bus.port
     before = port.getBaudRate()
-    others = [baud for baud in BAUDS if baud != before]
+    feetech = bus.table.facts.protocol == "feetech"
+    others = [baud for baud in (bus.table.facts.bauds if feetech else BAUDS) if baud != before]
     if len(missing) > _PINGED:
+        if feetech:
+            replying = find_feetech(port, others, on_progress)
+            return {s.servo_id: s.baud for s in replying if s.servo_id in missing}
         answering = scan(port, others, on_progress=on_progress)
         return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
     found: dict[int, int] = {}

@@ -9,6 +9,7 @@ from snakewalk.controller.bench.port_lines import PortLines
 from snakewalk.controller.bench.servo_settings import SettingChange
 from snakewalk.controller.console.finding import Finding
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, changes, own_file
 from snakewalk.drivers.errors import BusError
@@ -57,7 +58,7 @@ def read_all(lines: PortLines, robot: RobotConfig) -> dict[int, Fingerprint]:
     """Fingerprints of a robot's servos on all its ports; raises as ``read_fingerprints``."""
     found: dict[int, Fingerprint] = {}
     for line, ids in lines.lines:
-        bus = DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s)
+        bus = servo_bus(line, robot.models_by_id, latency_s=line.latency_s)
         there = [i for i in robot.servo_ids if ids is None or i in ids]
         found |= read_fingerprints(bus, there)
     return found

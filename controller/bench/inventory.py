@@ -8,7 +8,7 @@ from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.bench.scan import ScanResult, scan
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.start_up import ServoReport, read_report
 from snakewalk.drivers.errors import BusError, ControlTableError
 from snakewalk.drivers.port.byte_port import BytePort
@@ -65,7 +65,7 @@ def take_inventory(
 
 def _state(port: BytePort, latency_s: float, found: ScanResult) -> ServoReport | None:
     try:
-        bus = DynamixelBus(port, found.model, latency_s=latency_s)
+        bus = servo_bus(port, found.model, latency_s=latency_s)
         return read_report(bus, found.servo_id, found.model)
     except (BusError, ControlTableError):
         return None

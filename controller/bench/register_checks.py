@@ -14,16 +14,16 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.console.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.chain_settings import ChainSetting, chain_settings
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import (
     ALL_REPLY,
     IDENTITY,
-    ChainSetting,
-    chain_settings,
     identity_fault,
     pose_faults,
 )
 from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.protocol import feetech
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
     POSITION_MODE,
@@ -101,6 +101,10 @@ class _Checks:
 
     def all(self) -> list[Finding | None]:
         """Findings in the order of their weight; None where all is well."""
+        facts = self._robot.servo_records[0]
+        all_reply, shutdown = ALL_REPLY, SHUTDOWN_ALARMS
+        if facts.protocol == "feetech":
+            all_reply, shutdown = 1, feetech.shutdown_alarms(facts)
         return [
             self._pose(),
             self._exchanged(),
@@ -109,10 +113,11 @@ class _Checks:
             self._bad(
                 "status return level",
                 "warn",
-                lambda servo: servo.values.get("Status Return Level", ALL_REPLY) != ALL_REPLY,
+                lambda servo: servo.values.get("Status Return Level", all_reply) != all_reply,
                 "to writes",
                 verb="do not reply",
-                remedy="a run sets Status Return Level(68) to 2; other programs wait in vain",
+                remedy=f"a run sets {self._at('Status Return Level')} to {all_reply}; other "
+                "programs wait in vain",
             ),
             self._homing(),
             self._bits(
@@ -138,11 +143,8 @@ class _Checks:
             self._bad(
                 "shutdown",
                 "warn",
-                lambda servo: (
-                    servo.values.get("Shutdown", SHUTDOWN_ALARMS) & SHUTDOWN_ALARMS
-                    != SHUTDOWN_ALARMS
-                ),
-                "on, overloaded or overheated: Shutdown(63) is masked",
+                lambda servo: servo.values.get("Shutdown", shutdown) & shutdown != shutdown,
+                f"on, overloaded or overheated: {self._at('Shutdown')} is masked",
                 verb="stay",
             ),
             *self._pwm(),
@@ -153,6 +155,11 @@ class _Checks:
             *self._watchdog(),
         ]
 
+    def _at(self, name: str) -> str:
+        """Name of a register with its address."""
+        row = self._robot.servo_records[0].registers.get(name)
+        return name if row is None else f"{name}({row.address})"
+
     def _pwm(self) -> list[Finding | None]:
         """Limits and goals of the PWM that make a servo weak."""
         full = self._full
@@ -162,7 +169,7 @@ class _Checks:
                 "PWM limit",
                 "fail",
                 lambda servo: servo.values.get("PWM Limit") == 0,
-                "move: PWM Limit(36) is 0",
+                f"move: {self._at('PWM Limit')} is 0",
                 verb="cannot",
                 remedy=f"set it to {shown}",
             ),
@@ -172,7 +179,7 @@ class _Checks:
                 lambda servo: (
                     0 < servo.values.get("PWM Limit", full[servo.joint]) < full[servo.joint]
                 ),
-                f"a PWM Limit(36) below {shown}: weak and slow",
+                f"a {self._at('PWM Limit')} below {shown}: weak and slow",
                 remedy=f"set it to {shown}, unless it is meant",
             ),
             self._bad(
@@ -182,13 +189,14 @@ class _Checks:
                     servo.values.get("Goal PWM", full[servo.joint])
                     < servo.values.get("PWM Limit", full[servo.joint])
                 ),
-                "a Goal PWM(100) below its limit: weak or without power",
+                f"a {self._at('Goal PWM')} below its limit: weak or without power",
             ),
         ]
 
     def _limits(self) -> list[Finding | None]:
         """Limits, goals and sensors that other programs and faults leave behind."""
-        units = self._units
+        units, rows = self._units, self._robot.servo_records[0].registers
+        low, high = (rows[f"{end} Position Limit"].address for end in ("Max", "Min"))
         return [
             self._bad(
                 "position limits",
@@ -198,7 +206,7 @@ class _Checks:
                     or servo.values.get("Max Position Limit", math.inf)
                     < units.limits_raw[servo.joint][1]
                 ),
-                "position limits (48, 52) within the joint's range",
+                f"position limits ({low}, {high}) within the joint's range",
             ),
             self._not_factory("velocity limit", "Velocity Limit", "another program slowed it?"),
             self._not_factory(
@@ -212,7 +220,7 @@ class _Checks:
             ),
             self._weak(
                 *("goal current", "warn", "Goal Current"),
-                "a Goal Current(102) below the robot's current limit: weak",
+                f"a {self._at('Goal Current')} below the robot's current limit: weak",
             ),
             self._bad(
                 "registered instruction",
@@ -331,7 +339,7 @@ class _Checks:
     def _current_limit(self) -> Finding | None:
         return self._weak(
             *("current limit", "fail", "Current Limit"),
-            "a Current Limit(38) below the robot's current limit",
+            f"a {self._at('Current Limit')} below the robot's current limit",
             "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
         )
 
@@ -361,7 +369,9 @@ class _Checks:
         ]
         if not moved:
             return None
-        remedy = "a run leaves it: is each joint straight at 0? if not, Homing Offset(20) = 0"
+        remedy = (
+            f"a run leaves it: is each joint straight at 0? if not, {self._at('Homing Offset')} = 0"
+        )
         return Finding("homing offset", "warn", f"the zero is moved: {', '.join(moved)}", remedy)
 
     def _unusual(self, check: str, registers: Sequence[str]) -> Finding | None:
@@ -371,7 +381,8 @@ class _Checks:
             run = {s.register: s for s in self._settings(servo)}
             for name in registers:
                 value = servo.values.get(name)
-                usual = {self._factory[servo.joint].get(name, value), run[name].value}
+                usual = {self._factory[servo.joint].get(name, value)}
+                usual |= {run[name].value} if name in run else set()
                 if check == "operating mode":
                     usual |= {POSITION_MODE, CURRENT_POSITION_MODE}
                 if value is not None and value not in usual:
@@ -384,6 +395,8 @@ class _Checks:
 
 def _factory_values(facts: ServoModel) -> dict[str, int]:
     """Initial values of the registers; empty if the model's file does not give them."""
+    if facts.protocol == "feetech":
+        return {name: row.initial for name, row in facts.registers.items()}
     try:
         rules = registers_of(facts).rules
     except ControlTableError:

@@ -7,6 +7,7 @@ from serial.tools import list_ports
 
 from snakewalk.config.robot import ImuConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_scan import feetech_bauds, find_feetech
 from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.errors import BusError, ControlTableError, PortError
@@ -34,7 +35,7 @@ _TRIES = 6
 
 @dataclass(frozen=True, slots=True)
 class ScanResult:
-    """One servo that answered a broadcast ping."""
+    """One servo that answered a ping."""
 
     servo_id: int
     model: str
@@ -73,8 +74,9 @@ def check_bauds(bauds: Sequence[int]) -> None:
         ControlTableError: a line for each.
 
     """
-    shown = ", ".join(map(str, BAUDS))
-    unknown = [f"--baud {rate}: servos have {shown}" for rate in bauds if rate not in BAUDS]
+    known = sorted({*BAUDS, *feetech_bauds()})
+    shown = ", ".join(map(str, known))
+    unknown = [f"--baud {rate}: servos have {shown}" for rate in bauds if rate not in known]
     if unknown:
         raise ControlTableError(unknown)
 
@@ -114,6 +116,8 @@ def scan(
 ) -> ScanReport:
     """Ask at each baud rate, the likely ones first; leaves the port at the one it had.
 
+    Where no servo of Protocol 2.0 replies, Feetech servos are asked in their protocol.
+
     If a servo replies, or bytes are damaged, all are asked again until no new servo replies: a bad
     line loses requests and replies. Where nobody does, likely rates are asked again, if
     ``patient``.
@@ -148,6 +152,9 @@ def scan(
             if servos and port.setBaudRate(baud):
                 tries = _TRIES if bad else None
                 results += [_result(port, baud, reply, tries) for reply in servos.values()]
+        if not results and not noise:  # no servo of Protocol 2.0, and no bad line
+            found = find_feetech(port, bauds or feetech_bauds(), on_progress)
+            results = [ScanResult(s.servo_id, s.model, s.firmware, s.baud) for s in found]
     finally:
         port.setBaudRate(before)
     results.sort(key=lambda servo: (servo.servo_id, servo.baud))

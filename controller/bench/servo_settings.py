@@ -9,6 +9,8 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import FeetechBus
+from snakewalk.drivers.bus.feetech_scan import identify
 from snakewalk.drivers.errors import BusError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_of
@@ -85,7 +87,13 @@ def open_servo(port: BytePort, servo_id: int, latency_s: float) -> DynamixelBus:
     """
     if not 0 <= servo_id <= MAX_ID:
         raise InputError(f"--id {servo_id}: a bus has IDs 0 to {MAX_ID}")
-    found = DynamixelBus(port, latency_s=latency_s).ping(servo_id)
+    try:
+        found = DynamixelBus(port, latency_s=latency_s).ping(servo_id)
+    except NoAnswerError:
+        feetech = identify(FeetechBus(port, latency_s=latency_s), servo_id, port.getBaudRate())
+        if feetech is None:
+            raise
+        return FeetechBus(port, feetech.model, latency_s=latency_s)
     return DynamixelBus(port, model_of(found.model_number), latency_s=latency_s)
 
 
@@ -131,7 +139,7 @@ def apply(bus: DynamixelBus, servo_id: int, changes: tuple[SettingChange, ...]) 
     """
     for change in changes:
         if change.register in ("ID", "Baud Rate"):
-            bus.write(servo_id, change.register, change.after)
+            bus.write_kept(servo_id, change.register, change.after)
             if change.register == "ID":
                 servo_id = change.after
             else:
@@ -139,7 +147,7 @@ def apply(bus: DynamixelBus, servo_id: int, changes: tuple[SettingChange, ...]) 
             if bus.read(servo_id, change.register) != change.after:
                 raise BusError(f"servo {servo_id}: {change.register}: does not read back")
         else:
-            bus.write_verified(servo_id, change.register, change.after)
+            bus.write_verified(servo_id, change.register, change.after, kept=True)
 
 
 def restart(bus: DynamixelBus, servo_id: int) -> tuple[str, str]:

@@ -5,10 +5,12 @@ from typing import Final
 
 from snakewalk.controller.bench.emergency_stop import StopOutcome
 from snakewalk.controller.bench.scan import scan
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.feetech_scan import feetech_bauds
 from snakewalk.drivers.errors import BusError, ControlTableError
 from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.protocol.feetech import FeetechInstruction
 from snakewalk.drivers.protocol.packet import (
     BITS_PER_BYTE,
     BROADCAST_ID,
@@ -16,6 +18,8 @@ from snakewalk.drivers.protocol.packet import (
     InstructionPacket,
     encode_instruction,
 )
+from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID as FEETECH_BROADCAST
+from snakewalk.drivers.protocol.protocol1 import frame
 from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD
 
 _LIKELY: Final = (1_000_000, FACTORY_BAUD)
@@ -25,9 +29,13 @@ _COPIES: Final = 3
 """So often torque off is sent: noise may hit one (ours)."""
 _TRIES: Final = 8
 """How often a servo is asked whether its torque is off (ours)."""
+_FEETECH_TORQUE_ENABLE: Final = 40
 _TORQUE_OFF = encode_instruction(
     # Torque Enable(64) of the X and MX(2.0) series
     InstructionPacket(BROADCAST_ID, Instruction.WRITE, bytes([64, 0, 0]))
+)
+_FEETECH_OFF = frame(
+    FEETECH_BROADCAST, FeetechInstruction.WRITE, bytes((_FEETECH_TORQUE_ENABLE, 0))
 )
 
 
@@ -45,15 +53,17 @@ def torque_off(
         PortError: it is not there, or a program that has no stop button holds it.
 
     """
-    rates = tuple(bauds) or sorted(BAUDS, key=lambda rate: (rate not in _LIKELY, -rate))
+    known = {*BAUDS, *feetech_bauds()}
+    rates = tuple(bauds) or sorted(known, key=lambda rate: (rate not in _LIKELY, -rate))
     sent = 0
     with open_port(device, rates[0]) as port:
         held_s = max(_USB_S, port.latency_s)
         for rate in rates:
             if port.setBaudRate(rate):
-                port.write(_TORQUE_OFF * _COPIES)
+                packets = (_TORQUE_OFF + _FEETECH_OFF) * _COPIES
+                port.write(packets)
                 sent += 1
-                wire_s = _COPIES * len(_TORQUE_OFF) * BITS_PER_BYTE / rate
+                wire_s = len(packets) * BITS_PER_BYTE / rate
                 port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
         # on a bad line a request gets lost: the likely rates are asked twice
         for rate in (*rates, *(rate for rate in rates if rate in _LIKELY)):
@@ -82,7 +92,7 @@ def torque_off(
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
     """Read a servo's torque, switch it off again if it is on; returns the fault, if any."""
     try:
-        bus = DynamixelBus(port, model, latency_s=port.latency_s, tries=_TRIES)
+        bus = servo_bus(port, model, latency_s=port.latency_s, tries=_TRIES)
         bus.write_verified(servo_id, "Torque Enable", 0)
     except (BusError, ControlTableError) as fault:
         return f"servo {servo_id}: not confirmed: {fault}"

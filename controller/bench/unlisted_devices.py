@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.byte_port import BytePort
@@ -94,7 +95,12 @@ def _replies_in_protocol_1(port: BytePort, servo_id: int, latency_s: float) -> b
 
 
 def unlisted(
-    port: BytePort, others: Mapping[int, PingReply], latency_s: float, *, noisy: bool
+    port: BytePort,
+    others: Mapping[int, PingReply],
+    latency_s: float,
+    *,
+    noisy: bool,
+    protocol: int | str = 2,
 ) -> list[Finding]:
     """Findings about devices that replied and are not the robot's: presence, IDs, alarms, torque.
 
@@ -103,6 +109,7 @@ def unlisted(
         others: their replies to a broadcast ping, by ID.
         latency_s: how long adapter and driver may hold bytes back.
         noisy: damage on this line shows nothing about IDs.
+        protocol: of the servos on the line.
 
     """
     if not others:
@@ -115,7 +122,7 @@ def unlisted(
             "name a robot that has them with --robot, or remove them from the bus",
         )
     ]
-    numbers, alarms, torque, shared = model_numbers(), [], [], []
+    numbers, alarms, torque, shared = model_numbers(protocol), [], [], []
     for servo_id, reply in others.items():
         model = numbers.get(reply.model_number)
         if model is None:
@@ -129,7 +136,7 @@ def unlisted(
                 )
             )
             continue
-        bus = DynamixelBus(port, model, latency_s=latency_s)
+        bus = servo_bus(port, model, latency_s=latency_s)
         ping = bus.probe(servo_id)
         if ping.doubled or (not noisy and ping.damaged == ping.requests):
             shared.append(servo_id)

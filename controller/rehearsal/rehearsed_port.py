@@ -10,7 +10,7 @@ from snakewalk.controller.pose.sample import ArrivedPose
 from snakewalk.controller.pose.udp_feed import decoded
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.external.served_robot import ServedRobot
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 
 SENDER: Final = "127.0.0.1:40000"
@@ -41,7 +41,7 @@ class SimulatedPort:
         """Open the port: the client knows its bytes and its datagrams, and nothing else."""
         line = self.served.line
         chain = ServoChain(
-            DynamixelBus(line, robot.models_by_id),
+            servo_bus(line, robot.models_by_id),
             robot.model_copy(update={"ports": ()}),
             watchdog_s=run.safety.watchdog_s,
             rate_hz=run.cycle_hz,

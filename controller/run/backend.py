@@ -27,6 +27,7 @@ from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -138,7 +139,7 @@ def simulated(
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
     line = simulated_line(robot, body, deviation, made.imu())
     chain = ServoChain(
-        DynamixelBus(line, robot.models_by_id),
+        servo_bus(line, robot.models_by_id),
         robot.model_copy(update={"ports": ()}),  # here they are on one wire
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
@@ -296,7 +297,7 @@ def real_ports(robot: RobotConfig) -> list[str]:
 
 
 def _bus_on(robot: RobotConfig, line: SerialPort | NetworkPort) -> DynamixelBus:
-    return DynamixelBus(line, robot.models_by_id, latency_s=line.latency_s)
+    return servo_bus(line, robot.models_by_id, latency_s=line.latency_s)
 
 
 def _bus_on_ports(
@@ -307,7 +308,7 @@ def _bus_on_ports(
     with ExitStack() as opened:
         for each in robot.ports:
             if each.port == SIMULATED and simulated_line is not None:
-                bus = DynamixelBus(simulated_line, robot.models_by_id)
+                bus = servo_bus(simulated_line, robot.models_by_id)
             else:
                 bus = _bus_on(robot, open_port(each.port, robot.servo.baud, clock))
             opened.callback(bus.port.closePort)

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.errors import BudgetError
+from snakewalk.drivers.protocol import feetech
 from snakewalk.drivers.protocol.imu_table import BLOCK_BYTES
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
@@ -24,6 +26,8 @@ STATE_BYTES = 10
 """State block, read in every cycle: Present Current, Velocity, Position."""
 SLOW_STATE_BYTES = 3
 """Slow state block, read in every 16th cycle: Present Input Voltage, Present Temperature."""
+_FEETECH_SUPPLY_BYTES = 2
+"""Present Input Voltage and Present Temperature of Feetech servos."""
 CHECK_BYTES = 4
 """Longest register that is compared with its setting, in cycles without the slow state."""
 
@@ -161,6 +165,10 @@ def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
 
     Where segments are on ports of their own, that of the busiest port: all of them run at once.
     """
+    facts = robot.servo_records[0]
+    if facts.protocol == "feetech":
+        counts = [len(set(port.ids)) for port in robot.ports] or [robot.joint_count]
+        return _feetech_budget(facts, max(counts), baud)
     if not robot.ports:
         return _port_budget(robot.joint_count, baud, fast=fast, with_imu=robot.imu is not None)
     imu = set() if robot.imu is None else {robot.imu.id}
@@ -169,6 +177,20 @@ def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
         for port in robot.ports
     )
     return max(budgets, key=lambda budget: budget.cycle_s)
+
+
+def _feetech_budget(facts: ServoModel, servos: int, baud: int) -> WireBudget:
+    """Budget of the longest cycle of a chain of Feetech servos on one port."""
+    state = [facts.registers["Present Position"], facts.registers["Present Load"]]
+    if facts.measures_current:
+        state.append(facts.registers["Present Current"])
+    block = max(row.address + row.size for row in state) - state[0].address
+    goal = feetech.GROUP_BYTES + servos * (1 + facts.registers["Goal Position"].size)
+    request = reply = 0
+    for length in (block, max(_FEETECH_SUPPLY_BYTES, CHECK_BYTES)):
+        requests, replies = feetech.wire_bytes(facts, servos, length)
+        request, reply = request + requests, reply + replies
+    return WireBudget(servos, baud, False, goal, request, reply, 0.0)
 
 
 def _port_budget(servos: int, baud: int, *, fast: bool, with_imu: bool) -> WireBudget:

@@ -31,7 +31,7 @@ from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.compiling import is_compiling
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 from snakewalk.drivers.protocol.frames import HEAD
-from snakewalk.drivers.protocol.packet import BITS_PER_BYTE, HEADER
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
 _IS_LINUX = sys.platform.startswith("linux")
 FAST_FAILURES = 3
@@ -99,8 +99,7 @@ class ControlCycle:
 
         """
         self._port = port
-        self._goals = GroupWrite(ids, goal_address)
-        self._fast_path: FastPath | None = None
+        self._goals = self._goal_write(ids, goal_address)
         self._ids = tuple(ids)
         self._default_order = tuple(range(len(ids)))
         self._order = self._default_order
@@ -113,11 +112,32 @@ class ControlCycle:
         self._pending = pending if pending is not None else PendingReplies(port.clock)
         self._missed = np.zeros(len(ids), np.intp)
         self._line = line or LineReservation(port.clock, paced=port.paced)
-        self._default_request = GroupReadRequest(ids, read_address, read_bytes, fast=fast)
+        self._default_request = self._read_request(ids, read_bytes, fast=fast)
+        self._fast_path = self._native_path(spin_s)
+        self._awaited: tuple[GroupReadRequest, tuple[int, ...], FastPath | float] = (
+            *(self._default_request, self._default_order),
+            port.clock.now_s(),
+        )
+        """Request whose reply is awaited, its order, and what receives it, else until when."""
+        self.fast = fast
+        """Whether the next read is a fast one."""
+        self.counters = CycleCounters()
+
+    def _goal_write(self, ids: Sequence[int], address: int) -> GroupWrite:
+        """Packet that writes goals."""
+        return GroupWrite(ids, address)
+
+    def _read_request(self, ids: Sequence[int], length: int, *, fast: bool) -> GroupReadRequest:
+        """Packet that reads ``length`` bytes of the block."""
+        return GroupReadRequest(ids, self.read_address, length, fast=fast)
+
+    def _native_path(self, spin_s: float | None) -> FastPath | None:
+        """Fast path of the port; None where all must go through the port's own calls."""
+        port, latency_s = self._port, self._latency_s
         packets = self._goals, self._default_request, self._line
         if isinstance(port, FastPathPort):
-            self._fast_path = port.fast_path(*packets, latency_s=latency_s)
-        elif (
+            return port.fast_path(*packets, latency_s=latency_s)
+        if (
             isinstance(port, DescriptorPort)
             and port.descriptor is not None
             and self._line.zero_s is not None
@@ -128,15 +148,8 @@ class ControlCycle:
 
             if spin_s is None:
                 spin_s = SPIN_S if port.getBaudRate() >= SPIN_FROM_BAUD else 0.0
-            self._fast_path = SerialFastPath(port, *packets, latency_s=latency_s, spin_s=spin_s)
-        self._awaited: tuple[GroupReadRequest, tuple[int, ...], FastPath | float] = (
-            *(self._default_request, self._default_order),
-            port.clock.now_s(),
-        )
-        """Request whose reply is awaited, its order, and what receives it, else until when."""
-        self.fast = fast
-        """Whether the next read is a fast one."""
-        self.counters = CycleCounters()
+            return SerialFastPath(port, *packets, latency_s=latency_s, spin_s=spin_s)
+        return None
 
     @property
     def given_up_on(self) -> tuple[str, ...]:
@@ -254,17 +267,20 @@ class ControlCycle:
         if self._order is self._default_order and self.fast is default.fast and none_pending:
             return default
         if not none_pending:
-            responding = [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
-            length = self._pending.free_length(responding, length, fast=self.fast)
+            length = self._pending.free_length(self._responding(), length, fast=self.fast)
         key = (self.fast, length, self._order)
         request = self._requests.get(key)
         if request is None:
             if len(self._requests) >= _KEPT_REQUESTS:
                 self._requests.clear()
             ids = [self._ids[k] for k in self._order]
-            request = GroupReadRequest(ids, self.read_address, length, fast=self.fast)
+            request = self._read_request(ids, length, fast=self.fast)
             self._requests[key] = request
         return request
+
+    def _responding(self) -> list[int]:
+        """IDs of the servos that have replied lately."""
+        return [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
 
     def _send(self, packet: bytes) -> None:
         self._line.reserve(len(packet) * self._byte_s)
@@ -316,7 +332,7 @@ class ControlCycle:
             return raw
         more_s = port.clock.now_s() + 2 * HEAD * self._byte_s
         raw += port.read_until(expected + HEAD - len(raw), more_s)
-        if HEADER not in raw[expected:]:
+        if request.header not in raw[expected:]:
             return raw[:expected]  # noise, as when an adapter turns the line round
         return raw + port.read_until(2 * expected - len(raw), deadline_s)
 

@@ -264,8 +264,18 @@ class DynamixelBus:
         self._line.reserve(len(raw) * BITS_PER_BYTE / self.port.getBaudRate())
         self.port.write(raw)
 
-    def write_verified(self, servo_id: int, name: str, value: int) -> None:
+    def write_kept(self, servo_id: int, name: str, value: int) -> None:
+        """Write a register of the EEPROM so that it outlasts power-off; raises as ``write``."""
+        self.write(servo_id, name, value)
+
+    def write_verified(self, servo_id: int, name: str, value: int, *, kept: bool = False) -> None:
         """Write a register if it differs, and read it back: EEPROM wears out, and writes get lost.
+
+        Args:
+            servo_id: ID of the servo.
+            name: the register.
+            value: as it is in the register.
+            kept: write as ``write_kept`` does.
 
         Raises:
             BusError: it does not read back as written.
@@ -273,7 +283,7 @@ class DynamixelBus:
         """
         if self.read(servo_id, name) == value:
             return
-        self.write(servo_id, name, value)
+        (self.write_kept if kept else self.write)(servo_id, name, value)
         got = self.read(servo_id, name)
         if got != value:
             raise BusError(f"servo {servo_id}: {name}: wrote {value}, reads back {got}")

@@ -61,6 +61,9 @@ class GroupReadReply(NamedTuple):
 class GroupReadRequest:
     """One sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
 
+    header = HEADER
+    """First bytes of each packet."""
+
     def __init__(self, ids: Sequence[int], address: int, length: int, *, fast: bool) -> None:
         params = address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
         kind = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ

@@ -18,14 +18,19 @@ _GOAL = "Goal Position"
 
 
 class IdentifiedRead:
-    """Group read from the register that identifies a joint to its position and goal."""
+    """Group read from the register that identifies a joint to its position and goal.
+
+    Servos without such a register (SCS) are identified by their ID alone.
+    """
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, units: JointUnits) -> None:
         self._bus, self._robot, self._units = bus, robot, units
         ids = robot.servo_ids
         table = bus.table_of(ids[0])
         self._position = table.state_names[-1]
-        names = IDENTITY, _GOAL, self._position
+        names: tuple[str, ...] = (_GOAL, self._position)
+        if all(IDENTITY in bus.table_of(each) for each in ids):
+            names = (IDENTITY, *names)
         self._registers = {name: table.register(name) for name in names}
         self._cycle = bus.block(ids, names[0], names[-1], fast=False)
 
@@ -48,10 +53,10 @@ class IdentifiedRead:
         """
         here_rad, goals = np.full((2, self._robot.joint_count), np.nan)
         registers = self._registers
-        start = registers[IDENTITY].address
+        start = next(iter(registers.values())).address
 
         def store(joint: int, values: Mapping[str, int]) -> None:
-            if values[IDENTITY] == identity(joint):
+            if values.get(IDENTITY, identity(joint)) == identity(joint):
                 here_rad[joint] = self._units.position_rad(joint, values[self._position])
                 goals[joint] = values[_GOAL]
 

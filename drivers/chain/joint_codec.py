@@ -166,6 +166,8 @@ class StateDecoder:
 
         """
         for table in tables:
+            if table.facts.protocol == "feetech":
+                continue  # the bus converts the state
             registers = [table[name] for name in table.state_names]
             start = registers[0].address
             if [(r.address - start, r.size) for r in registers] != [(0, 2), (2, 4), (6, 4)]:

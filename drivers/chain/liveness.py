@@ -23,7 +23,7 @@ from snakewalk.drivers.chain.start_up import (
 )
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.protocol.control_table import Register
-from snakewalk.drivers.protocol.registers import WATCHDOG_TRIPPED
+from snakewalk.drivers.protocol.registers import WATCHDOG, WATCHDOG_TRIPPED
 
 SLOW_EVERY = 16
 """Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
@@ -49,7 +49,7 @@ class LivenessCheck:
         robot: RobotConfig,
         configured: Mapping[int, Mapping[str, int]],
         fingerprints: Mapping[int, Fingerprint],
-        watchdog_ticks: int,
+        watchdog_ticks: int | None,
         goals: GoalCheck,
         *,
         fast: bool,
@@ -62,7 +62,7 @@ class LivenessCheck:
             robot: their robot.
             configured: values of RAM registers as they were set, by joint.
             fingerprints: values of EEPROM registers at the start, by joint.
-            watchdog_ticks: Bus Watchdog(98) as it was armed.
+            watchdog_ticks: Bus Watchdog(98) as it was armed; None: the servos have none.
             goals: reads the goals back.
             fast: begin with fast sync reads.
             rad_per_position: returns the unit of a joint's position.
@@ -73,7 +73,9 @@ class LivenessCheck:
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
         self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
-        self._watchdog = read("Bus Watchdog", dict.fromkeys(joints, watchdog_ticks))
+        self._watchdog = None
+        if watchdog_ticks is not None:
+            self._watchdog = read(WATCHDOG, dict.fromkeys(joints, watchdog_ticks))
 
         def checks(
             registers: Iterable[str], values: Mapping[int, Mapping[str, int]]
@@ -84,7 +86,7 @@ class LivenessCheck:
             }
             return [read(name, expected) for name, expected in by_register.items() if expected]
 
-        (self._identity,) = checks([IDENTITY], configured)
+        self._identity = next(iter(checks([IDENTITY], configured)), None)
         self._settings = checks(RAM_SETTINGS, configured)
         self._shaping = checks(SHAPING_SETTINGS, configured)
         self._fingerprint = checks(FINGERPRINT, fingerprints)
@@ -130,7 +132,7 @@ class LivenessCheck:
         elif place == _IDENTITY_AT:
             check = self._identity
         elif place == _SETTINGS_AT:
-            check = self._settings[rounds % len(self._settings)]
+            check = _in_turn(self._settings, rounds, (_SETTINGS_AT,), place)
         elif place in _SHAPING_AT:
             check = _in_turn(self._shaping, rounds, _SHAPING_AT, place)
         elif place in _FINGERPRINT_AT:
@@ -163,7 +165,7 @@ class LivenessCheck:
         name, expected = check.register.name, check.expected[joint]
         if check is self._torque:
             return "torque is off: has it rebooted?"
-        if check is self._watchdog and value == WATCHDOG_TRIPPED:
+        if name == WATCHDOG and value == WATCHDOG_TRIPPED:
             return "its bus watchdog has stopped it"
         if check in self._fingerprint:
             change = register_change(name, expected, value, self._rad_per_position(joint))
@@ -183,7 +185,7 @@ class LivenessCheck:
         checks = [
             check
             for check in (self._watchdog, self._torque, *self._settings, *self._fingerprint)
-            if joint in check.expected
+            if check is not None and joint in check.expected
         ]
         try:
             values = self._bus.read_each(
@@ -200,8 +202,10 @@ class LivenessCheck:
 
 def _in_turn(
     checks: Sequence["RegisterCheck"], rounds: int, places: tuple[int, ...], place: int
-) -> "RegisterCheck":
+) -> "RegisterCheck | None":
     """The check whose turn it is, if one of them is made at each of the places of a round."""
+    if not checks:
+        return None
     return checks[(len(places) * rounds + places.index(place)) % len(checks)]
 
 
@@ -231,7 +235,7 @@ class RegisterCheck:
         ids = tuple(robot.servo_ids[joint] for joint in expected)
         cycle = bus.block(ids, name, name, fast=fast)
         register = bus.table_of(ids[0]).register(name)
-        raw = np.array(list(expected.values()), _kind(register)).tobytes()
+        raw = np.array(list(expected.values()), register.kind).tobytes()
         return cls(register, cycle, ids, dict(expected), raw)
 
     def compare(self, ask_again: ChainBus | None = None) -> tuple[dict[int, int], bool]:
@@ -249,7 +253,7 @@ class RegisterCheck:
         reply, register = self.cycle.read(), self.register
         if reply.flawless and reply.data.tobytes() == self.raw:  # the usual case
             return {}, True
-        values = np.ascontiguousarray(reply.data).view(_kind(register))[:, 0]
+        values = np.ascontiguousarray(reply.data).view(register.kind)[:, 0]
         everybody = reply.valid_count == len(reply.valid)
         found = {}
         for place, (joint, expected) in enumerate(self.expected.items()):
@@ -262,8 +266,3 @@ class RegisterCheck:
             if got != expected:
                 found[joint] = got
         return found, ask_again is not None or everybody
-
-
-def _kind(register: Register) -> str:
-    """Type of a register's numbers, as they stand in a packet."""
-    return f"<{'i' if register.signed else 'u'}{register.size}"

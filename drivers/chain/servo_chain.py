@@ -12,6 +12,7 @@ from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.alarm_reader import AlarmReader
+from snakewalk.drivers.chain.chain_settings import limitations
 from snakewalk.drivers.chain.fingerprint import Fingerprint
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
 from snakewalk.drivers.chain.goal_check import GoalCheck
@@ -35,6 +36,7 @@ from snakewalk.drivers.chain.torque_off import TorqueOff
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, ChainError, DriverError
 from snakewalk.drivers.protocol.registers import (
+    WATCHDOG,
     WATCHDOG_TICKS_MAX,
     WATCHDOG_UNIT_S,
     ServoUnits,
@@ -98,6 +100,7 @@ class ServoChain:
         scales = [ServoUnits.of(table.facts) for table in tables]
         self._units = JointUnits.of(robot, scales, can_hold=can_hold)
         # rounded up: at least the time that was asked for
+        self._has_watchdog = all(WATCHDOG in table for table in tables)
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
         self._watchdog_s = self._watchdog_ticks * WATCHDOG_UNIT_S
@@ -164,12 +167,8 @@ class ServoChain:
             self._imu.find()
         if self._rate_hz is not None:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
-        blind = np.flatnonzero(~self._units.measures_current)
-        if len(blind):
-            self.on_event(
-                f"{self.robot.servo_models[blind[0]]}: measures no current: safety "
-                "watches its output instead, as a share of the stall current"
-            )
+        for line in limitations(self.robot):
+            self.on_event(line)
         self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
         if self._file is not None:
             found = {self.robot.servo_ids[j]: each for j, each in self._fingerprints.items()}
@@ -268,7 +267,8 @@ class ServoChain:
     def _hold_and_arm(self, here_rad: Floats) -> JointState:
         """Goal = present, torque on, watchdog armed; every step read back; the state then."""
         bus, ids = self._bus, self.robot.servo_ids
-        bus.sync_write(ids, "Bus Watchdog", 0)  # goals follow at once, else an old goal counts
+        if self._has_watchdog:
+            bus.sync_write(ids, WATCHDOG, 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(here_rad)
         now_rad, held = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
         check_stillness(
@@ -280,8 +280,9 @@ class ServoChain:
                 f"{goals[joint]} was written to all"
             )
         ticks = self._watchdog_ticks
-        bus.sync_write(ids, "Bus Watchdog", ticks)  # before torque, which is never on without it
-        self._expect("Bus Watchdog", [ticks] * len(ids))
+        if self._has_watchdog:
+            bus.sync_write(ids, WATCHDOG, ticks)  # before torque, which is never on without it
+            self._expect(WATCHDOG, [ticks] * len(ids))
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
         self._liveness = self._new_liveness()
@@ -293,7 +294,7 @@ class ServoChain:
     def _new_liveness(self) -> LivenessCheck:
         return LivenessCheck(
             *(self._bus, self.robot, self._configured, self._fingerprints),
-            *(self._watchdog_ticks, self._goal_check),
+            *(self._watchdog_ticks if self._has_watchdog else None, self._goal_check),
             fast=self._fast_reads,
             rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
         )
@@ -431,7 +432,7 @@ class ServoChain:
 
         """
         pause_s = self._clock.now_s() - self._sent_at_s
-        if self._armed and pause_s > self._watchdog_s:
+        if self._armed and self._has_watchdog and pause_s > self._watchdog_s:
             raise BusError(
                 f"{pause_s:.2f} s without a packet: the bus watchdog ({self._watchdog_s:g} s) has "
                 "stopped the servos"
@@ -450,10 +451,10 @@ class ServoChain:
         bus, ids = self._bus, self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
-        labels = [self.robot.joint_label(joint) for joint in range(self.robot.joint_count)]
-        self._goal_check = GoalCheck(
-            labels, bus.block(ids, "Goal Position", "Goal Position", fast=fast)
-        )
+        labels = [*map(self.robot.joint_label, range(self.robot.joint_count))]
+        goal = bus.table_of(ids[0])["Goal Position"]
+        goals = bus.block(ids, goal.name, goal.name, fast=fast)
+        self._goal_check = GoalCheck(labels, goals, goal.kind)
         self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 

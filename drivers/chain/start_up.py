@@ -14,20 +14,23 @@ from numpy.typing import NDArray
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import PingReply
+from snakewalk.drivers.chain.chain_settings import (
+    FEETECH_SETTINGS,
+    STARTUP,
+    ChainSetting,
+    chain_settings,
+)
 from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause
+from snakewalk.drivers.protocol import feetech
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
-    CURRENT_POSITION_MODE,
     NO_SECONDARY_ID,
-    POSITION_MODE,
     RETURN_DELAY_UNIT_S,
     REVERSE,
-    SHUTDOWN_ALARMS,
-    TIME_PROFILE,
-    TORQUE_ON_BY_GOAL,
     VOLTAGE_UNIT_V,
+    WATCHDOG,
     alarm_names,
 )
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
@@ -48,11 +51,9 @@ _REPORTED = (
 )
 _COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position", *FINGERPRINT)
 """Registers read as well, for comparisons of a servo with its earlier state."""
-_STARTUP = "Startup Configuration"
-"""A firmware before 45 has none."""
 _SETTINGS = (
     *("Torque Enable", "Bus Watchdog", "Secondary(Shadow) ID", "Return Delay Time"),
-    *("Operating Mode", "Drive Mode", _STARTUP, "Shutdown", "Homing Offset", "PWM Limit"),
+    *("Operating Mode", "Drive Mode", STARTUP, "Shutdown", "Homing Offset", "PWM Limit"),
     *("Current Limit", "Min Position Limit", "Max Position Limit", "Goal Current"),
     *("Goal PWM", "Position P Gain", *SHAPING_SETTINGS, IDENTITY),
 )
@@ -131,7 +132,8 @@ def inspect(
         table = bus.table_of(servo_id)
         name = table.model
         if servo.model_number != table.model_number:
-            name = model_numbers().get(servo.model_number, f"number {servo.model_number}")
+            numbers = model_numbers(table.facts.protocol)
+            name = numbers.get(servo.model_number, f"number {servo.model_number}")
             text = f"{joint}: is a {name}, not a {table.model}"
             faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
             continue
@@ -154,75 +156,20 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
 
     """
     table = bus.table_of(servo_id)
-    names = (*_REPORTED, *(each for each in _COMPARED if each in table))
+    names = [each for each in (*_REPORTED, *_COMPARED) if each in table]
     values = bus.read_each(servo_id, names)
     return ServoReport(
         servo_id=servo_id,
         model=name,
         firmware=values["Firmware Version"],
         hardware_error=values["Hardware Error Status"],
-        return_delay_s=values["Return Delay Time"] * RETURN_DELAY_UNIT_S,
-        operating_mode=values["Operating Mode"],
+        return_delay_s=values.get("Return Delay Time", 0) * RETURN_DELAY_UNIT_S,
+        operating_mode=values.get("Operating Mode", feetech.POSITION_MODE),
         torque_on=bool(values["Torque Enable"]),
         temperature_c=float(values["Present Temperature"]),
         voltage_v=values["Present Input Voltage"] * VOLTAGE_UNIT_V,
         registers=values,
         fast_reads=table.facts.has_fast_reads(values["Firmware Version"]),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class ChainSetting:
-    """A register that shapes the motion or the safety of a chain, and what it must hold."""
-
-    register: str
-    value: int
-    bits: int = -1
-    """Mask of the bits that matter; the others stay as they are."""
-    usual: bool = True
-    """Whether other values come from a factory or another robot; else a change is reported."""
-
-    def value_in(self, registers: Mapping[str, int]) -> int:
-        """Whole value that the register should hold, where it holds what is in ``registers``."""
-        return registers[self.register] & ~self.bits | self.value & self.bits
-
-
-def chain_settings(
-    robot: RobotConfig, units: JointUnits, joint: int, goal_pwm: int
-) -> tuple[ChainSetting, ...]:
-    """Settings of one joint's servo, in the order in which they are written.
-
-    Args:
-        robot: limits and gains.
-        units: of its joints.
-        joint: index of the joint.
-        goal_pwm: the servo's PWM Limit(36): a Goal PWM(100) that another program left below it
-            would weaken the joint.
-
-    """
-    low, high = units.limits_raw[joint]
-    pitch = robot.all_axes[joint] == "p"
-    mode = CURRENT_POSITION_MODE if units.current_mode[joint] else POSITION_MODE
-    if pitch and not units.limits_current[joint]:  # such a model is as soft as its output is small
-        goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
-    return (
-        ChainSetting("Return Delay Time", 0),
-        # before the rest: a new mode resets the gains
-        ChainSetting("Operating Mode", mode),
-        # Torque that a goal or a power-up switches on is torque without a watchdog
-        ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
-        ChainSetting(_STARTUP, 0, usual=False),
-        ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
-        ChainSetting("Min Position Limit", int(low)),
-        ChainSetting("Max Position Limit", int(high)),
-        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
-        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
-        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
-        ChainSetting("Feedforward 1st Gain", 0, usual=False),
-        ChainSetting("Feedforward 2nd Gain", 0, usual=False),
-        ChainSetting("Profile Acceleration", 0),
-        ChainSetting("Profile Velocity", 0),
-        ChainSetting("Goal PWM", goal_pwm, usual=False),
     )
 
 
@@ -272,8 +219,8 @@ def configure(
         if found[joint]["Torque Enable"]:  # the packet was lost
             bus.write_verified(servo_id, "Torque Enable", 0)
         # in its error state goals are refused; if cleared with torque on, an old goal would count
-        if found[joint]["Bus Watchdog"]:
-            bus.write(servo_id, "Bus Watchdog", 0)
+        if found[joint].get(WATCHDOG):
+            bus.write(servo_id, WATCHDOG, 0)
     none = ChainSetting("Secondary(Shadow) ID", NO_SECONDARY_ID, usual=False)
     for joint in which:  # all, before a packet that one of them might treat as its own
         found[joint] = _apply(bus, robot, joint, (none,), found[joint], on_event)
@@ -301,7 +248,7 @@ def _configure_joint(
     values = _apply(bus, robot, joint, settings, found, on_event)
     if pwm_limit < full:
         on_event(f"{name}: PWM Limit is {pwm_limit} of {full}: weak and slow")
-    if values["Drive Mode"] & REVERSE:
+    if values.get("Drive Mode", 0) & REVERSE:
         on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
     before = found.get(IDENTITY, 0)
     if identity_fault(robot, joint, before) is not None:
@@ -309,12 +256,12 @@ def _configure_joint(
             f"{name}: its servo was {robot.joint_label(before - 1)} in the run before: have IDs "
             "been exchanged since?"
         )
-    offset = values["Homing Offset"]
+    offset = values.get("Homing Offset", 0)
     if offset:
         angle = offset * abs(units.rad_per_position[joint])
         on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
     set_here = {setting.register for setting in settings}
-    kept = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY)
+    kept = (*RAM_SETTINGS, *SHAPING_SETTINGS, *FEETECH_SETTINGS, IDENTITY)
     ram = {each: values[each] for each in kept if each in set_here and each in values}
     return ServoSettings(ram, fingerprint_of(values))
 
@@ -337,7 +284,10 @@ def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
 def _read_settings(bus: ChainBus, servo_id: int) -> dict[str, int]:
     """Values of all that ``configure`` looks at, as far as the model has it."""
     table = bus.table_of(servo_id)
-    return bus.read_each(servo_id, [each for each in _SETTINGS if each in table], (_STARTUP,))
+    names: tuple[str, ...] = _SETTINGS
+    if table.facts.protocol == "feetech":
+        names = (*_SETTINGS, *FEETECH_SETTINGS)
+    return bus.read_each(servo_id, [each for each in names if each in table], (STARTUP,))
 
 
 def _apply(
@@ -415,7 +365,8 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     found = bus.find(robot.servo_ids)
     right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]
     if right:
-        bus.sync_write(right, "Status Return Level", ALL_REPLY)
+        is_feetech = bus.table_of(right[0]).facts.protocol == "feetech"
+        bus.sync_write(right, "Status Return Level", 1 if is_feetech else ALL_REPLY)
     return found
 
 

@@ -7,6 +7,7 @@ from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import BusError, PortError
+from snakewalk.drivers.protocol.registers import WATCHDOG
 
 _GROUP_ROUNDS = 8
 """Group reads in which the servos may confirm that their torque is off (ours)."""
@@ -68,9 +69,13 @@ class TorqueOff:
         """Raise the error of servos that are not off, if any."""
         names = ", ".join(map(self._robot.joint_label, silent))
         if faults:
+            ids = self._robot.servo_ids
+            hold = "its servos hold their last goals"
+            if all(WATCHDOG in self._bus.table_of(each) for each in ids):
+                hold = f"its servos hold after the bus watchdog ({self._watchdog_s:.3g} s)"
             text = (
-                f"{'; '.join(map(str, faults))}; torque is not off: its servos hold after the bus "
-                f"watchdog ({self._watchdog_s:.3g} s); switch the servo power off"
+                f"{'; '.join(map(str, faults))}; torque is not off: {hold}; switch the servo power "
+                "off"
             )
             if ports > len(faults) and not silent:
                 text += "; on the other ports torque is off"
@@ -119,10 +124,10 @@ class TorqueOff:
         while silent and self._clock.now_s() < give_up_s:
             silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
         confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
-        if confirmed:
-            bus.sync_write(confirmed, "Bus Watchdog", 0)
+        if confirmed and all(WATCHDOG in bus.table_of(each) for each in confirmed):
+            bus.sync_write(confirmed, WATCHDOG, 0)
             # the port may be closed directly afterwards: a reply shows that the packet has arrived
-            bus.block(confirmed, "Bus Watchdog", "Bus Watchdog", fast=False).read()
+            bus.block(confirmed, WATCHDOG, WATCHDOG, fast=False).read()
         return silent
 
     def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:

@@ -22,9 +22,14 @@ class Register:
     name: str
     address: int
     size: int
-    """Bytes, little-endian."""
+    """Bytes, little-endian; ``FeetechBus`` converts words of another order."""
     signed: bool
-    """Two's complement."""
+    """Two's complement; ``FeetechBus`` converts words with a magnitude and a sign."""
+
+    @property
+    def kind(self) -> str:
+        """Type of the register's numbers in a block, for numpy."""
+        return f"<{'i' if self.signed else 'u'}{self.size}"
 
     def decode(self, data: bytes) -> int:
         """Value of ``size`` bytes."""
@@ -102,12 +107,12 @@ class ControlTable:
         return iter(self.registers)
 
 
-def model_numbers() -> Mapping[int, str]:
-    """Names of the known servos of Protocol 2.0 by model number.
+def model_numbers(protocol: int | str = 2) -> Mapping[int, str]:
+    """Names of the known servos of a protocol by model number.
 
     They include those of the files in the folder ``servos`` of the working directory.
     """
-    return models_by_number(Path())
+    return models_by_number(Path(), protocol)
 
 
 def model_of(model_number: int) -> str:
@@ -149,13 +154,13 @@ def _named(model: str) -> ControlTable:
 
 
 def _table(facts: ServoModel) -> ControlTable:
-    if facts.protocol != 2:
+    if facts.protocol == 1:
         usable = ", ".join(name for name in shipped_models() if servo_model(name).protocol == 2)
         raise ControlTableError(
             f"{facts.model}: has Protocol 1.0; known models of Protocol 2.0 are {usable}"
         )
     registers = {
-        name: Register(name, row.address, row.size, row.signed)
+        name: Register(name, row.address, row.size, row.signed or row.sign_bit is not None)
         for name, row in facts.registers.items()
     }
     for address, data, _ in facts.indirect[:1]:

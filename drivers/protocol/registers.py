@@ -19,6 +19,8 @@ LOAD_UNIT = 1e-3
 """Present Load(126) of models without a current sensor: of full output."""
 VOLTAGE_UNIT_V = 0.1
 """Present Input Voltage(144), all series of Protocol 2.0."""
+WATCHDOG = "Bus Watchdog"
+"""Register 98; Feetech servos have none."""
 WATCHDOG_UNIT_S = 0.02
 """Bus Watchdog(98)."""
 WATCHDOG_TICKS_MAX = 127
@@ -50,6 +52,8 @@ class Alarm(IntFlag):
     MOTOR_ENCODER = 0x08
     ELECTRICAL_SHOCK = 0x10
     OVERLOAD = 0x20
+    OVER_CURRENT = 0x40
+    """Feetech servos only; ``feetech.alarm_of`` converts their alarms to these bits."""
 
 
 def alarm_names(hardware_error: int) -> str:
@@ -98,6 +102,10 @@ class ServoUnits:
                 f"{facts.model}: its file lacks {', '.join(missing)}; a run needs "
                 "them: docs/how-to/add-a-servo-model.md"
             )
+        if facts.protocol == "feetech":
+            limits_current = "Goal Current" in facts.registers
+        else:
+            limits_current = measures and CURRENT_POSITION_MODE in facts.modes
         return ServoUnits(
             facts.units.zero_position,
             facts.rad_per_position,
@@ -106,7 +114,7 @@ class ServoUnits:
             measures,
             facts.units.full_pwm,
             math.nan if stall_a is None else stall_a,
-            measures and CURRENT_POSITION_MODE in facts.modes,
+            limits_current,
         )
 
     def position_rad(self, raw: SignedInts) -> Floats:

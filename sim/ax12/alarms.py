@@ -32,6 +32,9 @@ ALARMS: Mapping[str, int] = {
 class Ax12Alarms:
     """Alarms of S servos, whose registers are ``register(name)`` (S,)."""
 
+    known: Mapping[str, int] = ALARMS
+    """Errors that the servos detect, by the words of a fault file, and their bits."""
+
     def __init__(
         self,
         register: Callable[[str], NDArray[np.unsignedinteger]],
@@ -59,7 +62,7 @@ class Ax12Alarms:
     def alarms(self, row: int) -> Mapping[str, int]:
         """Errors that a servo can detect, and their bits."""
         del row
-        return ALARMS
+        return self.known
 
     def supply(self, volts: float | None, rows: Indices | None = None) -> None:
         """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
@@ -88,17 +91,27 @@ class Ax12Alarms:
         target_c = AMBIENT_C + motor.winding_k_per_w * motor.resistance_ohm * amps**2
         share = 1.0 - np.exp(-seconds / motor.thermal_time_s)
         self.temperature_c += (target_c - self.temperature_c) * share
-        full = np.where(drive.pwm_limit > 0.0, drive.pwm_limit, 1.0)  # 0 of 0 means no effort
+        full = self._full_output()
         on, slow_rad_s = drive.torque_on, self._slow_rad_s
         count_blocked(self._blocked_s, seconds, pwm, full, on, velocity_rad_s, slow_rad_s)
         tenths = np.rint(drive.supply_v * 10.0)
         low, high = self._register("Min Voltage Limit"), self._register("Max Voltage Limit")
         hot = np.rint(self.temperature_c) > self._register("Temperature Limit")
         found = Error1.VOLTAGE * ((tenths < low) | (tenths > high))
-        found |= Error1.OVERLOAD * (self._blocked_s >= OVERLOAD_S) | Error1.OVERHEATING * hot
-        self._latched |= found.astype(np.uint8) & self._register("Shutdown")
+        overload = self._blocked_s >= self._overload_s()
+        found |= Error1.OVERLOAD * overload | Error1.OVERHEATING * hot
+        self._latched |= found.astype(np.uint8) & self._register("Shutdown").astype(np.uint8)
         self.shown[:] = self._latched | found
         self._shut_down()
+
+    def _full_output(self) -> Floats:
+        """(S,) output at which a motor that does not turn is overloaded, fraction of the supply."""
+        limit = self._drive.pwm_limit
+        return np.where(limit > 0.0, limit, 1.0)  # 0 of 0 means no effort
+
+    def _overload_s(self) -> Floats | float:
+        """How long that may last."""
+        return OVERLOAD_S
 
     def _shut_down(self) -> None:
         self.shown |= self._latched

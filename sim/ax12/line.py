@@ -142,15 +142,13 @@ class Ax12Line(Wire):
         replies = []
         for row in self._addressed(packet.servo_id):
             own = int(self.servos["ID"][row])
-            delay_s = int(self.servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
-            level = int(self.servos["Status Return Level"][row])
+            delay_s, replies_to = self._delay_s(row), self._replies_to(row, code)
             error, data = Error1.CHECKSUM.value, b""
             if packet.intact:
                 error, data = self._execute_one(row, code, params)
-            asked = REPLY_LEVELS.get(code, 2)
             if packet.servo_id == BROADCAST_ID and code != Instruction1.PING:
                 continue
-            if level >= asked and not self._muted[row]:
+            if replies_to and not self._muted[row]:
                 shown = error | int(self.servos.protection.shown[row])
                 replies.append((own, Reply(delay_s, frame(own, shown, data))))
         replies.sort(key=lambda reply: reply[0])  # to a broadcast ping, IDs answer in turn
@@ -158,6 +156,18 @@ class Ax12Line(Wire):
             self._respond([reply for _, reply in each])
             for _, each in groupby(replies, lambda reply: reply[0])
         ]
+
+    def _delay_s(self, row: int) -> float:
+        """Silence before a reply of a servo."""
+        return int(self.servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
+
+    def _replies_to(self, row: int, code: int) -> bool:
+        """Whether the settings of a servo let it reply to an instruction."""
+        return int(self.servos["Status Return Level"][row]) >= REPLY_LEVELS.get(code, 2)
+
+    def _obeying(self, servo_id: int) -> list[int]:
+        """Rows of the servos that obey a sync write to an ID."""
+        return self._addressed(servo_id)
 
     def _respond(self, replies: list[Reply]) -> Reply:
         """Bytes on the wire of the servos with one ID."""
@@ -192,7 +202,7 @@ class Ax12Line(Wire):
         if packet.intact and packet.servo_id == BROADCAST_ID and len(params) >= 2:
             address, size = params[0], params[1]
             for at in range(2, len(params) - size, size + 1):
-                for row in self._addressed(params[at]):
+                for row in self._obeying(params[at]):
                     if self._deaf[row]:
                         continue
                     self.servos.write(row, address, params[at + 1 : at + 1 + size])

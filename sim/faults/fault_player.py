@@ -209,7 +209,7 @@ class FaultPlayer:
             if isinstance(fault, plan.WriteFault | plan.ReadingFault):
                 wrong += self._unwritable(fault, where)
             if fault.kind == "alert" and not self._line.has_alert_bit:
-                wrong.append(f"{where}: replies of Protocol 1.0 have no alert bit")
+                wrong.append(f"{where}: replies of Protocol 1.0 and of Feetech have no alert bit")
             if isinstance(fault, plan.TripFault) and fault.kind != "reboot":
                 wrong += self._undetectable(fault, where)
         if wrong:

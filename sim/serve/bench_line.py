@@ -7,9 +7,12 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import ImuConfig
-from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.servo_model import ServoModel, protocol_name
+from snakewalk.drivers.protocol.registers import baud_code
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import BAUD_CLOCK, Ax12Line
+from snakewalk.sim.feetech.line import FeetechLine
+from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.imu import Imu
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import LinkMotion
@@ -24,26 +27,34 @@ def bench_line(
     baud: int = 1_000_000,
     start_rad: ArrayLike = 0.0,
     imu: ImuConfig | None = None,
-) -> SimLine | Ax12Line:
+) -> SimLine | Ax12Line | FeetechLine:
     """Line of ``baud`` with the servos of ``chain``; shafts start at ``start_rad``, of all or each.
 
     An ``imu`` lies level and still on the bench with them.
 
     Raises:
         InputError: a model is not known or lacks the baud rate, two devices share an ID, or devices
-            of the two protocols are on one bus.
+            of two protocols are on one bus.
 
     """
     if imu is not None and imu.id in chain.ids:
         raise InputError(f"--imu {imu.id}: a servo has this ID")
     models = chain.records()
-    old = [facts for facts in models if facts.protocol == 1]
-    if old:
+    others = [facts for facts in models if facts.protocol != 2]
+    if others:
+        first = others[0]
         if imu is not None:
             raise InputError(
-                f"{old[0].model} speaks Protocol 1.0 and {imu.model} 2.0: not on one bus"
+                f"{first.model} speaks {protocol_name(first)} and {imu.model} Protocol 2.0: not on "
+                "one bus"
             )
-        return _ax12_line(chain.ids, models, baud, start_rad)
+        _check_one_model(models)
+        plant = BenchPlant(
+            len(chain.ids), gear=[measured_gearbox(each) for each in models], start_rad=start_rad
+        )
+        if first.protocol == 1:
+            return _ax12_line(chain.ids, first, baud, plant)
+        return feetech_line(FeetechServos(chain.ids, plant, first), baud)
     bank = ServoBank(chain.ids, models, baud)
     gears = [measured_gearbox(facts) for facts in models]
     plant = BenchPlant(len(bank), gear=gears, start_rad=start_rad)
@@ -53,27 +64,42 @@ def bench_line(
     return SimLine(bank, plant, baud=baud, imu=device)
 
 
-def _ax12_line(
-    ids: tuple[int, ...], models: Sequence[ServoModel], baud: int, start_rad: ArrayLike
-) -> Ax12Line:
-    facts = models[0]
-    others = sorted({each.model for each in models if each != facts})
-    if any(each.protocol != 1 for each in models):
-        old, new = (
-            [each.model for each in models if (each.protocol == 1) == is_old]
-            for is_old in (True, False)
-        )
+def _check_one_model(models: Sequence[ServoModel]) -> None:
+    """Reject servos of two protocols, or of two models without group packets of Protocol 2.0.
+
+    Raises:
+        InputError: with the models.
+
+    """
+    by_protocol = {facts.protocol: facts for facts in models}
+    if len(by_protocol) > 1:
+        first, *others = by_protocol.values()
+        shown = ", ".join(f"{each.model} {protocol_name(each)}" for each in others)
+        raise InputError(f"{first.model} speaks {protocol_name(first)} and {shown}: not on one bus")
+    names = sorted({facts.model for facts in models})
+    if len(names) > 1:
         raise InputError(
-            f"{old[0]} speaks Protocol 1.0 and {', '.join(dict.fromkeys(new))} Protocol 2.0: not "
-            "on one bus"
+            f"{' and '.join(names)}: one model of {protocol_name(models[0])} on a simulated bus"
         )
-    if others:
-        raise InputError(
-            f"{facts.model} and {', '.join(others)}: one model of Protocol 1.0 on a simulated bus"
-        )
+
+
+def _ax12_line(ids: tuple[int, ...], facts: ServoModel, baud: int, plant: BenchPlant) -> Ax12Line:
     if not BAUD_CLOCK / 255 <= baud <= BAUD_CLOCK / 2:
         raise InputError(f"{baud} baud: an {facts.model} has 7843 to 1000000")
-    plant = BenchPlant(len(ids), start_rad=start_rad)
     servos = Ax12Servos(ids, plant, facts=facts)
     servos["Baud Rate"][:] = round(BAUD_CLOCK / baud) - 1
     return Ax12Line(servos, baud=baud)
+
+
+def feetech_line(servos: FeetechServos, baud: int) -> FeetechLine:
+    """Line of ``baud`` to which Feetech servos are set.
+
+    Raises:
+        ControlTableError: the model lacks the rate.
+
+    """
+    code = baud_code(servos.facts, baud)
+    for row in range(len(servos)):
+        servos["Baud Rate"][row] = code
+        servos.registers.keep(row, "Baud Rate")
+    return FeetechLine(servos, baud=baud)

@@ -34,8 +34,8 @@ ORDER: Final = {
         "drivers.safety",
     ),
     "sim": (
-        *("sim", "sim.servo", "sim.line", "sim.faults", "sim.sniff", "sim.ax12", "sim.serve"),
-        *("sim.physics", "sim.rendering"),
+        *("sim", "sim.servo", "sim.line", "sim.faults", "sim.sniff", "sim.ax12", "sim.feetech"),
+        *("sim.serve", "sim.physics", "sim.rendering"),
     ),
     "controller": tuple(f"controller.{name}" for name in (*CORE, *FEATURES)),
 }

@@ -17,7 +17,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.kinematics.smoothstep import cubic
 from snakewalk.controller.runtime.loop import ticks
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import (
     BusError,
@@ -88,7 +88,7 @@ class CalibrationBench:
         self._robot = robot
         self._stop_requested, self._on_progress = stop_requested, on_progress
         self._clock = port.clock
-        bus = DynamixelBus(port, robot.models_by_id, latency_s=latency_s, tries=BUS_TRIES)
+        bus = servo_bus(port, robot.models_by_id, latency_s=latency_s, tries=BUS_TRIES)
         self._chain = ServoChain(bus, robot, watchdog_s=_WATCHDOG_S)
         limits = SafetyLimits.from_config(robot, SafetyConfig())
         self._limits = replace(limits, stale_limit_s=_STALE_S)

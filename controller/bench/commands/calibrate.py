@@ -24,6 +24,7 @@ from snakewalk.controller.console.command import BUS, command
 from snakewalk.controller.console.options import Force, Json, Port, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.port.network_port import open_port
 from snakewalk.drivers.safety.stop_button import StopButton
 
@@ -115,10 +116,10 @@ def calibrate(
         described = found.robot if baud is None else _at_baud(found.robot, baud)
         _write(out, robot_toml(described, heading))
         if backup is not None:
-            bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
+            bus = servo_bus(line, described.models_by_id, latency_s=line.latency_s)
             described, homing = _with_homing(bus, described, out, heading, backup, yes)
             facts |= homing
-        bus = DynamixelBus(line, described.models_by_id, latency_s=line.latency_s)
+        bus = servo_bus(line, described.models_by_id, latency_s=line.latency_s)
         fingerprints = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
         facts["fingerprints"] = str(fingerprints)
     answers.remove()

@@ -20,8 +20,11 @@ from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.truth import TruthLog
+from snakewalk.sim.feetech.line import FeetechLine
+from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import Plant
+from snakewalk.sim.serve.bench_line import feetech_line
 from snakewalk.sim.serve.watched_plant import WatchedPlant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import motors_of
@@ -82,9 +85,23 @@ def simulated_line(
     deviation: Deviation = NO_DEVIATION,
     imu: "Imu | None" = None,
     baud: int | None = None,
-) -> SimLine:
+) -> SimLine | FeetechLine:
     """Return the robot's servos on the shafts of a body, behind a simulated line."""
     rate = baud or robot.servo.baud
+    facts = robot.servo_records[0]
+    if facts.protocol == "feetech":
+        servos = FeetechServos(
+            robot.servo_ids,
+            plant,
+            facts,
+            robot.servo.supply_v,
+            deviation.mounting(robot),
+            motors_of(robot),
+        )
+        feetech = feetech_line(servos, rate)
+        if deviation.torque is not None:
+            servos.drive.torque_constant_n_m_a[:] *= deviation.torque
+        return feetech
     line = SimLine(
         ServoBank(robot.servo_ids, robot.servo_records, rate),
         plant,

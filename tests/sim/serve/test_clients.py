@@ -158,3 +158,44 @@ def test_lerobots_bus_with_two_models(servo_bus: Make, lerobot_motors: ModuleTyp
     finally:
         arm.disconnect()
     assert not bus["Torque Enable"].any()
+
+
+def test_lerobots_feetech_bus(
+    servo_bus: Make, lerobot_motors: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    del lerobot_motors  # its stand-ins for learning tools are needed
+    folder = Path(sys.prefix) / "clients-feetech"
+    if not folder.is_dir():
+        pytest.skip("feetech-servo-sdk is not installed")
+    monkeypatch.syspath_prepend(str(folder))
+    port = importlib.import_module("scservo_sdk").PortHandler
+    real_ms = port.getCurrentTime  # as ``patient_sdk`` does for the DYNAMIXEL SDK
+    monkeypatch.setattr(port, "getCurrentTime", lambda own: real_ms(own) / 50.0)
+    feetech = importlib.import_module("lerobot.motors.feetech")
+    base = importlib.import_module("lerobot.motors")
+    bus = servo_bus("1-6:STS3215")
+    names = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"]
+    motors = {
+        name: base.Motor(k, "sts3215", base.MotorNormMode.DEGREES)
+        for k, name in enumerate(names, 1)
+    }
+    arm = feetech.FeetechMotorsBus(port=bus.path, motors=motors)
+    arm.connect()
+    try:
+        arm.configure_motors()
+        offsets = arm.set_half_turn_homings()
+        assert set(offsets) == set(names)
+        arm.enable_torque()
+        arm.sync_write("Goal_Position", dict.fromkeys(names, 2400), normalize=False)
+        assert settled(
+            bus,
+            lambda: all(
+                abs(seen - 2400) < 10
+                for seen in arm.sync_read("Present_Position", normalize=False).values()
+            ),
+        )
+        assert arm.read("Present_Voltage", "gripper", normalize=False) == 74
+        assert (bus["Acceleration"] == 254).all()
+    finally:
+        arm.disconnect()
+    assert not bus["Torque Enable"].any()

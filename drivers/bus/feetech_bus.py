@@ -1,0 +1,308 @@
+"""The bus of Feetech servos: ``DynamixelBus`` with Feetech's packets.
+
+Register values are those of the table: the bus converts byte order, signs and alarms. A servo
+forgets registers of the EEPROM area at power-off if they were written while Lock was 1. So a run
+never wears the EEPROM; ``write_kept`` unlocks for one write.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from snakewalk.config.servo_model import ServoModel
+from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.feetech_cycle import (
+    Convert,
+    FeetechCycle,
+    FeetechSingleReads,
+    FeetechWrite,
+    state_convert,
+    supply_convert,
+)
+from snakewalk.drivers.bus.probe import Probe
+from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import Model, Register
+from snakewalk.drivers.protocol.feetech import (
+    MAX_ID,
+    STATUS_BYTES,
+    BlockFormat,
+    FeetechInstruction,
+    FeetechParser,
+    encode_word,
+)
+from snakewalk.drivers.protocol.packet import ALERT, BITS_PER_BYTE, StatusPacket
+from snakewalk.drivers.protocol.protocol1 import frame
+from snakewalk.drivers.protocol.registers import bauds_of
+
+_REPLY_S = 0.005
+"""Time for servo and adapter besides the wire and ``latency_s`` (ours); the longest return delay is
+0.508 ms."""
+_PROBES = 5
+
+
+class FeetechBus(DynamixelBus):
+    """Feetech servos of one model, or of several of one byte order, on one byte port."""
+
+    def __init__(
+        self,
+        port: BytePort,
+        model: Model | Mapping[int, Model] = "STS3215",
+        *,
+        latency_s: float = 0.004,
+        tries: int = 3,
+    ) -> None:
+        """Prepare; nothing is sent.
+
+        Raises:
+            ControlTableError: a model is not known, or is not from Feetech.
+
+        """
+        super().__init__(port, model, latency_s=latency_s, tries=tries)
+        for table in (self.table, *self._tables.values()):
+            if table.facts.protocol != "feetech":
+                raise ControlTableError(
+                    f"{table.model}: does not speak Feetech's protocol; on one port all servos "
+                    "speak one protocol"
+                )
+
+    def ping(self, servo_id: int) -> PingReply:
+        """Ping one servo and read its model number.
+
+        Raises:
+            NoAnswerError: nobody answered.
+
+        """
+        status = self._retry(lambda: self._exchange(servo_id, FeetechInstruction.PING, b"", 0))
+        number = self.read(servo_id, "Model Number")
+        return PingReply(servo_id, number, None, bool(status.error & ALERT))
+
+    def answering(self) -> list[int]:
+        """IDs that answer a ping at the port's baud rate, each asked once; lasts 3 seconds."""
+        found = []
+        for servo_id in range(MAX_ID + 1):
+            try:
+                self._exchange(servo_id, FeetechInstruction.PING, b"", 0)
+            except NoAnswerError:
+                continue
+            found.append(servo_id)
+        return found
+
+    def scan(self) -> dict[int, PingReply]:
+        """All servos at the port's baud rate."""
+        return self.find(self.answering())
+
+    def read_bytes(self, servo_id: int, register: Register) -> bytes:
+        """Bytes of a register as they are on the wire.
+
+        Raises:
+            NoAnswerError: nobody answered.
+
+        """
+        span = bytes((register.address, register.size))
+        return self._retry(
+            lambda: self._exchange(servo_id, FeetechInstruction.READ, span, register.size)
+        ).params
+
+    def probe(self, servo_id: int, block: tuple[str, str] | None = None) -> Probe:
+        """Ping 5 times until quiet, or read from the first to the last register of a block.
+
+        Raises:
+            PortError: the port is gone.
+
+        """
+        code, params, length = FeetechInstruction.PING, b"", 0
+        if block is not None:
+            first, last = (self.table_of(servo_id)[name] for name in block)
+            code, length = FeetechInstruction.READ, last.address + last.size - first.address
+            params = bytes((first.address, length))
+        packet, port = frame(servo_id, code, params), self.port
+        byte_s, reply_bytes = BITS_PER_BYTE / port.getBaudRate(), STATUS_BYTES + length
+        answered = total = damaged = 0
+        late_s: list[float] = []
+        for _ in range(_PROBES):
+            port.clearPort()
+            sent_s = port.clock.now_s()
+            port.write(packet)
+            wire_s = (len(packet) + 2 * reply_bytes) * byte_s
+            reader, replies = FeetechParser(), 0
+            while data := port.read_until(reply_bytes, sent_s + wire_s + _REPLY_S + self.latency_s):
+                replies += sum(each.servo_id == servo_id for each in reader.feed(data))
+                if replies == 1 and len(late_s) == answered:
+                    least_s = (len(packet) + reply_bytes) * byte_s
+                    late_s.append(port.clock.now_s() - sent_s - least_s)
+            answered += replies > 0
+            total += replies
+            damaged += reader.dropped_bytes + reader.pending > 0
+        doubled = max(0, total - _PROBES)
+        return Probe(servo_id, _PROBES, answered, doubled, damaged, tuple(late_s))
+
+    def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
+        """Write a register by its name; in the EEPROM area, until power-off while Lock is 1.
+
+        Raises:
+            ControlTableError: no such register, or the value does not fit it.
+            NoAnswerError: nobody answered.
+
+        """
+        table = self.table_of(servo_id)
+        row = table.facts.registers[table.register(name).name]
+        params = bytes((row.address,)) + encode_word(value, row, table.facts, name)
+        self._retry(lambda: self._exchange(servo_id, FeetechInstruction.WRITE, params, 0), tries)
+
+    def write_kept(self, servo_id: int, name: str, value: int) -> None:
+        """Write a register of the EEPROM so that it outlasts power-off: unlock, write, lock.
+
+        The port changes to a new baud rate as well.
+
+        Raises:
+            ControlTableError: no such register, or the value does not fit it.
+            BusError: the servo does not reply.
+
+        """
+        self.write(servo_id, "Lock", 0)
+        self.write(servo_id, name, value)
+        if name == "Baud Rate":
+            self.port.setBaudRate(bauds_of(self.table_of(servo_id).facts)[value])
+        if name == "ID" and value != servo_id:
+            self._tables[value] = self.table_of(servo_id)
+            servo_id = value
+        self.write(servo_id, "Lock", 1)
+
+    def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
+        """Write one value to all servos at once, without confirmation.
+
+        Raises:
+            ControlTableError: no such register, or the value does not fit it.
+
+        """
+        self._shared(servo_ids, name)
+        if servo_ids:
+            facts = self.table_of(servo_ids[0]).facts
+            packet = FeetechWrite(servo_ids, name, facts)
+            self._send(packet.encode(np.full(len(servo_ids), value, np.int32)))
+
+    def reboot(self, servo_id: int) -> None:
+        """Restart a servo: torque goes off; RAM and what was written under Lock are forgotten."""
+        self._retry(lambda: self._exchange(servo_id, FeetechInstruction.RESTART, b"", 0))
+
+    def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
+        """Control cycle: writes Goal Position, reads the state in the layout of Protocol 2.0."""
+        del fast
+        table = self._facts_of(servo_ids)
+        return self._cycle(servo_ids, *state_convert(table, self.table.state_names[0]))
+
+    def slow_cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
+        """Group read of voltage and temperature, in the layout of Protocol 2.0."""
+        del fast
+        return self._cycle(servo_ids, *supply_convert(self._facts_of(servo_ids)))
+
+    def block(
+        self, servo_ids: Sequence[int], first: str, last: str, *, fast: bool = True
+    ) -> ControlCycle:
+        """Group read of the registers from ``first`` to ``last``, converted.
+
+        Raises:
+            ControlTableError: the model lacks one of the registers.
+
+        """
+        del fast
+        start, end = self._shared(servo_ids, first), self._shared(servo_ids, last)
+        length = end.address + end.size - start.address
+        facts = self._facts_of(servo_ids)
+        convert = BlockFormat(facts, start.address, length).convert
+        return self._cycle(servo_ids, (start.address, length), convert)
+
+    def device_block(self, device_id: int, address: int, length: int) -> ControlCycle:
+        """Raise an error: no device of Protocol 2.0 is on this bus.
+
+        Raises:
+            ControlTableError: always.
+
+        """
+        raise ControlTableError(
+            f"device {device_id}: an IMU of Protocol 2.0 cannot be on a bus of Feetech servos; "
+            "connect it to a port of its own"
+        )
+
+    def _cycle(self, ids: Sequence[int], span: tuple[int, int], convert: Convert) -> ControlCycle:
+        facts = self._facts_of(ids)
+        kind = FeetechCycle if facts.sync_read or len(ids) == 1 else FeetechSingleReads
+        return kind(
+            self.port,
+            ids,
+            facts,
+            span,
+            convert,
+            latency_s=self.latency_s,
+            pending=self._pending,
+            line=self._line,
+        )
+
+    def _facts_of(self, servo_ids: Iterable[int]) -> ServoModel:
+        """Model of some servos, or of the first if they are of several with the same words."""
+        facts = [self.table_of(each).facts for each in servo_ids]
+        if len({(each.byte_order, each.sync_read) for each in facts}) > 1:
+            names = ", ".join(dict.fromkeys(each.model for each in facts))
+            raise ControlTableError(f"{names}: their words differ; use one series on a port")
+        return facts[0] if facts else self.table.facts
+
+    def _read(self, servo_id: int, register: Register) -> bytes:
+        facts = self.table_of(servo_id).facts
+        raw = np.frombuffer(self.read_bytes(servo_id, register), np.uint8)[None]
+        return BlockFormat(facts, register.address, register.size).convert(raw).tobytes()
+
+    def _send(self, packet: bytes) -> float:
+        free_s = self._line.reserve(len(packet) * BITS_PER_BYTE / self.port.getBaudRate())
+        self.port.write(packet)
+        return free_s
+
+    def _exchange(self, servo_id: int, code: int, params: bytes, length: int) -> StatusPacket:
+        """Reply of ``length`` bytes of one servo to one instruction.
+
+        Raises:
+            NoAnswerError: nobody answered.
+            BusError: a reply of another length came.
+
+        """
+        port, packet = self.port, frame(servo_id, code, params)
+        wire_s = (STATUS_BYTES + length) * BITS_PER_BYTE / port.getBaudRate()
+        port.clearPort()
+        deadline_s = self._send(packet) + wire_s + _REPLY_S + self.latency_s
+        reader, missing, other = FeetechParser(), STATUS_BYTES + length, None
+        while data := port.read_until(missing, deadline_s):
+            for status in reader.feed(data):
+                if status.servo_id != servo_id:
+                    continue
+                if len(status.params) == length:
+                    return status
+                other = len(status.params)
+            missing = max(1, STATUS_BYTES + length - reader.pending)
+        what = FeetechInstruction(code).name.lower().replace("_", " ")
+        at = f"at {port.getBaudRate()} baud"
+        if other is not None and not self._pending.is_pending(servo_id, other, fast=False):
+            raise BusError(f"servo {servo_id}: {what}: {other} bytes came, not {length}")
+        found = f"no answer {at}"
+        if reader.dropped_bytes or reader.pending:
+            found = f"damaged bytes {at}: noise on the line, or two servos with this ID"
+        raise NoAnswerError(f"servo {servo_id}: {what}: {found}")
+
+
+def servo_bus(
+    port: BytePort,
+    model: Model | Mapping[int, Model],
+    *,
+    latency_s: float = 0.004,
+    tries: int = 3,
+) -> DynamixelBus:
+    """Bus of a port for the protocol of its servos; arguments as of ``DynamixelBus``.
+
+    Raises:
+        ControlTableError: a model is not known, or servos of two protocols are on the port.
+
+    """
+    bus = DynamixelBus(port, model, latency_s=latency_s, tries=tries)
+    if bus.table.facts.protocol == "feetech":
+        return FeetechBus(port, model, latency_s=latency_s, tries=tries)
+    return bus

@@ -1,0 +1,245 @@
+"""The control cycle of Feetech servos: ``ControlCycle`` with Feetech's packets.
+
+The rules for late, doubled and missing replies are those of ``ControlCycle``. The blocks that it
+returns are converted: to little-endian two's complement, and the state to the layout of Protocol
+2.0, so that the chain above cannot distinguish the makes.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bytes
+from snakewalk.config.servo_model import RegisterRow, ServoModel
+from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.fast_path import FastPath
+from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
+from snakewalk.drivers.bus.group_write import GroupWrite
+from snakewalk.drivers.bus.line_reservation import LineReservation
+from snakewalk.drivers.bus.pending_replies import PendingReplies
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.feetech import (
+    STATUS_BYTES,
+    BlockFormat,
+    FeetechInstruction,
+    FeetechParser,
+    encode_word,
+)
+from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, HEADER, frame
+
+MOST_ENTRIES = 240
+"""Bytes of entries in one sync write (ours): the length field counts up to 255."""
+Convert = Callable[[Bytes], Bytes]
+
+
+class FeetechReadRequest(GroupReadRequest):
+    """One sync read of ``length`` bytes at ``address`` from ``ids``, or a read of one servo."""
+
+    header = HEADER
+
+    def __init__(self, ids: Sequence[int], address: int, length: int, *, is_single: bool) -> None:
+        span = bytes((address, length))
+        if is_single:
+            self.packet = frame(ids[0], FeetechInstruction.READ, span)
+        else:
+            self.packet = frame(BROADCAST_ID, FeetechInstruction.SYNC_READ, span + bytes(ids))
+        self.fast = False
+        self.frame_bytes = STATUS_BYTES + length
+        self.ids = tuple(ids)
+        self.length = length
+        self._index = {servo_id: k for k, servo_id in enumerate(ids)}
+        self.reply_bytes = len(self.ids) * self.frame_bytes
+
+    def parse(self, raw: bytes) -> GroupReadReply:
+        """Find each servo's result in the bytes that arrived before the deadline."""
+        reader = FeetechParser()
+        by_id, unexpected = self._in_turn(reader.feed(raw))
+        unexpected += reader.dropped_bytes + reader.pending
+        reply = self._partial(by_id, clean=not unexpected)
+        if unexpected or not reply.valid.all():
+            return reply
+        return reply._replace(whole=True, flawless=not reply.error.any())
+
+    def missing_bytes(self, raw: bytes) -> int:
+        """How many bytes more would complete the replies; 0 if none would."""
+        reader = FeetechParser()
+        missing = len(self.ids) - len(self._in_turn(reader.feed(raw))[0])
+        return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
+
+
+class FeetechWrite(GroupWrite):
+    """Sync write of one register to ``ids``, in their order."""
+
+    def __init__(self, ids: Sequence[int], name: str, facts: ServoModel) -> None:
+        self._ids, self._name, self._facts = tuple(ids), name, facts
+        self._row: RegisterRow = facts.registers[name]
+        self.size = len(self.encode(np.zeros(len(ids), np.int32)))
+
+    def encode(self, values: NDArray[np.int32]) -> bytes:
+        """Packets that write ``values`` (N,)."""
+        row, each = self._row, 1 + self._row.size
+        entries = b"".join(
+            bytes((servo_id,)) + encode_word(int(value), row, self._facts, self._name)
+            for servo_id, value in zip(self._ids, values, strict=True)
+        )
+        head, step = bytes((row.address, row.size)), MOST_ENTRIES // each * each
+        return b"".join(
+            frame(BROADCAST_ID, FeetechInstruction.SYNC_WRITE, head + entries[at : at + step])
+            for at in range(0, len(entries), step)
+        )
+
+
+class FeetechCycle(ControlCycle):
+    """Goals of Feetech servos, and a converted block of them, by sync read."""
+
+    def __init__(
+        self,
+        port: BytePort,
+        ids: Sequence[int],
+        facts: ServoModel,
+        span: tuple[int, int],
+        convert: Convert,
+        *,
+        latency_s: float,
+        pending: PendingReplies,
+        line: LineReservation,
+    ) -> None:
+        """Prepare the packets.
+
+        Args:
+            port: the line.
+            ids: servos, in the order of all arrays here.
+            facts: their model.
+            span: address and length of the block on the wire.
+            convert: makes the returned block (N, n) of the block on the wire (N, length).
+            latency_s: how long adapter and driver may hold bytes back, at most.
+            pending: pending replies of this port.
+            line: reservation of this port's line.
+
+        """
+        self._facts, self._convert, self._clock = facts, convert, port.clock
+        super().__init__(
+            port,
+            ids,
+            read_address=span[0],
+            read_bytes=span[1],
+            fast=False,
+            latency_s=latency_s,
+            pending=pending,
+            line=line,
+        )
+
+    def finish_read(self) -> GroupReadReply:
+        """Receive the reply to the request of ``begin_read``, converted."""
+        reply = super().finish_read()
+        return reply._replace(data=self._convert(reply.data))
+
+    def _goal_write(self, ids: Sequence[int], address: int) -> GroupWrite:
+        del address
+        return FeetechWrite(ids, "Goal Position", self._facts)
+
+    def _read_request(self, ids: Sequence[int], length: int, *, fast: bool) -> GroupReadRequest:
+        del fast
+        is_single = len(ids) == 1 and not self._facts.sync_read
+        return FeetechReadRequest(ids, self.read_address, length, is_single=is_single)
+
+    def _responding(self) -> list[int]:
+        # after fast reads Protocol 2.0 has plain ones, whose length nobody awaits
+        return super()._responding() or list(self._ids)
+
+    def _native_path(self, spin_s: float | None) -> FastPath | None:
+        del spin_s
+        return None
+
+
+class FeetechSingleReads(FeetechCycle):
+    """Cycle of servos without sync read: goals by sync write, a read of each servo in turn."""
+
+    def __init__(
+        self,
+        port: BytePort,
+        ids: Sequence[int],
+        facts: ServoModel,
+        span: tuple[int, int],
+        convert: Convert,
+        *,
+        latency_s: float,
+        pending: PendingReplies,
+        line: LineReservation,
+    ) -> None:
+        """Prepare the packets; arguments as of ``FeetechCycle``."""
+        make = partial(FeetechCycle, latency_s=latency_s, pending=pending, line=line)
+        self._singles = [make(port, (each,), facts, span, convert) for each in ids]
+        super().__init__(
+            port, ids, facts, span, convert, latency_s=latency_s, pending=pending, line=line
+        )
+        self._begun_s = self._clock.now_s()
+
+    @property
+    def since_sent_s(self) -> float:
+        """How old the values of a read are at most, s."""
+        return self._clock.now_s() - self._begun_s
+
+    def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
+        """Send goals (N,) if there are any; the servos are asked in ``finish_read``."""
+        if goals is not None:
+            self.write_goals(goals)
+        self._begun_s = self._clock.now_s()
+        self.counters.reads += 1
+
+    def finish_read(self) -> GroupReadReply:
+        """Ask each servo."""
+        replies = [each.read() for each in self._singles]
+        for name in ("timeouts", "unclean", "copies", "drained_bytes"):
+            total = sum(getattr(each.counters, name) for each in self._singles)
+            setattr(self.counters, name, total)
+        return GroupReadReply(
+            np.concatenate([each.data for each in replies]),
+            np.concatenate([each.valid for each in replies]),
+            np.concatenate([each.error for each in replies]),
+            np.concatenate([each.answered for each in replies]),
+            clean=all(each.clean for each in replies),
+            whole=all(each.whole for each in replies),
+            flawless=all(each.flawless for each in replies),
+        )
+
+
+def state_convert(facts: ServoModel, first: str) -> tuple[tuple[int, int], Convert]:
+    """Span of the state block on the wire, and its conversion to the layout of Protocol 2.0.
+
+    Args:
+        facts: the model.
+        first: Present Current, or Present Load.
+
+    """
+    rows = [facts.registers[name] for name in (first, "Present Velocity", "Present Position")]
+    address = min(row.address for row in rows)
+    length = max(row.address + row.size for row in rows) - address
+    block = BlockFormat(facts, address, length)
+    places = [(row.address - address, size) for row, size in zip(rows, (2, 4, 4), strict=True)]
+
+    def convert(data: Bytes) -> Bytes:
+        plain = block.convert(data)
+        parts = []
+        for at, size in places:
+            word = np.ascontiguousarray(plain[:, at : at + 2]).view("<i2")[:, 0]
+            column = np.ascontiguousarray(word.astype(f"<i{size}"))
+            parts.append(column.view(np.uint8).reshape(-1, size))
+        return np.ascontiguousarray(np.concatenate(parts, axis=1))
+
+    return (address, length), convert
+
+
+def supply_convert(facts: ServoModel) -> tuple[tuple[int, int], Convert]:
+    """Span of voltage and temperature on the wire, and its conversion (2 and 1 bytes)."""
+    volts, celsius = (
+        facts.registers[name] for name in ("Present Input Voltage", "Present Temperature")
+    )
+
+    def convert(data: Bytes) -> Bytes:
+        zero = np.zeros(len(data), np.uint8)
+        return np.stack([data[:, 0], zero, data[:, celsius.address - volts.address]], axis=1)
+
+    return (volts.address, celsius.address + celsius.size - volts.address), convert

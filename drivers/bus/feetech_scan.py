@@ -1,0 +1,99 @@
+"""Feetech servos on a line: found by pings of their own protocol, and named by their registers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from snakewalk.config.servo_catalogue import servo_model, shipped_models
+from snakewalk.drivers.bus.feetech_bus import FeetechBus
+from snakewalk.drivers.errors import BusError
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.protocol.control_table import Register, model_numbers
+from snakewalk.drivers.protocol.feetech import FeetechInstruction, FeetechParser
+from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
+from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, frame
+
+_HEAD: Final = Register("Firmware Version to Model Number", 0, 5, signed=False)
+_ANY: Final = "STS3215"
+"""Model whose first registers all of them share."""
+_TURN_S: Final = 0.3e-3
+"""Time after which the next servo replies to a broadcast ping (ours)."""
+_SETTLE_S: Final = 0.03
+_ORDERS: Final[dict[int, Literal["little", "big"]]] = {0: "little", 1: "big"}
+"""Register 2."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeetechServo:
+    """One servo that answered a ping."""
+
+    servo_id: int
+    model: str
+    firmware: int
+    baud: int
+
+
+def feetech_bauds() -> tuple[int, ...]:
+    """Baud rates of the shipped models, the factory's first."""
+    models = map(servo_model, shipped_models())
+    rates = [baud for facts in models if facts.protocol == "feetech" for baud in facts.bauds]
+    return tuple(dict.fromkeys(rates))
+
+
+def find_feetech(
+    port: BytePort,
+    bauds: Sequence[int],
+    on_progress: Callable[[str], None] = lambda step: None,
+    *,
+    latency_s: float = 0.004,
+) -> list[FeetechServo]:
+    """Servos at each baud rate, by ID; leaves the port at the rate it had.
+
+    Each ID is pinged only at a rate at which a broadcast ping is answered: replies to that may
+    collide, but not be missed.
+
+    Raises:
+        PortError: the port is gone.
+
+    """
+    before = port.getBaudRate()
+    found: dict[int, FeetechServo] = {}
+    try:
+        for baud in bauds:
+            on_progress(f"Feetech servos at {baud} baud")
+            if not port.setBaudRate(baud) or not _anybody(port):
+                continue
+            on_progress(f"Feetech servos at {baud} baud, ID by ID")
+            bus = FeetechBus(port, _ANY, latency_s=latency_s, tries=1)
+            for servo_id in bus.answering():
+                servo = identify(bus, servo_id, baud)
+                if servo is not None:
+                    found.setdefault(servo_id, servo)
+    finally:
+        port.setBaudRate(before)
+    return [found[servo_id] for servo_id in sorted(found)]
+
+
+def _anybody(port: BytePort) -> bool:
+    """Whether a broadcast ping is answered."""
+    packet = frame(BROADCAST_ID, FeetechInstruction.PING)
+    port.clearPort()
+    port.write(packet)
+    wire_s = 2 * len(packet) * BITS_PER_BYTE / port.getBaudRate()
+    raw = port.read_until(6, port.clock.now_s() + wire_s + _SETTLE_S)
+    port.drain_until_quiet(_SETTLE_S)
+    return bool(raw) and (FeetechParser().feed(raw) != [] or raw != packet)
+
+
+def identify(bus: FeetechBus, servo_id: int, baud: int) -> FeetechServo | None:
+    """Model of a servo; None for a DYNAMIXEL servo of Protocol 1.0, whose ID is register 3."""
+    try:
+        head = bus.read_bytes(servo_id, _HEAD)
+    except BusError:
+        return None
+    order = _ORDERS.get(head[2])
+    if order is None or (head[3] == servo_id and head[0] | head[1] << 8 in model_numbers(1)):
+        return None
+    number = int.from_bytes(head[3:], order)
+    name = model_numbers("feetech").get(number, f"Feetech, number {number}")
+    return FeetechServo(servo_id, name, head[0], baud)

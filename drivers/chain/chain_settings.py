@@ -1,0 +1,123 @@
+"""Registers that shape the motion or the safety of a chain, and their values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.chain.joint_codec import JointUnits
+from snakewalk.drivers.protocol import feetech
+from snakewalk.drivers.protocol.registers import (
+    CURRENT_POSITION_MODE,
+    POSITION_MODE,
+    SHUTDOWN_ALARMS,
+    TIME_PROFILE,
+    TORQUE_ON_BY_GOAL,
+    WATCHDOG,
+)
+
+STARTUP = "Startup Configuration"
+"""A firmware before 45 has none."""
+FEETECH_SETTINGS = ("Lock", "Acceleration", "Goal Velocity")
+"""Registers that only a chain of Feetech servos sets."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChainSetting:
+    """A register that shapes the motion or the safety of a chain, and what it must hold."""
+
+    register: str
+    value: int
+    bits: int = -1
+    """Mask of the bits that matter; the others stay as they are."""
+    usual: bool = True
+    """Whether other values come from a factory or another robot; else a change is reported."""
+
+    def value_in(self, registers: Mapping[str, int]) -> int:
+        """Whole value that the register should hold, where it holds what is in ``registers``."""
+        return registers[self.register] & ~self.bits | self.value & self.bits
+
+
+def chain_settings(
+    robot: RobotConfig, units: JointUnits, joint: int, goal_pwm: int
+) -> tuple[ChainSetting, ...]:
+    """Settings of one joint's servo, in the order in which they are written.
+
+    Args:
+        robot: limits and gains.
+        units: of its joints.
+        joint: index of the joint.
+        goal_pwm: the servo's PWM Limit(36): a Goal PWM(100) that another program left below it
+            would weaken the joint.
+
+    """
+    low, high = units.limits_raw[joint]
+    pitch = robot.all_axes[joint] == "p"
+    if pitch and not units.limits_current[joint]:  # such a model is as soft as its output is small
+        goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
+    if robot.servo_records[joint].protocol == "feetech":
+        return _feetech_settings(robot, units, joint, goal_pwm)
+    mode = CURRENT_POSITION_MODE if units.current_mode[joint] else POSITION_MODE
+    return (
+        ChainSetting("Return Delay Time", 0),
+        # before the rest: a new mode resets the gains
+        ChainSetting("Operating Mode", mode),
+        # Torque that a goal or a power-up switches on is torque without a watchdog
+        ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
+        ChainSetting(STARTUP, 0, usual=False),
+        ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
+        ChainSetting("Min Position Limit", int(low)),
+        ChainSetting("Max Position Limit", int(high)),
+        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
+        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
+        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
+        ChainSetting("Feedforward 1st Gain", 0, usual=False),
+        ChainSetting("Feedforward 2nd Gain", 0, usual=False),
+        ChainSetting("Profile Acceleration", 0),
+        ChainSetting("Profile Velocity", 0),
+        ChainSetting("Goal PWM", goal_pwm, usual=False),
+    )
+
+
+def _feetech_settings(
+    robot: RobotConfig, units: JointUnits, joint: int, goal_pwm: int
+) -> tuple[ChainSetting, ...]:
+    """Settings of one joint's Feetech servo, in the order in which they are written.
+
+    Lock comes first: the servo forgets later writes to the EEPROM area at power-off.
+    """
+    facts = robot.servo_records[joint]
+    low, high = units.limits_raw[joint]
+    speed = 1 if facts.motor is None else facts.motor.no_load_rpm / facts.units.velocity_rpm
+    shutdown = feetech.shutdown_alarms(facts)
+    return (
+        ChainSetting("Lock", 1),
+        ChainSetting("Return Delay Time", 0),
+        ChainSetting("Operating Mode", feetech.POSITION_MODE),
+        ChainSetting("Shutdown", shutdown, shutdown, usual=False),
+        ChainSetting("Min Position Limit", int(low)),
+        ChainSetting("Max Position Limit", int(high)),
+        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
+        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
+        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
+        ChainSetting("Acceleration", 0),
+        # 0 is the highest speed of some servos, and no motion of others (Phase, bit 3)
+        ChainSetting("Goal Velocity", round(speed)),
+        ChainSetting("Goal PWM", goal_pwm, usual=False),
+    )
+
+
+def limitations(robot: RobotConfig) -> list[str]:
+    """Return protections that a robot's servos lack, one line for each model and reason."""
+    lines = []
+    for facts in {facts.model: facts for facts in robot.servo_records}.values():
+        if not facts.measures_current:
+            lines.append(
+                f"{facts.model}: measures no current: safety watches its output instead, as a "
+                "share of the stall current"
+            )
+        if WATCHDOG not in facts.registers:
+            lines.append(
+                f"{facts.model}: has no bus watchdog: it holds its last goal if this program or "
+                "the port fails; keep a switch for the servo power at hand"
+            )
+    return lines

@@ -1,0 +1,192 @@
+"""Feetech's serial protocol (FT-SCS): instructions, alarms and the format of words.
+
+A packet is one of DYNAMIXEL Protocol 1.0 (``drivers.protocol.protocol1``). The words differ: STS
+and HLS servos are little-endian, SCS servos big-endian, and a signed word is a magnitude with a
+bit for its sign. The tables of the models state both (``config/servos``).
+
+Source: Feetech, "Servo SCS Communication Protocol", and the memory tables of STS, SCSCL and HLS.
+"""
+
+from collections.abc import Mapping
+from enum import IntEnum, IntFlag
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bytes
+from snakewalk.config.servo_model import RegisterRow, ServoModel
+from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.protocol.packet import ALERT, StatusPacket
+from snakewalk.drivers.protocol.protocol1 import HEADER, checksum
+from snakewalk.drivers.protocol.registers import Alarm
+
+MAX_ID: Final = 0xFD
+STATUS_BYTES: Final = 6
+"""Status packet without data: header 2, ID, length, error, checksum."""
+GROUP_BYTES: Final = 8
+"""Sync instruction without entries: header 2, ID, length, instruction, address, data length,
+checksum. A read of one servo is as long."""
+POSITION_MODE: Final = 0
+TORQUE_ON, TORQUE_DAMPING, CALIBRATE_MIDDLE = 1, 2, 128
+"""Torque Enable(40)."""
+
+
+class FeetechInstruction(IntEnum):
+    """Instructions of a host."""
+
+    PING = 0x01
+    READ = 0x02
+    WRITE = 0x03
+    REG_WRITE = 0x04
+    ACTION = 0x05
+    RECOVER = 0x06
+    """Restore all parameters but the ID."""
+    RESTART = 0x08
+    BACK_UP = 0x09
+    """Store the parameters that RECOVER restores."""
+    RESET = 0x0A
+    """Reset the count of turns."""
+    CALIBRATE = 0x0B
+    """Make the present position the middle, or the given one."""
+    SYNC_READ = 0x82
+    SYNC_WRITE = 0x83
+
+
+class FeetechAlarm(IntFlag):
+    """Bits of the error byte of a reply, and of the servo status (register 65)."""
+
+    VOLTAGE = 0x01
+    ENCODER = 0x02
+    OVERHEATING = 0x04
+    OVER_CURRENT = 0x08
+    OVERLOAD = 0x20
+
+
+_ALARMS: Final[Mapping[int, int]] = {
+    FeetechAlarm.VOLTAGE: Alarm.INPUT_VOLTAGE,
+    FeetechAlarm.ENCODER: Alarm.MOTOR_ENCODER,
+    FeetechAlarm.OVERHEATING: Alarm.OVERHEATING,
+    FeetechAlarm.OVER_CURRENT: Alarm.OVER_CURRENT,
+    FeetechAlarm.OVERLOAD: Alarm.OVERLOAD,
+}
+ALARM_BITS: Final = sum(_ALARMS)
+"""Bits of the error byte that report an alarm."""
+
+
+def alarm_of(status: int) -> int:
+    """Bits of ``registers.Alarm`` for a servo status."""
+    return sum(bit for own, bit in _ALARMS.items() if status & own)
+
+
+def shutdown_alarms(facts: ServoModel) -> int:
+    """Bits of Shutdown(19), "unload condition", that protect a motor: heat, current and load."""
+    bits = FeetechAlarm.OVERHEATING | (FeetechAlarm.OVER_CURRENT if facts.measures_current else 0)
+    return int(bits | (FeetechAlarm.OVERLOAD if "overload" in facts.alarms else 0))
+
+
+def decode_word(data: bytes, row: RegisterRow, facts: ServoModel) -> int:
+    """Value of a register's bytes on the wire."""
+    value = int.from_bytes(data[: row.size], facts.byte_order, signed=row.signed)
+    if row.sign_bit is None or row.size == 1:
+        return value
+    magnitude = value & (1 << row.sign_bit) - 1
+    return -magnitude if value >> row.sign_bit & 1 else magnitude
+
+
+def encode_word(value: int, row: RegisterRow, facts: ServoModel, name: str) -> bytes:
+    """Bytes of a register's value on the wire.
+
+    Raises:
+        ControlTableError: it does not fit.
+
+    """
+    if row.sign_bit is not None:
+        if abs(value) >= 1 << row.sign_bit:
+            raise ControlTableError(f"{name}: {value} does not fit below bit {row.sign_bit}")
+        value = abs(value) | (1 << row.sign_bit if value < 0 else 0)
+    try:
+        return value.to_bytes(row.size, facts.byte_order, signed=row.signed)
+    except OverflowError:
+        raise ControlTableError(f"{name}: {value} does not fit in {row.size} byte(s)") from None
+
+
+def wire_bytes(facts: ServoModel, servos: int, length: int) -> tuple[int, int]:
+    """Bytes of the requests and replies of a read of ``length`` bytes from each servo."""
+    requests = GROUP_BYTES + servos if facts.sync_read else GROUP_BYTES * servos
+    return requests, servos * (STATUS_BYTES + length)
+
+
+class BlockFormat:
+    """Converts blocks of registers from the wire to little-endian two's complement."""
+
+    def __init__(self, facts: ServoModel, address: int, length: int) -> None:
+        """Collect the registers that lie in the block of ``length`` bytes at ``address``."""
+        inside = [
+            row
+            for row in facts.registers.values()
+            if address <= row.address and row.address + row.size <= address + length
+        ]
+        words = [row for row in inside if row.size == 2]
+        self._swapped = [row.address - address for row in words if facts.byte_order == "big"]
+        self._signs = [
+            (row.address - address, row.sign_bit) for row in words if row.sign_bit is not None
+        ]
+        status = facts.registers["Hardware Error Status"].address - address
+        self._status = status if 0 <= status < length else None
+
+    def convert(self, blocks: Bytes) -> Bytes:
+        """Converted copy of blocks (N, length)."""
+        out = blocks.copy()
+        for at in self._swapped:
+            out[:, at], out[:, at + 1] = blocks[:, at + 1], blocks[:, at]
+        for at, bit in self._signs:
+            raw: NDArray[np.int32] = (
+                out[:, at].astype(np.int32) | out[:, at + 1].astype(np.int32) << 8
+            )
+            magnitude = raw & (1 << bit) - 1
+            value = np.where(raw >> bit & 1, -magnitude, magnitude)
+            out[:, at], out[:, at + 1] = value & 0xFF, value >> 8 & 0xFF
+        if self._status is not None:
+            column = out[:, self._status]
+            column[:] = [alarm_of(int(each)) for each in column]
+        return out
+
+
+class FeetechParser:
+    """Cuts a byte stream into status packets; noise and damaged packets are counted and skipped."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self.dropped_bytes = 0
+        """Bytes so far that belong to no packet."""
+
+    @property
+    def pending(self) -> int:
+        """Bytes that may be the beginning of a packet."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes) -> list[StatusPacket]:
+        """Packets that ``data`` completes; the error byte of an alarm is ``ALERT``."""
+        buffer = self._buffer
+        packets: list[StatusPacket] = []
+        buffer += data
+        while True:
+            at = buffer.find(HEADER)
+            if at < 0:
+                at = len(buffer) - buffer.endswith(b"\xff")
+            while buffer[at + 2 : at + 3] == b"\xff":
+                at += 1  # an ID is never FF: the header begins one byte later
+            self.dropped_bytes += at
+            del buffer[:at]
+            if len(buffer) < 4 or (buffer[3] >= 2 and len(buffer) < 4 + buffer[3]):
+                return packets
+            end = 4 + buffer[3]
+            body = bytes(buffer[2 : end - 1])
+            if buffer[3] < 2 or checksum(body) != buffer[end - 1]:
+                self.dropped_bytes += 2
+                del buffer[:2]
+                continue
+            alert = ALERT if body[2] & ALARM_BITS else 0
+            packets.append(StatusPacket(body[0], alert, body[3:]))
+            del buffer[:end]

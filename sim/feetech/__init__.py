@@ -1,0 +1,1 @@
+"""Feetech servos: STS, SCS and HLS, on the bytes of Feetech's serial protocol."""

@@ -1,0 +1,106 @@
+"""Registers of S Feetech servos: values in numbers, and their bytes in the model's format."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.servo_model import RegisterRow, ServoModel
+from snakewalk.drivers.protocol.feetech import decode_word, encode_word
+
+TABLE_END = 256
+"""Addresses that a packet can name; those without a register read 0 (ours)."""
+_FOLLOWS = {"Goal PWM": "PWM Limit", "Goal Current": "Current Limit", "Secondary ID": "ID"}
+"""Registers that have the value of another one after power-on."""
+_COPIES = {"Kp": "Position P Gain", "Kd": "Position D Gain", "Ki": "Position I Gain"}
+
+
+class FeetechRegisters:
+    """Values (S,) by name; a write to the EEPROM area while Lock is 1 is not kept."""
+
+    def __init__(self, facts: ServoModel, servos: int) -> None:
+        self.facts = facts
+        self._rows = dict(sorted(facts.registers.items(), key=lambda item: item[1].address))
+        self.values: dict[str, NDArray[np.int64]] = {
+            name: np.zeros(servos, np.int64) for name in self._rows
+        }
+        self._kept = {
+            name: np.zeros(servos, np.int64)
+            for name, row in self._rows.items()
+            if row.address < facts.ram_from
+        }
+        self._backup: dict[int, dict[str, int]] = {}
+        for row in range(servos):
+            self.reset(row, keep=())
+
+    def __getitem__(self, name: str) -> NDArray[np.int64]:
+        """(S,) live view of a register of all servos."""
+        return self.values[name]
+
+    def initial(self, name: str) -> int:
+        """Value of a register of a new servo."""
+        known = {"Model Number": self.facts.model_number, "Firmware Version": self.facts.firmware}
+        return known.get(name, self._rows[name].initial)
+
+    def read(self, row: int, address: int, length: int) -> bytes:
+        """Bytes of a block of one servo."""
+        data = bytearray(TABLE_END)
+        for name, each in self._inside(address - 1, address + length + 1):
+            raw = encode_word(int(self.values[name][row]), each, self.facts, name)
+            data[each.address : each.address + each.size] = raw
+        return bytes(data[address : address + length])
+
+    def write(self, row: int, address: int, data: bytes) -> list[str]:
+        """Write the registers that lie in a block; names of those that were accepted.
+
+        Registers that are read-only, and values out of range, are left as they are (ours).
+        """
+        accepted = []
+        for name, each in self._inside(address, address + len(data)):
+            if each.range is None:
+                continue
+            value = decode_word(data[each.address - address :], each, self.facts)
+            if each.range[0] <= value <= each.range[1]:
+                self.put(row, name, value)
+                accepted.append(name)
+        return accepted
+
+    def put(self, row: int, name: str, value: int) -> None:
+        """Set a register of one servo, as a write of its value does."""
+        self.values[name][row] = value
+        if name in self._kept and not self.values["Lock"][row]:
+            self._kept[name][row] = value
+        if name == "ID" and "Secondary ID" in self.values:
+            self.put(row, "Secondary ID", value)
+
+    def keep(self, row: int, name: str) -> None:
+        """Keep the present value of a register at power-off."""
+        self._kept[name][row] = self.values[name][row]
+
+    def restart(self, row: int) -> None:
+        """Set the values after power-on: those kept in the EEPROM, and initial ones of the RAM."""
+        for name in self._rows:
+            kept = self._kept.get(name)
+            self.values[name][row] = self.initial(name) if kept is None else kept[row]
+        for name, source in (_FOLLOWS | _COPIES).items():
+            if name in self.values:
+                self.values[name][row] = self.values[source][row]
+
+    def reset(self, row: int, keep: Iterable[str] = ("ID",)) -> None:
+        """Restore all parameters but those of ``keep``: backed-up ones, else the factory's."""
+        backup = self._backup.get(row, {})
+        for name, kept in self._kept.items():
+            if name not in keep:
+                kept[row] = backup.get(name, self.initial(name))
+        self.restart(row)
+
+    def back_up(self, row: int) -> None:
+        """Store the parameters in the EEPROM for ``reset``."""
+        self._backup[row] = {name: int(kept[row]) for name, kept in self._kept.items()}
+
+    def _inside(self, start: int, end: int) -> Iterable[tuple[str, RegisterRow]]:
+        return [
+            (name, each)
+            for name, each in self._rows.items()
+            if start <= each.address and each.address + each.size <= end
+        ]

@@ -1,0 +1,346 @@
+"""Feetech servos: the registers drive the motors and show their shafts."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bools, Floats, Indices
+from snakewalk.config.errors import InputError
+from snakewalk.config.servo_model import ServoModel
+from snakewalk.drivers.protocol.feetech import CALIBRATE_MIDDLE, MAX_ID, TORQUE_DAMPING
+from snakewalk.sim.feetech.alarms import FeetechAlarms
+from snakewalk.sim.feetech.registers import FeetechRegisters
+from snakewalk.sim.plant import Mounting, Plant
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
+from snakewalk.sim.servo.constant_readings import ConstantReadings
+from snakewalk.sim.servo.event_queue import EventQueue
+from snakewalk.sim.servo.motor import MotorColumns, MotorModel, make_drive
+from snakewalk.sim.servo.profile import Trajectory
+
+SLICE_S: Final = 2e-3
+POSITION, VELOCITY, PUSH, STEP = range(4)
+"""Operating Mode(33); PUSH is open-loop PWM on STS servos, and current on HLS servos. STEP is
+open-loop PWM on HLS servos."""
+ACCELERATION_RAD_S2: Final = np.radians(100.0 * 360.0 / 4096.0)
+"""Acceleration(41): 100 positions/s^2, 8.7 degrees/s^2 in the memory table."""
+_PUSH_GAIN = 1e-9
+"""Gain of a motor that only pushes: its goal is far away."""
+_FULL = 1000.0
+"""Goal PWM, PWM Limit, Present Load and open-loop PWM of full output."""
+
+
+class FeetechServos:
+    """S servos of one model on the shafts of ``plant``."""
+
+    def __init__(
+        self,
+        ids: Sequence[int],
+        plant: Plant,
+        facts: ServoModel,
+        supply_v: float | None = None,
+        mounting: Mounting | None = None,
+        motors: Sequence[MotorModel] | None = None,
+    ) -> None:
+        """Set up new servos; by default at the recommended supply, each on its shaft's zero.
+
+        Raises:
+            InputError: an ID is out of 0 to 253 or used twice.
+
+        """
+        wrong = [f"ID {each}: an {facts.model} has 0 to {MAX_ID}" for each in ids if each > MAX_ID]
+        if len(set(ids)) != len(ids):
+            wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
+        if wrong:
+            raise InputError(wrong)
+        servos = len(ids)
+        self.facts, self.plant = facts, plant
+        model = MotorModel.of(facts)
+        self._motor = MotorColumns(motors or [model] * servos)
+        self._mounting = mounting or Mounting(np.ones(servos), np.zeros(servos))
+        volts = model.nominal_v if supply_v is None else supply_v
+        self.registers = registers = FeetechRegisters(facts, servos)
+        self.drive = make_drive(motors or [model] * servos, volts)
+        self.blocked_shaft = BlockedShaft(self.drive)
+        self.protection = FeetechAlarms(
+            registers.__getitem__, facts.alarms, self.drive, model, self.blocked_shaft, volts
+        )
+        self.events = EventQueue()
+        """Events that happen to the servos at a time of their own, such as faults."""
+        self.powered = np.ones(servos, bool)
+        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
+        self._no_output = np.zeros(servos, bool)
+        self._readings = ConstantReadings(registers.__getitem__)
+        self._trajectory = Trajectory(servos, facts.rad_s_per_velocity, ACCELERATION_RAD_S2)
+        self._turns = np.zeros(servos)
+        self._step_goal = np.full(servos, np.nan)
+        """(S,) goals of servos in step mode, positions of all turns; NaN before the first step."""
+        self._was_on = np.zeros(servos, bool)
+        self._registered: dict[int, tuple[int, bytes]] = {}
+        self._time_s = plant.time_s
+        for row, servo_id in enumerate(ids):
+            registers.put(row, "Lock", 0)
+            registers.put(row, "ID", servo_id)
+            self.reboot(row)
+
+    def __getitem__(self, name: str) -> NDArray[np.int64]:
+        """(S,) live view of a register of all servos."""
+        return self.registers[name]
+
+    def __len__(self) -> int:
+        return len(self.powered)
+
+    # instructions
+
+    def read(self, row: int, address: int, length: int) -> bytes:
+        """Bytes of a block; ``refresh`` comes before."""
+        return self.registers.read(row, address, length)
+
+    def write(self, row: int, address: int, data: bytes) -> int:
+        """Write whole registers; returns 0: a reply reports no rejected write."""
+        torque = self.facts.registers["Torque Enable"].address
+        if address <= torque < address + len(data) and data[torque - address] == CALIBRATE_MIDDLE:
+            self.calibrate(row, self.facts.units.zero_position)
+            return 0
+        for name in self.registers.write(row, address, data):
+            if name == "Torque Enable" and self["Torque Enable"][row] and not self._was_on[row]:
+                self.protection.reset(row)
+            if name == "Goal Position" and self._mode()[row] == STEP and self._has_steps():
+                here = self._step_goal[row]
+                here = self._ticks()[row] if np.isnan(here) else here
+                self._step_goal[row] = here + int(self["Goal Position"][row])
+        return 0
+
+    def register_write(self, row: int, address: int, data: bytes) -> int:
+        """Reg Write: keep for Action."""
+        self._registered[row] = (address, data)
+        self["Registered Instruction"][row] = 1
+        return 0
+
+    def action(self, row: int) -> int:
+        """Carry out the registered write, if there is one."""
+        kept = self._registered.pop(row, None)
+        self["Registered Instruction"][row] = 0
+        return self.write(row, *kept) if kept is not None else 0
+
+    def calibrate(self, row: int, position: int) -> None:
+        """Make the present position ``position`` by Homing Offset(31), which is kept."""
+        if "Homing Offset" not in self.facts.registers:
+            return
+        turn = round(self.facts.units.positions_per_turn)
+        offset = round(float(self._ticks()[row])) - position
+        self["Homing Offset"][row] = (offset + turn // 2) % turn - turn // 2
+        self.registers.keep(row, "Homing Offset")
+        self.reset_turns(row)
+
+    def reset_turns(self, row: int) -> None:
+        """Count turns from the present one on."""
+        free = np.arange(len(self)) == row
+        self._turns = np.where(free, self._turn(), self._turns)
+
+    def reset(self, row: int) -> None:
+        """Restore all parameters but the ID, and restart."""
+        self.registers.reset(row)
+        self.reboot(row)
+
+    def reboot(self, row: int) -> None:
+        """Restart: RAM has its initial values, torque is off, goal = present position."""
+        self.registers.restart(row)
+        self._registered.pop(row, None)
+        self._was_on[row] = False
+        self.protection.reset(row)
+        self.reset_turns(row)
+        self.refresh()
+        self["Goal Position"][row] = self["Present Position"][row]
+
+    # power, blocked shafts, time
+
+    def hold_position(self) -> None:
+        """Give every servo its present position as goal, at rest: its shaft was put elsewhere."""
+        self._turns = self._turn()
+        self.refresh()
+        self["Goal Position"][:] = self["Present Position"]
+        self._trajectory.restart(np.ones(len(self), bool), self._servo_rad())
+
+    def cut_power(self, rows: Indices) -> None:
+        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
+        self.powered[rows] = False
+
+    def restore_power(self, rows: Indices) -> None:
+        """Give the supply back."""
+        self.powered[rows] = True
+        for row in rows:
+            self.reboot(int(row))
+
+    def block_shafts(self, rows: Indices) -> None:
+        """Block shafts where they are."""
+        for row in rows:
+            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
+
+    def free_shafts(self, rows: Indices) -> None:
+        """Free blocked shafts."""
+        for row in rows:
+            self.blocked_shaft.free(int(row))
+
+    def cut_output(self, rows: Indices, on: bool) -> None:
+        """Cut the output stages of servos off their motors, or connect them again."""
+        self._no_output[rows] = on
+
+    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
+        """Let servos report a constant value in a register; None: the present one."""
+        self.refresh()
+        self._readings.set(rows, name, value)
+
+    def clear_reading(self, rows: Indices, name: str) -> None:
+        """Let servos report measured values in a register again."""
+        self._readings.clear(rows, name)
+
+    def advance(self, until_s: float) -> None:
+        """Step physics, trajectories and alarms to ``until_s``."""
+        while self._time_s < until_s:
+            stop_s = min(until_s, self._time_s + SLICE_S, self.events.next_s)
+            if stop_s > self._time_s:
+                self._update_drive(stop_s - self._time_s)
+                self.plant.advance(stop_s, self.drive)
+                self.protection.check(stop_s - self._time_s, self.plant.velocity_rad_s)
+                self._time_s = stop_s
+            if stop_s >= self.events.next_s:
+                self.events.run_due(stop_s)
+
+    # registers and shafts
+
+    def refresh(self) -> None:
+        """Write all present values into the registers."""
+        facts = self.facts
+        free = ~self._on() | (self._mode() == VELOCITY) | (self._mode() == PUSH)
+        self._turns = np.where(free, self._turn(), self._turns)
+        position = self._ticks() - self._offset() - self._turns * facts.units.positions_per_turn
+        if self._has_steps():
+            left = np.nan_to_num(self._step_goal - self._ticks())
+            position = np.where(self._mode() == STEP, left, position)
+        _, last = facts.registers["Goal Position"].range or (0, 0)
+        self["Present Position"][:] = np.clip(np.rint(position), -last, last)
+        speed = self._mounting.sign * self.plant.velocity_rad_s / facts.rad_s_per_velocity
+        self["Present Velocity"][:] = np.clip(np.rint(speed), -32767, 32767)
+        pwm = self._mounting.sign * self.blocked_shaft.pwm()
+        self["Present Load"][:] = np.clip(np.rint(pwm * _FULL), -1000, 1000)
+        if "Present Current" in facts.registers:
+            amps = self._mounting.sign * self.blocked_shaft.current_a()
+            self["Present Current"][:] = np.clip(
+                np.rint(amps / (facts.units.current_a or np.inf)), -32767, 32767
+            )
+        self["Present Input Voltage"][:] = np.clip(np.rint(self.drive.supply_v * 10.0), 0, 255)
+        celsius = np.rint(self.protection.temperature_c)
+        self["Present Temperature"][:] = np.clip(celsius, 0, 255)
+        self["Hardware Error Status"][:] = self.protection.shown
+        self["Moving"][:] = self._trajectory.ongoing & self._on()
+        if "Present Goal Position" in facts.registers:
+            self["Present Goal Position"][:] = self["Goal Position"]
+        if self._readings.any:
+            self._readings.apply()
+
+    def _on(self) -> Bools:
+        return np.asarray((self["Torque Enable"] == 1) & self.powered)
+
+    def _mode(self) -> NDArray[np.int64]:
+        if "Operating Mode" in self.facts.registers:
+            return self["Operating Mode"]
+        # an SCS servo without limits turns endlessly, with Goal Time as its PWM
+        endless = (self["Min Position Limit"] == 0) & (self["Max Position Limit"] == 0)
+        return np.where(endless, PUSH, POSITION)
+
+    def _has_steps(self) -> bool:
+        """Whether mode 3 is that of steps."""
+        return "Open-loop PWM" in self.facts.registers
+
+    def _offset(self) -> NDArray[np.int64]:
+        if "Homing Offset" in self.facts.registers:
+            return self["Homing Offset"]
+        return np.zeros(len(self), np.int64)
+
+    def _servo_rad(self) -> Floats:
+        """(S,) angles of the servos, from their middle."""
+        mounting = self._mounting
+        return np.asarray(mounting.sign * self.plant.position_rad + mounting.zero_rad)
+
+    def _ticks(self) -> Floats:
+        """(S,) positions without offset, of all turns."""
+        units = self.facts.units
+        return np.asarray(self._servo_rad() * self.facts.positions_per_rad + units.zero_position)
+
+    def _turn(self) -> Floats:
+        """(S,) turn in which each shaft is."""
+        turn = self.facts.units.positions_per_turn
+        return np.asarray(np.floor((np.rint(self._ticks()) - self._offset()) / turn))
+
+    def _update_drive(self, seconds: float) -> None:
+        drive, facts, mode, on = self.drive, self.facts, self._mode(), self._on()
+        registers, shaft = self.registers, self._servo_rad()
+        self._step_goal[(mode != STEP) | ~on] = np.nan
+        positions = on & ((mode == POSITION) | (mode == STEP) & self._has_steps())
+        self._move(seconds, positions, on & (mode == VELOCITY), shaft)
+        gain = self._motor.positions_per_rad / self._motor.full_pwm / self._motor.p_gain_divisor
+        gain = gain * registers["Position P Gain" if "Kp" not in facts.registers else "Kp"]
+        closed = positions | (on & (mode == VELOCITY))
+        push, limit_a = self._push(mode)
+        weak = self.protection.is_weak
+        limit = np.minimum(registers["PWM Limit"], self._goal_pwm()) / _FULL
+        if "Protective Torque" in facts.registers:
+            limit = np.where(weak, registers["Protective Torque"] / 100.0, limit)
+        damping = (registers["Torque Enable"] == TORQUE_DAMPING) & self.powered
+        drive.torque_on[:] = on | damping
+        drive.p_gain_per_rad[:] = np.where(damping, 0.0, np.where(closed, gain, _PUSH_GAIN))
+        aim = np.where(closed, self._trajectory.position, push / _PUSH_GAIN)
+        mounting = self._mounting
+        shift = np.where(closed, mounting.zero_rad, 0.0)
+        drive.goal_rad[:] = mounting.sign * (aim - shift)
+        drive.pwm_limit[:] = np.where(self._no_output, 0.0, limit)
+        drive.current_limit_a[:] = limit_a
+        self.blocked_shaft.hold()
+        self._was_on = on
+
+    def _move(self, seconds: float, positions: Bools, wheels: Bools, shaft: Floats) -> None:
+        """Let the trajectories run to the goals, or at the goal velocities."""
+        facts, registers, path = self.facts, self.registers, self._trajectory
+        path.restart(~(positions | wheels) | ((positions | wheels) & ~self._was_on), shaft)
+        goal = registers["Goal Position"].astype(np.float64)
+        low, high = registers["Min Position Limit"], registers["Max Position Limit"]
+        many_turns = (low == 0) & (high == 0)
+        goal = np.where(many_turns, goal, np.clip(goal, low, high))
+        ticks = goal + self._offset() + self._turns * facts.units.positions_per_turn
+        wanted = (ticks - facts.units.zero_position) / facts.positions_per_rad
+        if self._has_steps():
+            steps = self._mode() == STEP
+            goal = (self._step_goal - facts.units.zero_position) / facts.positions_per_rad
+            wanted = np.where(steps, np.where(np.isnan(goal), path.goal, goal), wanted)
+        velocity = np.abs(registers["Goal Velocity"]).astype(np.float64)
+        timed = np.zeros(len(self), bool)
+        if "Goal Time" in facts.registers:
+            timed = (velocity == 0.0) & (registers["Goal Time"] > 0)
+            velocity = np.where(timed, registers["Goal Time"], velocity)
+        ramp = np.zeros(len(self))
+        if "Acceleration" in facts.registers:
+            ramp = registers["Acceleration"].astype(np.float64)
+        path.set_goals(np.where(positions, wanted, path.goal), velocity, ramp, timed)
+        path.advance(seconds, positions)
+        speed = registers["Goal Velocity"] * facts.rad_s_per_velocity
+        ahead = path.position + speed * seconds
+        path.position[wheels] = np.clip(ahead, shaft - 0.5, shaft + 0.5)[wheels]
+        path.goal[wheels] = path.position[wheels]
+
+    def _push(self, mode: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """(S,) open-loop output, and (S,) limits of the current, A."""
+        registers, facts = self.registers, self.facts
+        none = np.full(len(self), np.inf)
+        if "Goal Current" in facts.registers:
+            raw = registers["Goal Current"].astype(np.float64)
+            limit_a = np.abs(raw) * (facts.units.current_a or 0.0)
+            push = np.where(mode == STEP, raw / _FULL, np.sign(raw))
+            return np.where(mode >= PUSH, push, 0.0), np.where(mode == STEP, np.inf, limit_a)
+        name = "Open-loop PWM" if self._has_steps() else "Goal Time"
+        return np.where(mode == PUSH, registers[name] / _FULL, 0.0), none
+
+    def _goal_pwm(self) -> NDArray[np.int64]:
+        name = "Goal PWM" if "Goal PWM" in self.facts.registers else "PWM Limit"
+        return self.registers[name]
