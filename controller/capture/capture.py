@@ -1,9 +1,10 @@
 """A whole recording captured: bodies detected, outliers marked, head and tail kept."""
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.film_fit import fit_film, with_least_errors
 from snakewalk.controller.capture.verification.film_check import verified
 from snakewalk.controller.images.body_detector import BodyDetector
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
@@ -115,17 +116,23 @@ def captured_from(
     name: str = "recording",
     head_px: tuple[float, float] | None = None,
     fixed: bool = True,
+    part: bool = False,
 ) -> Capture:
-    """Make a capture of the detections of a film; see ``capture``."""
+    """Make a capture of the detections of a film; see ``capture``.
+
+    A ``part`` of a film may be without motion or without any body.
+    """
     checked = mark_outliers(align_ends(found.skeletons).skeletons, np.array(found.area_px))
     if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
+        if part:
+            return _without_body(found, checked, rate_hz, fixed=fixed)
         raise InputError(f"{name}: {_fault(checked)}")
     aligned = align_ends(checked)
     coils = solve_coils(aligned.skeletons, found.outlines, np.array(found.axis_error_px))
     aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
     points = np.stack([one.points_px for one in aligned.skeletons])
     radius = np.stack([one.radius_px for one in aligned.skeletons])
-    if _change(points) < _STILL:
+    if not part and _change(points) < _STILL:
         raise InputError(
             f"{name}: no motion: the body changes by less than {_STILL:.0%} of its length in "
             f"{len(points)} frames"
@@ -138,7 +145,7 @@ def captured_from(
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
     fitted = with_least_errors(fitted, found.faint_error_px)
     skeletons = verified(fitted.skeletons, found.store)
-    if sum(one.status.has_points for one in skeletons) < 2:
+    if not part and sum(one.status.has_points for one in skeletons) < 2:
         raise InputError(f"{name}: {_fault(skeletons)}")
     usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
     expected = fitted.expected_px.copy()
@@ -157,6 +164,30 @@ def captured_from(
         time_s=np.arange(len(points)) / rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
+        places_recorded=fixed,
+    )
+
+
+def _without_body(
+    found: Detections, checked: Sequence[Skeleton], rate_hz: float, *, fixed: bool
+) -> Capture:
+    """Return a part of a film in which no body is seen well."""
+    bodies = [
+        no_skeleton(FrameStatus.BLOB if one.status.has_points else one.status) for one in checked
+    ]
+    nan = np.full(len(bodies), np.nan)
+    return Capture(
+        points_px=np.stack([one.points_px for one in bodies]),
+        radius_px=np.stack([one.radius_px for one in bodies]),
+        length_px=nan,
+        status=tuple(one.status for one in bodies),
+        expected_px=nan.copy(),
+        distractors=np.array(found.distractors),
+        margin=nan.copy(),
+        rate_hz=rate_hz,
+        time_s=np.arange(len(bodies)) / rate_hz,
+        head_by="taper",
+        head_sure=0.0,
         places_recorded=fixed,
     )
 
@@ -198,7 +229,7 @@ def save_capture(path: Path, held: CaptureFile) -> None:
     scale = 1.0 if held.m_per_px is None else held.m_per_px
     length_m = np.nan if held.m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
     doubts = held.identity_uncertain_after
-    more = {"identity_uncertain_after": np.array(doubts)} if doubts else {}
+    more: dict[str, Any] = {"identity_uncertain_after": np.array(doubts)} if doubts else {}
     with path.open("wb") as stream:
         np.savez_compressed(
             stream,

@@ -14,13 +14,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import (
     Capture,
     CaptureFile,
-    capture,
     load_capture,
     save_capture,
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
+from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, PartFolder
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
-from snakewalk.controller.capture.options import CaptureOptions, check_options
+from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
 from snakewalk.controller.capture.plots.capture import contact_sheet, overlay_film, step_picture
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale, review_page
@@ -131,6 +131,11 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
 
     """
     check_options(options)
+    folder = PartFolder(
+        options.output.with_name(options.output.name + ".part"),
+        settings_of(options) | {"frames_of_a_part": PART_FRAMES},
+    )
+    finished = folder.start(resume=options.resume, force=options.force)
     console = stderr_console()
     with console.status("learning the background ..."):
         film = open_film(options)
@@ -146,16 +151,9 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     scale = 1.0
     if options.review is not None:
         scale = picture_scale(film.some[::3], footage.count, str(options.recording))
-    with ProgressBar("frames", footage.count, transient=True) as bar:
-        captured = capture(
-            film.frames(),
-            detector,
-            footage.rate_hz,
-            name=str(options.recording),
-            head_px=film.head_px,
-            fixed=not options.cropped and film.one_size,
-            on_progress=bar.advance,
-        )
+    parts = _parts(options, film, folder, finished)
+    with ProgressBar("frames", footage.count, transient=True, remaining=True) as bar:
+        captured = _captured(parts, film, detector, bar)
         time_s, rate_hz = film.times(options.rate_hz, captured.time_s)
         captured = replace(
             captured,
@@ -174,9 +172,46 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         )
         write_captures(options.output, [held], wide=options.wide)
         _write_pictures(options, film, detector, held, bar, scale)
+    if parts.folder is not None:
+        parts.folder.clear()
     facts = facts_of(options, footage, detector, captured, m_per_px, options.output)
     warn_of(options, footage, facts)
     return facts
+
+
+def _parts(
+    options: CaptureOptions, film: OpenedFilm, folder: PartFolder, finished: list[Capture]
+) -> FilmParts:
+    """Return the film in parts, with those that an interrupted capture has finished."""
+    for one in finished:
+        film.stated_s.extend(one.time_s.tolist())
+    return FilmParts(
+        film.footage.rate_hz,
+        film.footage.count,
+        str(options.recording),
+        film.head_px,
+        not options.cropped and film.one_size,
+        folder,
+        finished=finished,
+        part_frames=PART_FRAMES,
+    )
+
+
+def _captured(
+    parts: FilmParts, film: OpenedFilm, detector: BodyDetector, bar: ProgressBar
+) -> Capture:
+    first = len(film.stated_s)
+    bar.update(first)
+    try:
+        for frame in film.frames(first):
+            parts.add(frame, detector.detect(frame), film.stated_s[-1])
+            bar.advance()
+    except KeyboardInterrupt as stop:
+        if parts.folder is not None and parts.finished:
+            stop.add_note(f"{parts.folder.path}: holds the frames so far; continue by --resume")
+        raise
+    captured, _ = parts.done()
+    return captured
 
 
 def warn_of(options: CaptureOptions, footage: Footage, facts: CaptureFacts) -> None:

@@ -37,6 +37,8 @@ class Detections:
     """The surroundings of the body in every frame."""
     crops: dict[int, Crop] = field(default_factory=dict)
     """By frame: small bodies, and where a small body was lost its last place."""
+    stated_s: list[float] = field(default_factory=list)
+    """Times of the frames, as the film states them."""
     _last: int = -_LOST_FRAMES - 1
     _points: Floats = field(default_factory=lambda: np.empty((0, 2)))
 

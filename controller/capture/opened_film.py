@@ -37,10 +37,10 @@ class OpenedFilm:
     stated_s: list[float] = field(default_factory=list)
     """Times of the frames, as the film states them; filled by ``frames``."""
 
-    def frames(self) -> Iterator[DeepImage]:
-        """All frames, cut to the region."""
-        self.stated_s.clear()
-        for frame, at_s in self.footage.timed():
+    def frames(self, first: int = 0) -> Iterator[DeepImage]:
+        """All frames from number ``first``, cut to the region."""
+        del self.stated_s[first:]
+        for frame, at_s in self.footage.timed(first):
             self.stated_s.append(at_s)
             yield self.cut(frame)
 

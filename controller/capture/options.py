@@ -41,6 +41,8 @@ class CaptureOptions:
     """A number, or ``auto``; None: one animal."""
     wide: bool = False
     """A table with one row a frame."""
+    resume: bool = False
+    """Continue after the finished parts of an interrupted capture."""
     force: bool = False
 
 
@@ -94,11 +96,25 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
             f"--animals {animals}: expected a number from 1 to {MOST_ANIMALS}, or {AUTO}"
         )
     given = {"--head": options.head, "--steps": options.steps, "--sheet": options.sheet}
+    if options.resume:
+        raise InputError("--animals and --resume: only a film of one animal can be continued")
     one = [name for name, value in given.items() if value is not None]
     if one:
         raise InputError(f"--animals and {one[0]}: this option is for one animal; leave it out")
     if options.cropped:
         raise InputError("--animals and --cropped: several animals need a camera that stands still")
+
+
+def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool | None]:
+    """Return the film and the options on which the skeletons depend."""
+    film = options.recording
+    names = ("background", "rate_hz", "head", "cropped", "roi", "mask", "threshold")
+    values = {name: getattr(options, name) for name in names}
+    held = {name: str(one) if isinstance(one, Path) else one for name, one in values.items()}
+    size = 0
+    if film.exists():
+        size = film.stat().st_size if film.is_file() else sum(1 for _ in film.iterdir())
+    return {"recording": film.name, "size": size, **held}
 
 
 def track_files(options: CaptureOptions, count: int) -> list[Path]:

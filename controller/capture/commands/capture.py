@@ -64,6 +64,10 @@ Animals = Annotated[
 Wide = Annotated[
     bool, typer.Option("--wide", help="in a .csv, one row for each frame instead of each point")
 ]
+Resume = Annotated[
+    bool,
+    typer.Option("--resume", help="continue an interrupted capture of a long film from OUT.part"),
+]
 Background = Annotated[
     Path | None, typer.Option(help="image without the animal; default: estimated from frames")
 ]
@@ -134,6 +138,7 @@ def capture(
     corrections: Corrections = None,
     animals: Animals = None,
     wide: Wide = False,
+    resume: Resume = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -157,6 +162,7 @@ def capture(
         corrections=corrections,
         animals=animals,
         wide=wide,
+        resume=resume,
         force=force,
     )
     if animals is not None and corrections is None:

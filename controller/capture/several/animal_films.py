@@ -7,8 +7,8 @@ import numpy as np
 
 from snakewalk.config.arrays import DeepImage
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture, captured_from
-from snakewalk.controller.capture.detections import Detections
+from snakewalk.controller.capture.capture import Capture
+from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.several.blobs import (
     Blobs,
     blobs_of,
@@ -108,7 +108,10 @@ def capture_animals(
 ) -> list[CapturedAnimal]:
     """Capture each animal as if it were alone; frames in which it is not alone have no points."""
     plans = [_plan(one, found.frames) for one in found.identities]
-    films = [Detections() for _ in plans]
+    films = [
+        FilmParts(rate_hz, found.frames, f"{name}: animal {number}")
+        for number in range(1, len(plans) + 1)
+    ]
     for number, frame in enumerate(frames):
         ground = detector.ground_of(frame)
         blobs = blobs_of(frame, ground, detector, found.usual_px)
@@ -122,9 +125,9 @@ def capture_animals(
         if on_progress is not None:
             on_progress()
     out = []
-    for number, (identity, film) in enumerate(zip(found.identities, films, strict=True), start=1):
+    for identity, film in zip(found.identities, films, strict=True):
         try:
-            captured = captured_from(film, rate_hz, name=f"{name}: animal {number}")
+            captured, _ = film.done()
         except InputError as error:
             out.append(CapturedAnimal(None, identity, str(error)))
         else:

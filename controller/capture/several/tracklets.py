@@ -122,15 +122,15 @@ class TrackletBuilder:
                 links[:, new] &= near[:, new] | (np.arange(links.shape[0]) == old)
         lost, fresh = ~links.any(axis=1), ~links.any(axis=0)
         if lost.any() and fresh.any():
-            apart = np.hypot(
-                *(before.middle_px[:, None] - blobs.middle_px[None]).transpose(2, 0, 1)
-            )
+            moved = before.middle_px[:, None] - blobs.middle_px[None]
+            apart = np.hypot(moved[..., 0], moved[..., 1])
             reach = _REACH * np.exp(before.shape[:, :1])
-            apart = np.where(lost[:, None] & fresh[None, :] & (apart < reach), apart, np.inf)
-            for old in np.flatnonzero(np.isfinite(apart).any(axis=1)):
-                new = int(np.argmin(apart[old]))
-                if int(np.argmin(apart[:, new])) == old:
-                    links[old, new] = True
+            free = lost[:, None] & fresh[None, :] & (apart < reach)
+            away: Floats = np.where(free, apart, np.inf)
+            for lone in np.flatnonzero(free.any(axis=1)).tolist():
+                nearest = int(np.argmin(away[lone]))
+                if int(np.argmin(away[:, nearest])) == lone:
+                    links[lone, nearest] = True
         return np.asarray(links)
 
     def _link(self, olds: Ints, news: Ints, blobs: Blobs, nodes: list[_Node | None]) -> None:
@@ -209,7 +209,8 @@ def _components(links: Bools) -> list[tuple[Ints, Ints]]:
     """Groups of linked blobs of two frames (n, m), each with at least one of both."""
     out, free = [], set(np.flatnonzero(links.any(axis=1)).tolist())
     while free:
-        olds, news = {free.pop()}, set()
+        olds: set[int] = {free.pop()}
+        news: set[int] = set()
         while True:
             more = set(np.flatnonzero(links[sorted(olds)].any(axis=0)).tolist()) - news
             news |= more
