@@ -37,7 +37,10 @@ def opencv(left: Image, right: Image, count: int) -> Floats:
 
 def widened_opencv(left: Image, right: Image, count: int) -> Floats:
     """OpenCV's matcher with the left border that ``match`` adds as well."""
-    wide = [cv2.copyMakeBorder(one, 0, 0, count, 0, cv2.BORDER_REPLICATE) for one in (left, right)]
+    wide = [
+        np.asarray(cv2.copyMakeBorder(one, 0, 0, count, 0, cv2.BORDER_REPLICATE), dtype=np.uint8)
+        for one in (left, right)
+    ]
     return opencv(wide[0], wide[1], count)[:, count:]
 
 

@@ -120,12 +120,12 @@ class TrackletBuilder:
                 near = part > _SAME
                 links[old] &= near[old] | (np.arange(links.shape[1]) == new)
                 links[:, new] &= near[:, new] | (np.arange(links.shape[0]) == old)
-        lost, fresh = ~links.any(axis=1), ~links.any(axis=0)
+        lost, fresh = np.asarray(~links.any(axis=1)), np.asarray(~links.any(axis=0))
         if lost.any() and fresh.any():
             moved = before.middle_px[:, None] - blobs.middle_px[None]
             apart = np.hypot(moved[..., 0], moved[..., 1])
             reach = _REACH * np.exp(before.shape[:, :1])
-            free = lost[:, None] & fresh[None, :] & (apart < reach)
+            free: Bools = np.asarray(lost[:, None] & fresh[None, :] & (apart < reach))
             away: Floats = np.where(free, apart, np.inf)
             for lone in np.flatnonzero(free.any(axis=1)).tolist():
                 nearest = int(np.argmin(away[lone]))
