@@ -35,16 +35,25 @@ def opencv(left: Image, right: Image, count: int) -> Floats:
     return np.where(found > 0.0, found, np.nan)
 
 
+def widened_opencv(left: Image, right: Image, count: int) -> Floats:
+    """OpenCV's matcher with the left border that ``match`` adds as well."""
+    wide = [
+        np.asarray(cv2.copyMakeBorder(one, 0, 0, count, 0, cv2.BORDER_REPLICATE), dtype=np.uint8)
+        for one in (left, right)
+    ]
+    return opencv(wide[0], wide[1], count)[:, count:]
+
+
 def real_pair() -> None:
     """scikit-image's motorcycle (Middlebury 2014, a quarter of its size)."""
     left, right, truth = skimage.data.stereo_motorcycle()  # type: ignore[no-untyped-call]
     has_truth = np.isfinite(truth)
-    print("| matcher | told | within 1 px | within 2 px | of told: 1 px | 2 px | median | time |")
+    print("| matcher | reported | within 1 px | 2 px | of reported: 1 px | 2 px | median | CPU |")
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
-    for name, matcher in (("OpenCV `StereoSGBM`", opencv), ("`terrain from-stereo`", match)):
-        begin = time.perf_counter()
+    for name, matcher in MATCHERS.items():
+        begin = time.process_time()
         found = matcher(left, right, 80)
-        took = time.perf_counter() - begin
+        took = time.process_time() - begin
         told = has_truth & np.isfinite(found)
         error = np.abs(found - truth)[told]
         all_of, within = has_truth.sum(), [(error <= px).sum() for px in (1.0, 2.0)]
@@ -55,6 +64,13 @@ def real_pair() -> None:
         ]
         cells = " | ".join(f"{100 * share:.1f} %" for share in shares)
         print(f"| {name} | {cells} | {np.median(error):.3f} px | {took:.1f} s |")
+
+
+MATCHERS = {
+    "OpenCV `StereoSGBM`": opencv,
+    "the same with a left border": widened_opencv,
+    "`terrain from-stereo`": match,
+}
 
 
 @dataclass(frozen=True)

@@ -1,32 +1,28 @@
 """A whole recording captured: bodies detected, outliers marked, head and tail kept."""
 
 import hashlib
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.coil_film import COIL_LEAST, COILS, solve_coils
-from snakewalk.controller.capture.coil_fit import Outline
+from snakewalk.controller.capture.coil_film import COIL_LEAST, solve_coils
+from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
 from snakewalk.controller.capture.outlier_frames import mark_outliers
-from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
-from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
 from snakewalk.controller.capture.small_body.film_fit import fit_film, with_least_errors
 from snakewalk.controller.capture.verification.film_check import verified
-from snakewalk.controller.capture.verification.frame_store import FrameStore
-from snakewalk.controller.images.body_detector import BodyDetector, Detection
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
-_LOST_FRAMES = 5  # for this number of frames a lost small body is searched at its last place
 _OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
-_FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
 _STILL = 0.02  # of the length: a smaller change does not count as motion
 
 
@@ -105,16 +101,38 @@ def capture(
         InputError: fewer than 2 frames can be used, or nothing moves.
 
     """
-    found = _detect_all(frames, detector, on_progress)
+    found = Detections()
+    for frame in frames:
+        found.add(frame, detector.detect(frame))
+        if on_progress is not None:
+            on_progress()
+    return captured_from(found, rate_hz, name=name, head_px=head_px, fixed=fixed)
+
+
+def captured_from(
+    found: Detections,
+    rate_hz: float,
+    *,
+    name: str = "recording",
+    head_px: tuple[float, float] | None = None,
+    fixed: bool = True,
+    part: bool = False,
+) -> Capture:
+    """Make a capture of the detections of a film; see ``capture``.
+
+    A ``part`` of a film may be without motion or without any body.
+    """
     checked = mark_outliers(align_ends(found.skeletons).skeletons, np.array(found.area_px))
     if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
+        if part:
+            return _without_body(found, checked, rate_hz, fixed=fixed)
         raise InputError(f"{name}: {_fault(checked)}")
     aligned = align_ends(checked)
     coils = solve_coils(aligned.skeletons, found.outlines, np.array(found.axis_error_px))
     aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
     points = np.stack([one.points_px for one in aligned.skeletons])
     radius = np.stack([one.radius_px for one in aligned.skeletons])
-    if _change(points) < _STILL:
+    if not part and _change(points) < _STILL:
         raise InputError(
             f"{name}: no motion: the body changes by less than {_STILL:.0%} of its length in "
             f"{len(points)} frames"
@@ -127,7 +145,7 @@ def capture(
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
     fitted = with_least_errors(fitted, found.faint_error_px)
     skeletons = verified(fitted.skeletons, found.store)
-    if sum(one.status.has_points for one in skeletons) < 2:
+    if not part and sum(one.status.has_points for one in skeletons) < 2:
         raise InputError(f"{name}: {_fault(skeletons)}")
     usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
     expected = fitted.expected_px.copy()
@@ -150,6 +168,30 @@ def capture(
     )
 
 
+def _without_body(
+    found: Detections, checked: Sequence[Skeleton], rate_hz: float, *, fixed: bool
+) -> Capture:
+    """Return a part of a film in which no body is seen well."""
+    bodies = [
+        no_skeleton(FrameStatus.BLOB if one.status.has_points else one.status) for one in checked
+    ]
+    nan = np.full(len(bodies), np.nan)
+    return Capture(
+        points_px=np.stack([one.points_px for one in bodies]),
+        radius_px=np.stack([one.radius_px for one in bodies]),
+        length_px=nan,
+        status=tuple(one.status for one in bodies),
+        expected_px=nan.copy(),
+        distractors=np.array(found.distractors),
+        margin=nan.copy(),
+        rate_hz=rate_hz,
+        time_s=np.arange(len(bodies)) / rate_hz,
+        head_by="taper",
+        head_sure=0.0,
+        places_recorded=fixed,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class CaptureFile:
     """Content of a file of a captured recording."""
@@ -161,6 +203,8 @@ class CaptureFile:
     rate_assumed: bool = False
     source: str = "not stated"
     licence: str = "not stated"
+    identity_uncertain_after: tuple[int, ...] = ()
+    """Frames after which it may be another animal of the film."""
 
     @property
     def fingerprint(self) -> str:
@@ -178,11 +222,14 @@ def save_capture(path: Path, held: CaptureFile) -> None:
     ``points_px`` (T, 101, 2) as in the image, ``radius_px`` (T, 101), ``length_px`` (T,), and
     ``head_margin`` (T,). It also has ``expected_px`` (T,), the error of a point, and ``company``
     (T,), the size of the next largest object. Once: ``m_per_px`` (NaN: no scale), ``head_by``,
-    ``head_sure``, ``places_recorded``.
+    ``head_sure``, ``places_recorded``, and if the film shows several animals
+    ``identity_uncertain_after``: frames after which it may be another animal.
     """
     captured = held.captured
     scale = 1.0 if held.m_per_px is None else held.m_per_px
     length_m = np.nan if held.m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
+    doubts = held.identity_uncertain_after
+    more: dict[str, Any] = {"identity_uncertain_after": np.array(doubts)} if doubts else {}
     with path.open("wb") as stream:
         np.savez_compressed(
             stream,
@@ -205,6 +252,7 @@ def save_capture(path: Path, held: CaptureFile) -> None:
             head_by=captured.head_by,
             head_sure=captured.head_sure,
             places_recorded=captured.places_recorded,
+            **more,
         )
 
 
@@ -264,76 +312,10 @@ def load_capture(path: Path) -> CaptureFile:
         rate_assumed=bool(held["rate_assumed"]),
         source=str(held["source"]),
         licence=str(held["licence"]),
+        identity_uncertain_after=tuple(
+            int(one) for one in np.ravel(held.get("identity_uncertain_after", ()))
+        ),
     )
-
-
-@dataclass(slots=True)
-class _Detections:
-    """One entry a frame, as the detector found it."""
-
-    skeletons: list[Skeleton] = field(default_factory=list)
-    area_px: list[float] = field(default_factory=list)
-    distractors: list[float] = field(default_factory=list)
-    expected_px: list[float] = field(default_factory=list)
-    """Error of long bodies, whose medial axis is kept; NaN for all others."""
-    axis_error_px: list[float] = field(default_factory=list)
-    """Error of the medial axis of any body; NaN for a frame without one."""
-    outlines: dict[int, Outline] = field(default_factory=dict)
-    """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
-    faint_error_px: dict[int, float] = field(default_factory=dict)
-    """By frame: least expected error of bodies with faint parts."""
-    store: FrameStore = field(default_factory=FrameStore)
-    """The surroundings of the body in every frame."""
-    crops: dict[int, Crop] = field(default_factory=dict)
-    """By frame: small bodies, and where a small body was lost its last place."""
-
-
-def _detect_all(
-    frames: Iterable[DeepImage], detector: BodyDetector, on_progress: Callable[[], None] | None
-) -> _Detections:
-    """Run the detector on every frame, and keep crops of small bodies for the fit."""
-    out = _Detections()
-    last, points = -_LOST_FRAMES - 1, np.empty((0, 2))
-    for number, frame in enumerate(frames):
-        detection = detector.detect(frame)
-        body, silhouette = detection.skeleton, detection.silhouette
-        out.skeletons.append(body)
-        out.area_px.append(silhouette.area_px)
-        out.distractors.append(silhouette.distractors)
-        expected = axis_px = np.nan
-        if body.status is FrameStatus.GOOD:
-            blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
-            axis_px = axis_error_px(blur_px, body.length_px)
-            if detection.faint_parts:
-                axis_px *= _FAINT_PARTS
-                out.faint_error_px[number] = axis_px
-        if body.status is FrameStatus.GOOD or body.status in COILS:
-            width_px = 2.0 * float(np.max(body.radius_px))
-            out.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
-        _keep(out.store, number, frame, detection, points)
-        if body.length_px <= LONGEST_PX:
-            last, points = number, body.points_px
-            out.crops[number] = crop_body(frame, detection.background, points)
-        elif body.status is FrameStatus.GOOD:
-            expected = axis_px
-        elif body.status is FrameStatus.BLOB and number - last <= _LOST_FRAMES:
-            out.crops[number] = crop_body(frame, detection.background, points)
-        out.expected_px.append(expected)
-        out.axis_error_px.append(axis_px)
-        if on_progress is not None:
-            on_progress()
-    return out
-
-
-def _keep(
-    store: FrameStore, number: int, frame: DeepImage, detection: Detection, last_px: Floats
-) -> None:
-    """Keep the surroundings of the silhouette and of the last place of a small body."""
-    body = detection.silhouette
-    corner = np.array([body.origin_px, np.add(body.origin_px, body.level.shape[::-1])])
-    places = np.vstack([corner, last_px]) if body.area_px > 0.0 else last_px
-    if len(places):
-        store.put(number, frame, places, float(np.nan_to_num(detection.skeleton.length_px)))
 
 
 def _fault(checked: list[Skeleton]) -> str:
@@ -345,7 +327,8 @@ def _fault(checked: list[Skeleton]) -> str:
     advice = {
         FrameStatus.NOTHING: "no contrast or no motion: nothing stands out from the background; "
         "give --background, or better light",
-        FrameStatus.SEVERAL: "several animals: cut the film so that one is in view",
+        FrameStatus.SEVERAL: "several animals: give --animals N or --animals auto",
+        FrameStatus.MERGED: "the animal is never seen apart from others",
         FrameStatus.EMPTY: "the found lines lie on empty ground; give --background",
         FrameStatus.CUT: "the body is cut by the edge of the image",
         FrameStatus.BLOB: "the silhouette is not a long body; give --background",

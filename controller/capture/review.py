@@ -10,7 +10,7 @@ import math
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -29,6 +29,7 @@ _SMALLEST_PX: Final = 320
 _MOST_BYTES: Final = 150_000_000
 """Limit for all pictures together (ours): a browser opens such a page in seconds."""
 _QUALITY: Final = 85
+_WORDS: Final = [str(one) for one in FrameStatus]
 
 
 def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
@@ -57,26 +58,26 @@ def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
 
 
 def review_page(
-    held: CaptureFile,
+    animals: Sequence[CaptureFile],
     frames: Iterable[DeepImage],
     *,
     scale: float,
-    track: Path,
+    tracks: Sequence[Path],
     origin_px: tuple[int, int] = (0, 0),
     on_progress: Callable[[], None] | None = None,
 ) -> str:
     """Write the page.
 
     Args:
-        held: the recording.
-        frames: all of them, (H, W[, 3]), as they were captured.
+        animals: of one recording.
+        frames: all of them, (H, W[, C]), as they were captured.
         scale: of their pictures: ``picture_scale``.
-        track: the file of the recording, which the page names.
+        tracks: the file of each animal, which the page names.
         origin_px: x, y of the frames' first pixel in the whole picture.
         on_progress: called after each frame.
 
     """
-    captured = held.captured
+    captured = animals[0].captured
     pictures: list[str] = []
     sizes: list[tuple[int, int]] = []
     for frame in frames:
@@ -84,32 +85,41 @@ def review_page(
         pictures.append(base64.b64encode(_packed(frame, scale)).decode())
         if on_progress is not None:
             on_progress()
-    words = [str(one) for one in FrameStatus]
+    data = {
+        "name": animals[0].name if len(animals) == 1 else f"{len(animals)} animals",
+        "rate_hz": captured.rate_hz,
+        "time_s": np.round(captured.time_s, 4).tolist(),
+        "origin": list(origin_px),
+        "sizes": sizes,
+        "words": _WORDS,
+        "animals": [_of_animal(one, file) for one, file in zip(animals, tracks, strict=True)],
+        "images": pictures[: len(captured.status)],
+    }
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return _TEMPLATE.read_text(encoding="utf-8").replace("__DATA__", text, 1)
+
+
+def _of_animal(held: CaptureFile, track: Path) -> dict[str, Any]:
+    """One animal on the page."""
+    captured = held.captured
     corrections = f"{track.stem}-corrections.json"
     corrected = track.with_name(f"{track.stem}-corrected.npz")
-    data = {
+    return {
         "name": held.name,
         "track": held.fingerprint,
         "corrections": corrections,
         "command": shlex.join(
             ["snakewalk", "capture", str(track), "--corrections", corrections, "-o", str(corrected)]
         ),
-        "rate_hz": captured.rate_hz,
-        "time_s": np.round(captured.time_s, 4).tolist(),
-        "origin": list(origin_px),
-        "sizes": sizes,
         "length": round(float(np.nanmedian(captured.length_px)), 2),
-        "words": words,
-        "status": [words.index(str(one)) for one in captured.status],
+        "status": [_WORDS.index(str(one)) for one in captured.status],
         "points": [
             np.round(line, 2).ravel().tolist() if np.isfinite(line).all() else None
             for line in captured.points_px
         ],
         "margin": [round(float(m), 3) if np.isfinite(m) else None for m in captured.margin],
-        "images": pictures[: len(captured.status)],
+        "unsure_after": list(held.identity_uncertain_after),
     }
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    return _TEMPLATE.read_text(encoding="utf-8").replace("__DATA__", text, 1)
 
 
 def _packed(frame: DeepImage, scale: float) -> bytes:

@@ -5,7 +5,14 @@ from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Self, TypeVar
 
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.runtime.drive import Progress as RunProgress
@@ -19,10 +26,18 @@ REFRESH_HZ = 4.0
 
 
 class ProgressBar:
-    """The bar: description, share, a note, time; ``transient`` bars vanish at the end."""
+    """The bar: description, share, a note, time; ``transient`` bars vanish at the end.
+
+    ``remaining`` adds an estimate of the remaining time.
+    """
 
     def __init__(
-        self, description: str, total: float | None = None, *, transient: bool = False
+        self,
+        description: str,
+        total: float | None = None,
+        *,
+        transient: bool = False,
+        remaining: bool = False,
     ) -> None:
         console = stderr_console()
         self._progress = Progress(
@@ -31,6 +46,7 @@ class ProgressBar:
             TaskProgressColumn(),
             TextColumn("{task.fields[note]}", markup=False),
             TimeElapsedColumn(),
+            *([TextColumn("remaining"), TimeRemainingColumn()] if remaining else []),
             console=console,
             transient=transient,
             auto_refresh=console.is_terminal,  # elsewhere only the last state is printed

@@ -65,14 +65,18 @@ class BodyDetector:
     search_faint_parts: bool = True
     """Whether parts that are much fainter than the rest of the body belong to it."""
 
-    def detect(self, image: DeepImage) -> Detection:
+    def detect(self, image: DeepImage, ground: DeepImage | None = None) -> Detection:
         """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
+
+        Args:
+            image: (H, W[, C]).
+            ground: the background for this frame; None: ``ground_of`` the frame.
 
         Raises:
             InputError: the frame is not as large as the background.
 
         """
-        background = self.ground_of(image)
+        background = self.ground_of(image) if ground is None else ground
         if background.shape != image.shape:
             raise InputError(
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
@@ -149,7 +153,7 @@ def make_detector(
     if background is not None:
         given = replace(plain, background=background, background_source="given")
         given.detect(frames[0])
-        return replace(given, polarity=_usual_polarity(frames, background))
+        return replace(given, polarity=usual_polarity(frames, background))
     best = _learnt(replace(plain, search_faint_parts=False), frames, cropped=cropped)
     if best.share < _SURE:
         other = _learnt(plain, frames, cropped=cropped)
@@ -161,7 +165,7 @@ def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) 
     """The best ground for some frames, and how the detector does with it."""
     surface = replace(
         plain,
-        polarity=_usual_polarity(frames, None),
+        polarity=usual_polarity(frames, None),
         background_source="a smooth surface through each frame",
     )
     alone = [_Candidate.of(surface, frames)]
@@ -174,7 +178,7 @@ def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) 
         replace(
             plain,
             background=candidate,
-            polarity=_usual_polarity(frames, candidate) if polarity is None else polarity,
+            polarity=usual_polarity(frames, candidate) if polarity is None else polarity,
             background_source=source,
         )
         for candidate, polarity, source in background_candidates(frames)
@@ -291,7 +295,7 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
     )
 
 
-def _usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
+def usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
     """The polarity of most frames.
 
     Against a background that shows the animal a frame stands out both ways; then what each frame
@@ -303,7 +307,7 @@ def _usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -
     ]
     usual = max(Polarity, key=found.count)
     if background is not None and usual is Polarity.BOTH:
-        return _usual_polarity(frames, None)
+        return usual_polarity(frames, None)
     return usual
 
 

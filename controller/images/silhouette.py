@@ -118,6 +118,15 @@ def silhouette_of(
     return cut_out(apart, threshold, clear, middle, margin)
 
 
+def body_threshold(apart: DeepImage) -> float | None:
+    """Half of the contrast of the strongest body in a contrast (H, W); None: nothing stands out."""
+    middle, spread = noise_of(apart)
+    found = connected_parts((apart > middle + _CLEAR * spread).astype(np.uint8))
+    if found is None:
+        return None
+    return _threshold_of_body(apart, *found, middle, middle + 3.0 * spread)
+
+
 def _threshold_of_body(
     apart: DeepImage,
     label: NDArray[np.int32],

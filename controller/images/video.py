@@ -88,16 +88,16 @@ class Footage:
         """Frames as of ``read``, 8 bit all of them: to be drawn on."""
         return map(in_8_bits, self.read())
 
-    def timed(self) -> Iterator[tuple[DeepImage, float]]:
-        """Frames as of ``read``, and when a video says they are shown, s.
+    def timed(self, first: int = 0) -> Iterator[tuple[DeepImage, float]]:
+        """Frames as of ``read`` from number ``first``, and when a video says they are shown, s.
 
         Images have the times of their numbers where some are missing, else NaN.
         """
         if self.files:
             at_s = [n / self.rate_hz for n in self.numbers] or [float("nan")] * len(self.files)
-            shots = zip(self.files, self.pages, at_s, strict=True)
+            shots = list(zip(self.files, self.pages, at_s, strict=True))[first:]
             return ((self.image(file, page), at) for file, page, at in shots)
-        return self._video(1)
+        return self._video(1, first)
 
     def spread(self, most: int) -> list[DeepImage]:
         """At most ``most`` frames, spread over the recording."""
@@ -121,9 +121,13 @@ class Footage:
             return _one_channel(whole)
         return _one_channel((whole.astype(np.float32) - self.deep.black) * self.deep.gain)
 
-    def _video(self, every: int) -> Iterator[tuple[DeepImage, float]]:
+    def _video(self, every: int, first: int = 0) -> Iterator[tuple[DeepImage, float]]:
         done = 0
-        shots = _av_frames(self.path, every) if self.decoded_by_av else self._grabbed(every)
+        shots = (
+            _av_frames(self.path, every, first)
+            if self.decoded_by_av
+            else self._grabbed(every, first)
+        )
         for frame, at_s in shots:
             if frame is not None:
                 yield _one_channel(frame), at_s
@@ -134,14 +138,14 @@ class Footage:
                 "codec is damaged; copy it again, or cut it there and give the part"
             )
 
-    def _grabbed(self, every: int) -> Iterator[tuple[Image | None, float]]:
-        """All frames by OpenCV, with their times; None for those between each ``every``-th."""
+    def _grabbed(self, every: int, first: int) -> Iterator[tuple[Image | None, float]]:
+        """All frames by OpenCV, with their times; None before ``first`` and between."""
         film = cv2.VideoCapture(str(self.path))
         number = 0
         try:
             while film.grab():
                 at_s = 1e-3 * film.get(cv2.CAP_PROP_POS_MSEC)
-                if number % every:
+                if number % every or number < first:
                     yield None, at_s
                 else:
                     whole, frame = film.retrieve()
@@ -153,14 +157,15 @@ class Footage:
             film.release()
 
 
-def _av_frames(path: Path, every: int) -> Iterator[tuple[Image | None, float]]:
+def _av_frames(path: Path, every: int, first: int = 0) -> Iterator[tuple[Image | None, float]]:
     """All frames by PyAV, blue first as OpenCV has them, with times; None for those between."""
     av = _av()
     try:
         with av.open(str(path)) as film:
             for number, frame in enumerate(film.decode(video=0)):
                 at_s = float("nan") if frame.time is None else float(frame.time)
-                whole = None if number % every else frame.to_ndarray(format="bgr24")
+                skipped = number % every or number < first
+                whole = None if skipped else frame.to_ndarray(format="bgr24")
                 yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
         return  # missing frames are counted by the caller

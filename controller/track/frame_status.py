@@ -14,6 +14,7 @@ class FrameStatus(StrEnum):
     MISSING = "keypoints are missing"
     NOTHING = "nothing seen"
     SEVERAL = "several animals"
+    MERGED = "touches another animal: one silhouette shows several"
     CUT = "cut by the edge of the image"
     LOOP = "touches itself: the silhouette has a hole"
     BRANCH = "touches itself: the medial axis branches"

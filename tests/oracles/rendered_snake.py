@@ -133,13 +133,13 @@ def film(scene: SnakeScene, midlines: Floats | None = None) -> Iterator[Image]:
     ground = _ground(scene, rng)
     if midlines is not None:
         for midline in midlines:
-            yield _shot(scene, ground, _coverage(scene, midline), rng)
+            yield _shot(scene, ground, coverage(scene, midline), rng)
         return
     still = true_midlines(replace(scene, follow=0.0))
     for midline, (x, y) in zip(
         true_midlines(scene), camera_places(scene, still).astype(int), strict=True
     ):
-        yield _shot(scene, np.roll(ground, (-y, -x), axis=(0, 1)), _coverage(scene, midline), rng)
+        yield _shot(scene, np.roll(ground, (-y, -x), axis=(0, 1)), coverage(scene, midline), rng)
 
 
 def empty(scene: SnakeScene) -> Image:
@@ -169,7 +169,7 @@ def strength(scene: SnakeScene) -> Floats:
     return np.asarray(faint * np.where(light, scene.band, 1.0))
 
 
-def _coverage(scene: SnakeScene, midline: Floats) -> NDArray[np.float32]:
+def coverage(scene: SnakeScene, midline: Floats) -> NDArray[np.float32]:
     """(H, W) part of each pixel that the body covers."""
     fine = _FINE if scene.length_px <= 100.0 else 3
     side = np.gradient(midline, axis=0)
@@ -215,6 +215,13 @@ def _ground(scene: SnakeScene, rng: np.random.Generator) -> NDArray[np.float32]:
         soft = gaussian_filter(pattern, _STAIN * scene.columns, mode="wrap")
         ground -= scene.stains * np.clip(soft / float(soft.std()) - 0.5, 0.0, 1.5)
     return ground
+
+
+def shot_of_ground(
+    scene: SnakeScene, ground: NDArray[np.float32], rng: np.random.Generator
+) -> Image:
+    """(H, W) the picture that a camera takes of a drawn scene without another body."""
+    return _shot(scene, ground, np.zeros_like(ground), rng)
 
 
 def _shot(

@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.table import Table
 
-from snakewalk.controller.capture.capturing import (
-    CaptureOptions,
-    capture_recording,
-    correct_recording,
-)
+from snakewalk.controller.capture.capturing import capture_recording, correct_recording
+from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
 from snakewalk.controller.console.command import RECORDINGS, command
-from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.options import Force, Json, console, show
 
 Footage = Annotated[
     Path,
@@ -54,8 +53,57 @@ Corrections = Annotated[
         metavar="JSON",
     ),
 ]
+Animals = Annotated[
+    str | None,
+    typer.Option(
+        help="capture several animals, with one track each: their number, or auto for those that "
+        "are in view for half of the film",
+        metavar="N|auto",
+    ),
+]
+Wide = Annotated[
+    bool, typer.Option("--wide", help="in a .csv, one row for each frame instead of each point")
+]
+Resume = Annotated[
+    bool,
+    typer.Option("--resume", help="continue an interrupted capture of a long film from OUT.part"),
+]
 Background = Annotated[
     Path | None, typer.Option(help="image without the animal; default: estimated from frames")
+]
+
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        help="write the track here (.npz, .csv or .wcon); with --animals to track-1.npz and so "
+        "on, or to one .csv or .wcon",
+    ),
+]
+LengthM = Annotated[
+    float | None, typer.Option(help="length of the animal in metres, which sets the scale")
+]
+FilmRate = Annotated[
+    float | None,
+    typer.Option(help="frame rate in frames per second; default: the rate that the film states"),
+]
+Head = Annotated[
+    str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")
+]
+Roi = Annotated[
+    str | None,
+    typer.Option(help="search only this part of the image: X,Y,W,H in pixels", metavar="X,Y,W,H"),
+]
+Mask = Annotated[
+    Path | None, typer.Option(help="search only where this picture is white", metavar="PNG")
+]
+Overlay = Annotated[
+    Path | None, typer.Option(help="write a film with the skeleton on it (.mp4, .avi)")
+]
+Sheet = Annotated[Path | None, typer.Option(help="write a contact sheet of frames (.png, .jpg)")]
+Steps = Annotated[
+    Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
 ]
 
 
@@ -66,50 +114,31 @@ Background = Annotated[
         "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
         "capture frames/ --cropped --overlay overlay.mp4 --force --json",
         "capture film.mp4 --review review.html",
+        "capture plate.mp4 --animals auto --overlay overlay.mp4",
+        "capture dish.mp4 --animals 3 -o fish.csv --wide",
         "capture track.npz --corrections track-corrections.json -o corrected.npz",
     ),
 )
 def capture(
     recording: Footage,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="write the track here (.npz)")
-    ] = Path("track.npz"),
+    output: Output = Path("track.npz"),
     background: Background = None,
-    length_m: Annotated[
-        float | None, typer.Option(help="length of the animal in metres, which sets the scale")
-    ] = None,
+    length_m: LengthM = None,
     marker: Marker = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            help="frame rate in frames per second; default: the rate that the film states"
-        ),
-    ] = None,
-    head: Annotated[
-        str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")
-    ] = None,
+    rate: FilmRate = None,
+    head: Head = None,
     cropped: Cropped = False,
-    roi: Annotated[
-        str | None,
-        typer.Option(
-            help="search only this part of the image: X,Y,W,H in pixels", metavar="X,Y,W,H"
-        ),
-    ] = None,
-    mask: Annotated[
-        Path | None, typer.Option(help="search only where this picture is white", metavar="PNG")
-    ] = None,
+    roi: Roi = None,
+    mask: Mask = None,
     threshold: Threshold = None,
-    overlay: Annotated[
-        Path | None, typer.Option(help="write a film with the skeleton on it (.mp4, .avi)")
-    ] = None,
-    sheet: Annotated[
-        Path | None, typer.Option(help="write a contact sheet of frames (.png, .jpg)")
-    ] = None,
-    steps: Annotated[
-        Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
-    ] = None,
+    overlay: Overlay = None,
+    sheet: Sheet = None,
+    steps: Steps = None,
     review: Review = None,
     corrections: Corrections = None,
+    animals: Animals = None,
+    wide: Wide = False,
+    resume: Resume = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -131,7 +160,35 @@ def capture(
         steps=steps,
         review=review,
         corrections=corrections,
+        animals=animals,
+        wide=wide,
+        resume=resume,
         force=force,
     )
+    if animals is not None and corrections is None:
+        _show_several(capture_several(options), as_json)
+        return
     facts = (capture_recording if corrections is None else correct_recording)(options)
     show(asdict(facts), as_json)
+
+
+def _show_several(facts: AnimalsFacts, as_json: bool) -> None:
+    """One row for each animal, or all facts as JSON."""
+    if as_json:
+        show(asdict(facts), as_json)
+        return
+    table = Table(title=f"{facts.recording}: {facts.frames} frames", title_justify="left", box=None)
+    heads = ("animal", "track", "frames used", "in contact", "length, px", "identity uncertain")
+    for head in heads:
+        table.add_column(head)
+    for one in facts.animals:
+        after = ", ".join(map(str, one.identity_uncertain_after))
+        unsure = f"after frame {after}" if after else "no"
+        if one.capture is None:
+            table.add_row(str(one.animal), "-", "0", "-", "-", unsure)
+            continue
+        used, length = one.capture.frames_used, f"{one.capture.length_px:g}"
+        merged = str(one.frames_merged)
+        table.add_row(str(one.animal), one.capture.track, str(used), merged, length, unsure)
+    console.print(table)
+    console.print(f"other objects, not captured: {facts.left_out}; background: {facts.background}")

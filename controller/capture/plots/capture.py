@@ -1,6 +1,6 @@
 """Pictures of a capture: a contact sheet, a film with the skeleton on it, single steps."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import cv2
@@ -35,11 +35,20 @@ def drawn(
     colour = plain if plain.ndim == 3 else cv2.cvtColor(plain, cv2.COLOR_GRAY2BGR)
     canvas[: size[1], : size[0]] = cv2.resize(colour, size, interpolation=how)
     if status.has_points:
-        line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
-        thick = 2 if max(size) > 2 * _TILE_PX else 1
-        cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
-        cv2.circle(canvas, tuple(int(v) for v in line[0]), 4 * 16, _HEAD, -1, cv2.LINE_AA, 4)
+        draw_body(canvas, image, points_px)
     return canvas
+
+
+def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> NDArray[np.int32]:
+    """Draw a body of a frame onto its canvas; returns its line there, sixteenths of a pixel."""
+    high_px, wide_px = canvas.shape[:2]
+    factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
+    size = (round(image.shape[1] * factor), round(image.shape[0] * factor))
+    line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
+    thick = 2 if max(size) > 2 * _TILE_PX else 1
+    cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
+    cv2.circle(canvas, tuple(int(v) for v in line[0]), 4 * 16, _HEAD, -1, cv2.LINE_AA, 4)
+    return np.asarray(line, dtype=np.int32)
 
 
 def _words(canvas: Image, text: str, good: bool) -> None:
@@ -150,10 +159,12 @@ def _spread(numbers: NDArray[np.intp], most: int) -> list[int]:
 def overlay_film(
     path: Path,
     frames: Iterable[DeepImage],
-    captured: Capture,
+    animals: Sequence[Capture],
     on_progress: Callable[[], None] | None = None,
 ) -> None:
-    """The recording with the skeleton on it, every frame with its number and status.
+    """The recording with the skeletons on it, every frame with its number and status.
+
+    Several animals have numbers at their heads instead of a status.
 
     Raises:
         InputError: no film of this ending can be written here.
@@ -171,14 +182,33 @@ def overlay_film(
                 wide, high = ((side * factor + 1) // 2 * 2 for side in image.shape[1::-1])
                 high += 18
                 code = cv2.VideoWriter.fourcc(*kind)
-                film = cv2.VideoWriter(str(part), code, captured.rate_hz, (wide, high))
+                film = cv2.VideoWriter(str(part), code, animals[0].rate_hz, (wide, high))
                 if not film.isOpened():
                     raise InputError(f"{path}: this OpenCV cannot write such a film; try .avi")
-            status = captured.status[number]
-            canvas = drawn(image, captured.points_px[number], status, wide, high)
-            _words(canvas, f"{number}: {status}", status is FrameStatus.GOOD)
-            film.write(canvas)
+            film.write(_film_frame(image, animals, number, (wide, high)))
             if on_progress is not None:
                 on_progress()
         if film is not None:
             film.release()
+
+
+def _film_frame(
+    image: DeepImage, animals: Sequence[Capture], number: int, size: tuple[int, int]
+) -> Image:
+    """One frame of an overlay film of (width, height)."""
+    if len(animals) == 1:
+        status = animals[0].status[number]
+        canvas = drawn(image, animals[0].points_px[number], status, *size)
+        _words(canvas, f"{number}: {status}", status is FrameStatus.GOOD)
+        return canvas
+    canvas = drawn(image, np.zeros((0, 2)), FrameStatus.NOTHING, *size)
+    used = 0
+    for name, animal in enumerate(animals, start=1):
+        if animal.status[number].has_points:
+            used += 1
+            line = draw_body(canvas, image, animal.points_px[number])
+            place = (int(line[0, 0]) // 16 + 6, int(line[0, 1]) // 16 - 6)
+            text = str(name)
+            cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, _TEXT, 1, cv2.LINE_AA)
+    _words(canvas, f"{number}: {used} of {len(animals)} animals", used == len(animals))
+    return canvas

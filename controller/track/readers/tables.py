@@ -17,9 +17,11 @@ from snakewalk.controller.track.track import Track, frame_numbers, track_from_po
 
 _MIDLINE: dict[tuple[str, str], float | None] = {
     **{("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0},
-    ("x_lengths", "y_lengths"): None,
+    **{("x_lengths", "y_lengths"): None, ("x_px", "y_px"): None},
 }
-"""Columns of places, and metres in their unit; None: body lengths, without a scale."""
+"""Columns of places, and metres in their unit; None: body lengths or pixels, without a scale."""
+_WIDE = {"x_m": 1.0, "x_px": None, "x_lengths": None}
+"""The same of wide rows, whose columns end in the number of the point."""
 
 
 def load_csv(
@@ -41,9 +43,14 @@ def load_csv(
     column = {name.strip(): index for index, name in enumerate(rows[0])}
     for pair, scale_m in _MIDLINE.items():
         if {"t", "frame", "point", *pair} <= column.keys():
-            choice.only(file, "a CSV of midlines")
+            rows = _of_animal(file, rows, column, choice)
             columns = [column[name] for name in ("t", "frame", "point", *pair)]
             return _midline(file, _numbers(file, rows, columns), scale_m, rate_hz)
+    for name, scale_m in _WIDE.items():
+        if {"t", "frame", f"{name}_1", f"{name}_4"} <= column.keys():
+            rows = _of_animal(file, rows, column, choice)
+            table = _long(file, rows, column, name.removeprefix("x_"))
+            return _midline(file, table, scale_m, rate_hz)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, rate_hz, least_score, choice)
@@ -52,6 +59,33 @@ def load_csv(
         "SLEAP's frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
         f"coords in the first lines; found {', '.join(rows[0][:6])[:80]}"
     )
+
+
+def _of_animal(
+    file: Path, rows: list[list[str]], column: dict[str, int], choice: Choice
+) -> list[list[str]]:
+    """Return the names of the columns and the rows of the chosen animal, if animals are named."""
+    at = column.get("animal")
+    if at is None:
+        choice.only(file, "a CSV of midlines")
+        return rows
+    choice.only(file, "a CSV of midlines", "individual")
+    names = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+    listed = list(dict.fromkeys(names))
+    mine = choice.animal(file, listed, listed)
+    return [rows[0], *(row for row, name in zip(rows[1:], names, strict=True) if name == mine)]
+
+
+def _long(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) -> Floats:
+    """Rows t, frame, point, x, y of rows that hold all points of a frame."""
+    count = 1
+    while {f"x_{unit}_{count + 1}", f"y_{unit}_{count + 1}"} <= column.keys():
+        count += 1
+    names = [f"{axis}_{unit}_{point + 1}" for point in range(count) for axis in "xy"]
+    table = _numbers(file, rows, [column[name] for name in ("t", "frame", *names)])
+    first = np.repeat(table[:, :2], count, axis=0)
+    point = np.tile(np.arange(1.0, count + 1.0), len(table))[:, None]
+    return np.hstack([first, point, table[:, 2:].reshape(-1, 2)])
 
 
 def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:

@@ -9,6 +9,7 @@ missing.
 import math
 import re
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
     frame = frame_numbers(str(file), np.rint((time - time[0]) / step))
     if (np.diff(frame) == 0).any():  # so uneven that the times alone count
         frame = np.arange(len(time))
-    return track_from_points(
+    track = track_from_points(
         file.stem,
         _alike([points for _, points in bodies]),
         1.0 / step if rate_hz is None else rate_hz,
@@ -80,6 +81,10 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         frame=frame,
         time_s=time if rate_hz is None else None,
     )
+    about = held.get("metadata")
+    if isinstance(about, dict) and about.get("places_recorded") is False:
+        return replace(track, places_recorded=False)
+    return track
 
 
 def zipped_text(file: Path) -> str | None:

@@ -2,19 +2,18 @@
 
 import csv
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.track import Track
 
 SUFFIXES: Final = (".npz", ".csv", ".wcon")
 """File name endings of a track that can be written."""
-_DIGITS: Final = 7
 
 
 def write_track(path: Path, track: Track, suffix: str) -> None:
@@ -24,62 +23,105 @@ def write_track(path: Path, track: Track, suffix: str) -> None:
         InputError: none of ``SUFFIXES``.
 
     """
+    if suffix.lower() == ".npz":
+        save_track(path, track)
+    else:
+        write_tracks(path, [track], suffix)
+
+
+def write_tracks(
+    path: Path,
+    tracks: Sequence[Track],
+    suffix: str,
+    *,
+    wide: bool = False,
+    unit: str | None = None,
+) -> None:
+    """Write the animals of one recording into a table or a WCON; numbers are not rounded.
+
+    Args:
+        path: of the file.
+        tracks: one for each animal; their names are different.
+        suffix: ``.csv`` or ``.wcon``.
+        wide: a row of the table holds all points of a frame; else one point.
+        unit: of the points: ``m``, ``px`` or ``lengths``; None: as the tracks have it.
+
+    Raises:
+        InputError: another suffix, or a table of a recording without places.
+
+    """
+    if unit is None:
+        unit = "lengths" if tracks[0].length_m is None else "m"
     match suffix.lower():
-        case ".npz":
-            save_track(path, track)
         case ".csv":
-            _write_csv(path, track)
+            _write_csv(path, tracks, unit, wide=wide)
         case ".wcon":
-            _write_wcon(path, track)
+            _write_wcon(path, tracks, unit)
         case _:
             raise InputError(f"{path}: a track is written as one of {', '.join(SUFFIXES)}")
 
 
-def _write_csv(path: Path, track: Track) -> None:
+def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) -> None:
     """Write rows of t, frame, point (1 is the head) and place, for R, MATLAB and others.
 
-    Columns are ``x_m, y_m``, or ``x_lengths, y_lengths`` where the recording has no scale. Frames
-    that are missing have no rows.
+    Columns are ``x_m, y_m``, or ``x_lengths`` or ``x_px`` where the recording has no scale. Wide
+    rows have ``x_m_1, y_m_1, x_m_2`` and so on. A column ``animal`` names the animal where there
+    are several. Frames that are missing have no rows.
     """
-    unit = "lengths" if track.length_m is None else "m"
-    number = np.rint(track.time_s * track.rate_hz).astype(int).tolist()
+    if not all(one.places_recorded for one in tracks):
+        raise InputError(
+            f"{path.name}: a .csv cannot state that places were not recorded; write an .npz or a "
+            ".wcon"
+        )
+    several = len(tracks) > 1
+    heads = ["t", "frame", *(["animal"] if several else [])]
+    if wide:
+        count = tracks[0].points.shape[1]
+        heads += [f"{axis}_{unit}_{point + 1}" for point in range(count) for axis in "xy"]
+    else:
+        heads += ["point", f"x_{unit}", f"y_{unit}"]
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(["t", "frame", "point", f"x_{unit}", f"y_{unit}"])
-        for frame, body in zip(number, track.points.tolist(), strict=True):
-            time_s = f"{frame / track.rate_hz:.{_DIGITS}f}"
-            for point, (x, y) in enumerate(body, start=1):
-                writer.writerow([time_s, frame, point, f"{x:.{_DIGITS}g}", f"{y:.{_DIGITS}g}"])
+        writer.writerow(heads)
+        for track in tracks:
+            number = np.rint(track.time_s * track.rate_hz).astype(int).tolist()
+            for frame, body in zip(number, track.points.tolist(), strict=True):
+                first = [frame / track.rate_hz, frame, *([track.name] if several else [])]
+                if wide:
+                    writer.writerow([*first, *(value for place in body for value in place)])
+                    continue
+                writer.writerows(
+                    [*first, point, *place] for point, place in enumerate(body, start=1)
+                )
 
 
-def _write_wcon(path: Path, track: Track) -> None:
-    """Write a WCON of one animal for Tierpsy and others; a body without a scale has unit 1."""
-    unit = "1" if track.length_m is None else "m"
+def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
+    """Write a WCON for Tierpsy and others; bodies without a scale have unit 1."""
+    first = tracks[0]
     about = {
         "software": {"name": "snakewalk"},
-        "source": track.source,
-        "licence": track.licence,
-        "rate_hz": track.rate_hz,
-        "rate_assumed": track.rate_assumed,
-        "frames_left_out": track.dropped,
-        "frames_missing": track.absent,
-        "notes": list(track.notes),
+        "source": first.source,
+        "licence": first.licence,
+        "unit_of_length": unit,
+        "rate_hz": first.rate_hz,
+        "rate_assumed": first.rate_assumed,
+        "frames_left_out": sum(one.dropped for one in tracks),
+        "frames_missing": sum(one.absent for one in tracks),
+        "notes": list(dict.fromkeys(note for one in tracks for note in one.notes)),
+        "places_recorded": all(one.places_recorded for one in tracks),
     }
     held = {
-        "units": {"t": "s", "x": unit, "y": unit},
+        "units": {"t": "s"} | dict.fromkeys("xy", "m" if unit == "m" else "1"),
         "metadata": about,
         "data": [
             {
-                "id": track.name,
-                "t": np.round(track.time_s, _DIGITS).tolist(),
-                "x": _rounded(track.points[..., 0]),
-                "y": _rounded(track.points[..., 1]),
+                "id": one.name,
+                "t": one.time_s.tolist(),
+                "x": one.points[..., 0].tolist(),
+                "y": one.points[..., 1].tolist(),
                 "head": "L",
             }
+            for one in tracks
         ],
     }
     path.write_text(json.dumps(held), encoding="utf-8")
-
-
-def _rounded(values: Floats) -> list[list[float]]:
-    return [[float(f"{v:.{_DIGITS}g}") for v in row] for row in values.tolist()]

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
+from snakewalk.controller.capture.capturing import capture_recording
+from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.recording import examine
 from snakewalk.controller.capture.scale import scale_of_marker
 from snakewalk.controller.images.video import open_footage

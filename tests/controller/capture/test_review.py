@@ -12,17 +12,14 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import CaptureFile, load_capture, save_capture
-from snakewalk.controller.capture.capturing import (
-    CaptureOptions,
-    capture_recording,
-    correct_recording,
-)
+from snakewalk.controller.capture.capturing import capture_recording, correct_recording
 from snakewalk.controller.capture.corrections import (
     Corrections,
     RedrawnFrame,
     apply_corrections,
     read_corrections,
 )
+from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.review import picture_scale, review_page
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_track
@@ -71,11 +68,12 @@ def test_what_was_saved_is_loaded_again_and_the_page_is_of_it(
     said = re.search(r'id="data">(.*?)</script>', page, re.DOTALL)
     assert said is not None
     data = json.loads(said[1])
-    assert data["track"] == held.fingerprint
-    assert len(data["images"]) == len(data["status"]) == 16
-    assert data["points"][LOST] is None
+    (animal,) = data["animals"]
+    assert animal["track"] == held.fingerprint
+    assert len(data["images"]) == len(animal["status"]) == 16
+    assert animal["points"][LOST] is None
     assert data["sizes"] == [[240, 210]] * 16
-    assert data["words"][data["status"][LOST]] == "nothing seen"
+    assert data["words"][animal["status"][LOST]] == "nothing seen"
     assert not re.search(r"(src|href)\s*=\s*[\"']?http", page), "the page needs no network"
 
 
@@ -251,12 +249,12 @@ def test_a_person_flips_drops_drags_and_saves(
 
 def test_images_of_different_sizes_keep_them(held: CaptureFile) -> None:
     frames = [frame[: 100 + k] for k, frame in enumerate(film(SCENE))]
-    text = review_page(held, frames, scale=0.5, track=Path("track.npz"))
+    text = review_page([held], frames, scale=0.5, tracks=[Path("track.npz")])
     data = json.loads(text.split('id="data">')[1].split("</script>")[0])
     assert data["sizes"] == [[240, 100 + k] for k in range(16)]
 
 
 def test_a_name_steers_no_page(held: CaptureFile) -> None:
     named = replace(held, name="</script><img src=x onerror=alert(1)>")
-    text = review_page(named, list(film(SCENE)), scale=1.0, track=Path("track.npz"))
+    text = review_page([named], list(film(SCENE)), scale=1.0, tracks=[Path("track.npz")])
     assert "<img" not in text

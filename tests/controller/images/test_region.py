@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
+from snakewalk.controller.capture.capturing import capture_recording
+from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.region import WHOLE, region_of
 from snakewalk.controller.images.silhouette import Polarity

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.capture.capture import load_capture
-from snakewalk.controller.capture.capturing import CaptureOptions, capture_recording
+from snakewalk.controller.capture.capturing import capture_recording
+from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.image_sequence import frame_numbers_of
 from snakewalk.controller.images.video import frame_times, in_8_bits, open_footage

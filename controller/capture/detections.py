@@ -1,0 +1,88 @@
+"""Detections of a film, frame by frame, as the capture of the whole film needs them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from snakewalk.config.arrays import DeepImage, Floats
+from snakewalk.controller.capture.coil_film import COILS
+from snakewalk.controller.capture.coil_fit import Outline
+from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
+from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
+from snakewalk.controller.capture.verification.frame_store import FrameStore
+from snakewalk.controller.images.body_detector import Detection
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_LOST_FRAMES = 5  # for this number of frames a lost small body is searched at its last place
+_FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
+
+
+@dataclass(slots=True)
+class Detections:
+    """One entry a frame, as the detector found it."""
+
+    skeletons: list[Skeleton] = field(default_factory=list)
+    area_px: list[float] = field(default_factory=list)
+    distractors: list[float] = field(default_factory=list)
+    expected_px: list[float] = field(default_factory=list)
+    """Error of long bodies, whose medial axis is kept; NaN for all others."""
+    axis_error_px: list[float] = field(default_factory=list)
+    """Error of the medial axis of any body; NaN for a frame without one."""
+    outlines: dict[int, Outline] = field(default_factory=dict)
+    """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
+    faint_error_px: dict[int, float] = field(default_factory=dict)
+    """By frame: least expected error of bodies with faint parts."""
+    store: FrameStore = field(default_factory=FrameStore)
+    """The surroundings of the body in every frame."""
+    crops: dict[int, Crop] = field(default_factory=dict)
+    """By frame: small bodies, and where a small body was lost its last place."""
+    stated_s: list[float] = field(default_factory=list)
+    """Times of the frames, as the film states them."""
+    _last: int = -_LOST_FRAMES - 1
+    _points: Floats = field(default_factory=lambda: np.empty((0, 2)))
+
+    def add(self, frame: DeepImage, detection: Detection) -> None:
+        """Add the next frame (H, W[, C]); crops of small bodies are kept for their fit."""
+        number = len(self.skeletons)
+        body, silhouette = detection.skeleton, detection.silhouette
+        self.skeletons.append(body)
+        self.area_px.append(silhouette.area_px)
+        self.distractors.append(silhouette.distractors)
+        expected = axis_px = np.nan
+        if body.status is FrameStatus.GOOD:
+            blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
+            axis_px = axis_error_px(blur_px, body.length_px)
+            if detection.faint_parts:
+                axis_px *= _FAINT_PARTS
+                self.faint_error_px[number] = axis_px
+        if body.status is FrameStatus.GOOD or body.status in COILS:
+            width_px = 2.0 * float(np.max(body.radius_px))
+            self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
+        self._keep(number, frame, detection)
+        if body.length_px <= LONGEST_PX:
+            self._last, self._points = number, body.points_px
+            self.crops[number] = crop_body(frame, detection.background, self._points)
+        elif body.status is FrameStatus.GOOD:
+            expected = axis_px
+        elif body.status is FrameStatus.BLOB and number - self._last <= _LOST_FRAMES:
+            self.crops[number] = crop_body(frame, detection.background, self._points)
+        self.expected_px.append(expected)
+        self.axis_error_px.append(axis_px)
+
+    def skip(self, status: FrameStatus) -> None:
+        """Add a frame in which the animal is not searched for."""
+        self.skeletons.append(no_skeleton(status))
+        self.area_px.append(0.0)
+        self.distractors.append(0.0)
+        self.expected_px.append(np.nan)
+        self.axis_error_px.append(np.nan)
+
+    def _keep(self, number: int, frame: DeepImage, detection: Detection) -> None:
+        """Keep the surroundings of the silhouette and of the last place of a small body."""
+        body = detection.silhouette
+        corner = np.array([body.origin_px, np.add(body.origin_px, body.level.shape[::-1])])
+        places = np.vstack([corner, self._points]) if body.area_px > 0.0 else self._points
+        if len(places):
+            length = float(np.nan_to_num(detection.skeleton.length_px))
+            self.store.put(number, frame, places, length)

@@ -1,0 +1,143 @@
+"""Options of ``snakewalk capture``, and their checks before any work is done."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.track.readers.writers import SUFFIXES
+
+_FILMS = (".mp4", ".mkv", ".avi")
+_PAGES = (".html", ".htm")
+_SHEETS = (".png", ".jpg", ".jpeg")
+AUTO = "auto"
+"""Value of ``animals``: those that persist."""
+MOST_ANIMALS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureOptions:
+    """The options of ``snakewalk capture``; see its help."""
+
+    recording: Path
+    output: Path
+    background: Path | None = None
+    length_m: float | None = None
+    marker: str | None = None
+    rate_hz: float | None = None
+    head: str | None = None
+    cropped: bool = False
+    roi: str | None = None
+    mask: Path | None = None
+    threshold: float | None = None
+    overlay: Path | None = None
+    sheet: Path | None = None
+    steps: Path | None = None
+    review: Path | None = None
+    corrections: Path | None = None
+    animals: str | None = None
+    """A number, or ``auto``; None: one animal."""
+    wide: bool = False
+    """A table with one row a frame."""
+    resume: bool = False
+    """Continue after the finished parts of an interrupted capture."""
+    force: bool = False
+
+
+def check_options(options: CaptureOptions) -> None:
+    """Check the options that need no film.
+
+    Raises:
+        InputError: an option that cannot be used, or a result that exists.
+
+    """
+    if options.cropped and options.background is not None:
+        raise InputError("--cropped and --background: a camera that moves has no one background")
+    if options.length_m is not None and options.marker is not None:
+        raise InputError("--length-m and --marker both give the scale: say one of them")
+    if options.length_m is not None and not 0.0 < options.length_m < float("inf"):
+        raise InputError(f"--length-m: the animal must be longer than 0 m, not {options.length_m}")
+    if options.threshold is not None and not 0.0 < options.threshold < float("inf"):
+        raise InputError(
+            f"--threshold {options.threshold:g}: expected the grey levels, above 0, by which the "
+            "body stands out from its background at its boundary"
+        )
+    if options.output.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{options.output}: a track is written as one of {', '.join(SUFFIXES)}")
+    if options.wide and options.output.suffix.lower() != ".csv":
+        raise InputError(f"--wide: is a form of a .csv, not of {options.output}; leave it out")
+    if options.cropped and options.output.suffix.lower() == ".csv":
+        raise InputError(
+            f"{options.output}: a .csv cannot state that places were not recorded (--cropped); "
+            "write an .npz or a .wcon"
+        )
+    if options.review is not None and options.output.suffix.lower() != ".npz":
+        raise InputError(f"--review: corrects an .npz, not {options.output}; name an .npz")
+    if options.animals is not None:
+        _check_animals(options, options.animals)
+    if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:
+        raise InputError(f"{options.overlay}: an overlay film is one of {', '.join(_FILMS)}")
+    for picture in (options.sheet, options.steps):
+        if picture is not None and picture.suffix.lower() not in _SHEETS:
+            raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
+    if options.review is not None and options.review.suffix.lower() not in _PAGES:
+        raise InputError(f"{options.review}: a review page is an .html")
+    refuse_to_overwrite(
+        [options.output, options.overlay, options.sheet, options.steps, options.review],
+        options.force,
+    )
+
+
+def _check_animals(options: CaptureOptions, animals: str) -> None:
+    if animals != AUTO and not (animals.isdecimal() and 1 <= int(animals) <= MOST_ANIMALS):
+        raise InputError(
+            f"--animals {animals}: expected a number from 1 to {MOST_ANIMALS}, or {AUTO}"
+        )
+    given = {"--head": options.head, "--steps": options.steps, "--sheet": options.sheet}
+    if options.resume:
+        raise InputError("--animals and --resume: only a film of one animal can be continued")
+    one = [name for name, value in given.items() if value is not None]
+    if one:
+        raise InputError(f"--animals and {one[0]}: this option is for one animal; leave it out")
+    if options.cropped:
+        raise InputError("--animals and --cropped: several animals need a camera that stands still")
+
+
+def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool | None]:
+    """Return the film and the options on which the skeletons depend."""
+    film = options.recording
+    names = ("background", "rate_hz", "head", "cropped", "roi", "mask", "threshold")
+    values = {name: getattr(options, name) for name in names}
+    held = {name: str(one) if isinstance(one, Path) else one for name, one in values.items()}
+    size = 0
+    if film.exists():
+        size = film.stat().st_size if film.is_file() else sum(1 for _ in film.iterdir())
+    return {"recording": film.name, "size": size, **held}
+
+
+def track_files(options: CaptureOptions, count: int) -> list[Path]:
+    """Return the files of the tracks of some animals: one each, or one table of all."""
+    if options.output.suffix.lower() != ".npz":
+        return [options.output]
+    return [
+        options.output.with_name(f"{options.output.stem}-{number}.npz")
+        for number in range(1, count + 1)
+    ]
+
+
+def place_of(text: str) -> tuple[float, float]:
+    """Return the place of ``--head X,Y``.
+
+    Raises:
+        InputError: not two numbers.
+
+    """
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--head {text}: expected X,Y in pixels") from None
+    if not np.isfinite([x, y]).all():
+        raise InputError(f"--head {text}: expected X,Y in pixels")
+    return x, y

@@ -1,0 +1,182 @@
+"""One capture for each animal of a film: its own blob in each frame, all others painted out."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from snakewalk.config.arrays import DeepImage
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.capture import Capture
+from snakewalk.controller.capture.film_parts import FilmParts
+from snakewalk.controller.capture.several.blobs import (
+    Blobs,
+    blobs_of,
+    others_mask,
+    own_window,
+    usual_area,
+)
+from snakewalk.controller.capture.several.identities import Identity, identities_of
+from snakewalk.controller.capture.several.tracklets import TrackletBuilder
+from snakewalk.controller.images.body_detector import BodyDetector, Detection
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_PERSISTS = 0.5  # of the film: how long an animal must be followed with ``auto``
+_AROUND = 0.4  # of the body's length, around its blob
+_LEAST_AROUND_PX = 24
+
+
+@dataclass(frozen=True, slots=True)
+class AnimalsFound:
+    """The animals of a film."""
+
+    identities: tuple[Identity, ...]
+    """In the order of their tracks: from left to right where they are first seen."""
+    left_out: int
+    """Blobs that were followed, but not long enough for an animal."""
+    usual_px: float
+    """Usual area of an animal."""
+    frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class CapturedAnimal:
+    """One animal's capture, or why it failed."""
+
+    captured: Capture | None
+    identity: Identity
+    fault: str | None = None
+
+
+def find_animals(
+    frames: Iterable[DeepImage],
+    some: Sequence[DeepImage],
+    detector: BodyDetector,
+    *,
+    wanted: int | None,
+    name: str,
+    on_progress: Callable[[], None] | None = None,
+) -> AnimalsFound:
+    """Follow all animals through a film.
+
+    Args:
+        frames: all, in order.
+        some: a few, spread over the film.
+        detector: from ``detector_of_several``.
+        wanted: number of animals; None: those that are followed through half of the film.
+        name: of the film, for faults.
+        on_progress: called after each frame.
+
+    Raises:
+        InputError: fewer animals than wanted, or none.
+
+    """
+    usual = usual_area([blobs_of(one, detector.ground_of(one), detector) for one in some])
+    if usual <= 0.0:
+        raise InputError(
+            f"{name}: no contrast or no motion: nothing stands out from the background; give "
+            "--background, or better light"
+        )
+    builder, count = TrackletBuilder(usual), 0
+    for frame in frames:
+        builder.add(blobs_of(frame, detector.ground_of(frame), detector, usual))
+        count += 1
+        if on_progress is not None:
+            on_progress()
+    every = identities_of(builder.done())
+    kept = [one for one in every if one.span >= _PERSISTS * count]
+    if wanted is not None:
+        kept = every[:wanted]
+    if not kept or (wanted is not None and len(kept) < wanted):
+        asked = "auto" if wanted is None else str(wanted)
+        raise InputError(
+            f"{name}: --animals {asked}: {len(kept)} animals can be followed; give --background, "
+            "or another number"
+        )
+    kept.sort(key=lambda one: float(one.tracklets[0].middles[0][0]))
+    return AnimalsFound(tuple(kept), len(every) - len(kept), usual, count)
+
+
+def capture_animals(
+    frames: Iterable[DeepImage],
+    detector: BodyDetector,
+    found: AnimalsFound,
+    rate_hz: float,
+    *,
+    name: str,
+    on_progress: Callable[[], None] | None = None,
+) -> list[CapturedAnimal]:
+    """Capture each animal as if it were alone; frames in which it is not alone have no points."""
+    plans = [_plan(one, found.frames) for one in found.identities]
+    films = [
+        FilmParts(rate_hz, found.frames, f"{name}: animal {number}")
+        for number in range(1, len(plans) + 1)
+    ]
+    for number, frame in enumerate(frames):
+        ground = detector.ground_of(frame)
+        blobs = blobs_of(frame, ground, detector, found.usual_px)
+        for plan, film in zip(plans, films, strict=True):
+            here = plan[number]
+            if isinstance(here, FrameStatus):
+                film.skip(here)
+                continue
+            shown, detection = _detected(frame, ground, detector, blobs, here)
+            film.add(shown, detection)
+        if on_progress is not None:
+            on_progress()
+    out = []
+    for identity, film in zip(found.identities, films, strict=True):
+        try:
+            captured, _ = film.done()
+        except InputError as error:
+            out.append(CapturedAnimal(None, identity, str(error)))
+        else:
+            out.append(CapturedAnimal(captured, identity))
+    return out
+
+
+def _plan(identity: Identity, count: int) -> list[int | FrameStatus]:
+    """For each frame the animal's blob, or why it is missing."""
+    first, last = identity.tracklets[0], identity.tracklets[-1]
+    unseen = FrameStatus.NOTHING
+    out: list[int | FrameStatus] = [unseen] * count
+    if first.begins_in is not None:
+        out[: first.frames[0]] = [FrameStatus.MERGED] * first.frames[0]
+    end = last.frames[-1] + 1
+    if last.ends_in is not None:
+        out[end:] = [FrameStatus.MERGED] * (count - end)
+    touched = False
+    at = first.frames[0]
+    for one in identity.tracklets:
+        touched = touched or (one is not first and one.begins_in is not None)
+        if touched:
+            out[at : one.frames[0]] = [FrameStatus.MERGED] * (one.frames[0] - at)
+        for frame, blob in zip(one.frames, one.blobs, strict=True):
+            out[frame] = blob
+        at, touched = one.frames[-1] + 1, one.ends_in is not None
+    return out
+
+
+def _detected(
+    frame: DeepImage, ground: DeepImage, detector: BodyDetector, blobs: Blobs, number: int
+) -> tuple[DeepImage, Detection]:
+    """The frame with this animal alone, and the animal in it."""
+    length, width = np.exp(blobs.shape[number][:2])
+    window = own_window(blobs, number, max(_LEAST_AROUND_PX, round(_AROUND * float(length))))
+    part = frame[window].copy()
+    covered = others_mask(blobs, number, window, round(0.5 * float(width)) + 3)
+    part[covered] = ground[window][covered]
+    inside = None if detector.inside is None else detector.inside[window]
+    local = replace(detector, inside=inside)
+    found = local.detect(part, np.ascontiguousarray(ground[window]))
+    corner = np.array([window[1].start, window[0].start], dtype=float)
+    shown = ground.copy()
+    shown[window] = part
+    silhouette = found.silhouette
+    x, y = np.add(silhouette.origin_px, corner)
+    return shown, replace(
+        found,
+        silhouette=replace(silhouette, origin_px=(float(x), float(y))),
+        skeleton=replace(found.skeleton, points_px=found.skeleton.points_px + corner),
+        background=ground,
+    )

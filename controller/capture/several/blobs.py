@@ -1,0 +1,173 @@
+"""Blobs of one frame: connected parts that may be an animal, or several animals in contact."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bools, DeepImage, Floats, Ints
+from snakewalk.config.errors import InputError
+from snakewalk.controller.images.background import background_candidates, median_background
+from snakewalk.controller.images.body_detector import BodyDetector, usual_polarity
+from snakewalk.controller.images.silhouette import body_threshold, connected_parts, soft_contrast
+
+SMALLEST = 0.3
+"""Area of a blob over the usual area of an animal; smaller ones are dirt."""
+_AS_LARGE = 0.97  # of the largest area of all animals: a background shows all of them
+FEATURES = ("length", "width", "contrast")
+"""Columns of ``Blobs.shape``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blobs:
+    """The n blobs of a frame."""
+
+    label: NDArray[np.int32]
+    """(H, W) 1 to n in the blobs, 0 elsewhere."""
+    boxes: Ints
+    """(n, 4) left, top, width, height, px."""
+    area_px: Floats
+    """(n,)"""
+    middle_px: Floats
+    """(n, 2) x, y of the centroid."""
+    shape: Floats
+    """(n, 3) logarithms of ``FEATURES``: px, px, grey levels."""
+
+
+def blobs_of(
+    frame: DeepImage, ground: DeepImage, detector: BodyDetector, usual_px: float = 0.0
+) -> Blobs:
+    """Return the blobs of a frame.
+
+    Args:
+        frame: (H, W[, C]).
+        ground: the same without animals.
+        detector: its polarity, threshold and region are used.
+        usual_px: usual area of an animal; 0: blobs of any size are returned.
+
+    """
+    apart = soft_contrast(frame, ground, detector.polarity)
+    if detector.inside is not None:
+        apart = np.where(detector.inside, apart, np.zeros_like(apart))
+    threshold = body_threshold(apart) if detector.threshold is None else detector.threshold
+    found = None if threshold is None else connected_parts((apart > threshold).astype(np.uint8))
+    if found is None:
+        none = np.zeros((0, 4), dtype=int)
+        return Blobs(
+            np.zeros(apart.shape, np.int32), none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 3))
+        )
+    label, stats = found
+    area = stats[:, cv2.CC_STAT_AREA].astype(float)
+    kept = 1 + np.flatnonzero(area[1:] >= max(1.0, SMALLEST * usual_px))
+    number = np.zeros(len(stats), dtype=np.int32)
+    number[kept] = np.arange(1, len(kept) + 1)
+    boxes = stats[kept, :4].astype(int)
+    label = number[label]
+    measured = [_measured(label, apart, k, box) for k, box in enumerate(boxes, start=1)]
+    middle = np.array([one for one, _ in measured]).reshape(-1, 2)
+    shape = np.array([one for _, one in measured]).reshape(-1, len(FEATURES))
+    return Blobs(label, boxes, area[kept], middle, shape)
+
+
+def _measured(
+    label: NDArray[np.int32], apart: DeepImage, number: int, box: Ints
+) -> tuple[Floats, Floats]:
+    """Centroid of a blob, and its shape: the rectangle of equal area and perimeter."""
+    left, top, wide, high = (int(v) for v in box)
+    window = (slice(top, top + high), slice(left, left + wide))
+    mask = (label[window] == number).astype(np.uint8)
+    rows, columns = np.nonzero(mask)
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    around = max(cv2.arcLength(one, True) for one in outlines)
+    area = float(len(rows))
+    length = 0.25 * (around + np.sqrt(max(0.0, around**2 - 16.0 * area)))
+    length = max(length, 1.0)
+    contrast = float(apart[window][mask > 0].mean())
+    middle = np.array([left + columns.mean(), top + rows.mean()])
+    return middle, np.log([length, max(area / length, 0.5), max(contrast, 0.5)])
+
+
+def usual_area(frames: Sequence[Blobs]) -> float:
+    """Usual area of an animal: half of all that stands out is in larger blobs; 0: nothing does."""
+    area = np.sort(np.concatenate([one.area_px for one in frames]))
+    if not area.size:
+        return 0.0
+    share = np.cumsum(area) / area.sum()
+    return float(area[np.searchsorted(share, 0.5)])
+
+
+def count_of(frames: Sequence[Blobs]) -> tuple[int, float]:
+    """Median number of animals in some frames, and the mean area of all of them together."""
+    least = SMALLEST * usual_area(frames)
+    large = [one.area_px[one.area_px >= least] for one in frames]
+    return int(np.median([len(one) for one in large])), float(np.mean([one.sum() for one in large]))
+
+
+def detector_of_several(
+    frames: Sequence[DeepImage],
+    background: DeepImage | None = None,
+    *,
+    inside: Bools | None = None,
+    threshold: float | None = None,
+    wanted: int | None = None,
+) -> BodyDetector:
+    """Learn the scene of several animals from a few frames of a camera that stands still.
+
+    The median over frames shows animals where they rest or come back. A lighter or darker quantile
+    of each pixel is used if animals are larger against it, or nearer to the number ``wanted``.
+
+    Args:
+        frames: (H, W[, C]), spread over the film.
+        background: the scene without animals.
+        inside: (H, W) where animals may be.
+        threshold: contrast at the boundary of a body, grey levels.
+        wanted: number of animals; None: unknown.
+
+    Raises:
+        InputError: nothing stands out.
+
+    """
+    if background is not None:
+        polarity = usual_polarity(frames, background)
+        return BodyDetector(background, polarity, "given", 0, inside, threshold)
+    tried: list[tuple[BodyDetector, int, float]] = []
+    polarity = usual_polarity(frames, median_background(frames))
+    for ground, supposed, source in background_candidates(frames):
+        if supposed is not None and supposed is not polarity:
+            continue
+        detector = BodyDetector(ground, polarity, source, 0, inside, threshold)
+        count, area = count_of([blobs_of(frame, ground, detector) for frame in frames])
+        if count:
+            tried.append((detector, 0 if wanted is None else abs(count - wanted), area))
+    if not tried:
+        raise InputError(
+            "nothing stands out from the background; give --background, or better light"
+        )
+    nearest = min(away for _, away, _ in tried)
+    tried = [one for one in tried if one[1] == nearest]
+    largest = max(area for _, _, area in tried)
+    return next(detector for detector, _, area in tried if area >= _AS_LARGE * largest)
+
+
+def own_window(blobs: Blobs, number: int, around_px: int) -> tuple[slice, slice]:
+    """Rows and columns of blob ``number`` (from 0) with a margin."""
+    rows, columns = blobs.label.shape
+    left, top, wide, high = (int(v) for v in blobs.boxes[number])
+    return (
+        slice(max(0, top - around_px), min(rows, top + high + around_px)),
+        slice(max(0, left - around_px), min(columns, left + wide + around_px)),
+    )
+
+
+def others_mask(blobs: Blobs, number: int, window: tuple[slice, slice], reach_px: int) -> Bools:
+    """(h, w) pixels of a window that show other animals, with their blurred edges."""
+    label = blobs.label[window]
+    own = label == number + 1
+    other = ((label > 0) & ~own).astype(np.uint8)
+    if not other.any():
+        return np.zeros(label.shape, dtype=bool)
+    box = np.ones((2 * reach_px + 1, 2 * reach_px + 1), np.uint8)
+    near_own = cv2.dilate(own.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return np.asarray((cv2.dilate(other, box) > 0) & ~near_own)

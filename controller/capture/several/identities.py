@@ -1,0 +1,232 @@
+"""Identities of several animals: which tracklets belong to the same animal.
+
+Ends of tracklets are assigned to later starts at least cost (linear assignment; gap closing as in
+u-track, Jaqaman et al. 2008, Nature Methods 5:695). The cost compares the motion before and after
+the gap, and the shape: length, width and contrast. An assignment is uncertain if an exchange with
+another animal costs hardly more.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.capture.several.tracklets import Tracklet
+
+SURE = 10.0
+"""Additional cost of the best exchange from which an assignment is certain (ours; measured on
+rendered crossings, seeds 500 to 519)."""
+_MOTION_FRAMES = 8  # frames of a tracklet next to a gap that say how the animal moves
+_PLACE = 0.06  # of the length: error of a predicted place, in addition to that of its motion
+_TURNS = 0.3  # of the distance travelled in the gap: error of a predicted place
+_LEAST_SPREAD = (0.03, 0.05, 0.03)  # of the logarithms of length, width and contrast
+_CORRELATED = 10.0  # frames whose shapes differ from the animal's usual one in the same way
+_MOST_GAP = 30  # frames for which an animal without a crossing may be unseen
+_REACH = 1.0  # body lengths that it may move while it is unseen
+_FAR = 60.0  # cost of ending a tracklet that was not seen to enter a crossing
+_CROSSING = 1e4  # cost of leaving a tracklet of a crossing without a successor
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """One animal of a film."""
+
+    tracklets: tuple[Tracklet, ...]
+    uncertain_after: tuple[int, ...]
+    """Frames after which it may be another animal: the last one before a gap."""
+    bridged: int
+    """Gaps that were bridged, crossings or not."""
+
+    @property
+    def frames(self) -> int:
+        """Frames in which the animal is alone."""
+        return sum(len(one.frames) for one in self.tracklets)
+
+    @property
+    def span(self) -> int:
+        """Frames from the first to the last one in which the animal is alone."""
+        return self.tracklets[-1].frames[-1] + 1 - self.tracklets[0].frames[0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Link:
+    before: int
+    after: int
+    margin: float
+    """Additional cost of the best exchange; infinite without another possibility."""
+
+
+def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:
+    """All identities of a film; the one that is followed for most frames first."""
+    links: list[_Link] = []
+    for _ in range(_ROUNDS):
+        links = _links(tracklets, links)
+    after = {one.before: one for one in links}
+    later = {one.after for one in links}
+    out = []
+    for first in range(len(tracklets)):
+        if first in later:
+            continue
+        chain, unsure, k = [tracklets[first]], [], first
+        while k in after:
+            link = after[k]
+            if link.margin < SURE:
+                unsure.append(tracklets[k].frames[-1])
+            k = link.after
+            chain.append(tracklets[k])
+        out.append(Identity(tuple(chain), tuple(unsure), len(chain) - 1))
+    return sorted(out, key=lambda one: -one.span)
+
+
+def _links(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> list[_Link]:
+    """Assign ends to starts; shapes are those of all tracklets that certain links join."""
+    ends = [k for k, one in enumerate(tracklets) if one.frames]
+    cost = _costs(tracklets, known)
+    out = []
+    for olds, news in _groups(np.isfinite(cost)):
+        some = cost[np.ix_(olds, news)]
+        if not some.size:
+            continue
+        least = min(_FAR, _CROSSING)
+        alone = np.array(
+            [_CROSSING if tracklets[ends[k]].ends_in is not None else least for k in olds]
+        )
+        for row, column in _assigned(some, alone):
+            margin = _margin(some, row, column, _assigned(some, alone), alone)
+            out.append(_Link(int(olds[row]), int(news[column]), margin))
+    return out
+
+
+def _assigned(cost: Floats, alone: Floats) -> list[tuple[int, int]]:
+    """Pairs (row, column) of least cost; a row may stay alone at a cost of its own."""
+    rows, columns = cost.shape
+    whole = np.full((rows, columns + rows), 1e9)
+    whole[:, :columns] = np.where(np.isfinite(cost), cost, 1e9)
+    whole[np.arange(rows), columns + np.arange(rows)] = alone
+    pairs = zip(*linear_sum_assignment(whole), strict=True)
+    return [(int(r), int(c)) for r, c in pairs if c < columns and np.isfinite(cost[r, c])]
+
+
+def _margin(
+    cost: Floats, row: int, column: int, pairs: list[tuple[int, int]], alone: Floats
+) -> float:
+    """Additional cost if the animal of a row continued elsewhere: exchanged, or in a free start."""
+    best = float("inf")
+    taken = {c for _, c in pairs}
+    for other, at in pairs:
+        if other != row:
+            swapped = cost[row, at] + min(cost[other, column], 1e9)
+            best = min(best, float(swapped - cost[row, column] - cost[other, at]))
+    for at in range(cost.shape[1]):
+        if at not in taken:
+            best = min(best, float(cost[row, at] - cost[row, column]))
+    for other in set(range(cost.shape[0])) - {r for r, _ in pairs}:
+        if np.isfinite(cost[other, column]):
+            best = min(best, float(cost[other, column] - cost[row, column]))
+    return best
+
+
+def _groups(possible: Bools) -> list[tuple[list[int], list[int]]]:
+    """Rows and columns that belong together, as (rows, columns)."""
+    out = []
+    free = set(np.flatnonzero(possible.any(axis=1)).tolist())
+    while free:
+        rows, columns, fresh = set(), set(), {free.pop()}
+        while fresh:
+            rows |= fresh
+            columns |= set(np.flatnonzero(possible[sorted(fresh)].any(axis=0)).tolist())
+            fresh = set(np.flatnonzero(possible[:, sorted(columns)].any(axis=1)).tolist()) - rows
+        free -= rows
+        out.append((sorted(rows), sorted(columns)))
+    return out
+
+
+def _costs(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> Floats:
+    """(n, n) cost of each start (column) as the continuation of an end (row); infinite: none."""
+    count = len(tracklets)
+    cost = np.full((count, count), np.inf)
+    if not count:
+        return cost
+    spread = _spread(tracklets)
+    length = float(np.exp(np.median([np.median(one.shapes, axis=0)[0] for one in tracklets])))
+    before, after = _shapes(tracklets, known)
+    out = [_motion(one, last=True) for one in tracklets]
+    into = [_motion(one, last=False) for one in tracklets]
+    speed = float(np.median([np.hypot(*velocity) for _, velocity in (*out, *into)]))
+    for i, old in enumerate(tracklets):
+        for j, new in enumerate(tracklets):
+            gap = new.frames[0] - old.frames[-1]
+            if gap <= 0 or not _may_follow(old, new, gap, out[i][0], into[j][0], length):
+                continue
+            (place, velocity), (later, velocity_later) = out[i], into[j]
+            moved = max(speed, 0.5 * float(np.hypot(*velocity) + np.hypot(*velocity_later)))
+            error = _PLACE * length + _TURNS * moved * gap
+            off = (
+                np.sum((place + gap * velocity - later) ** 2)
+                + np.sum((later - gap * velocity_later - place) ** 2)
+            ) / 2.0
+            (mean, number), (mean_later, number_later) = before[i], after[j]
+            variance = spread**2 * _CORRELATED * (1.0 / number + 1.0 / number_later)
+            variance = np.minimum(variance, 4.0 * spread**2) + np.square(_LEAST_SPREAD)
+            shape = float(np.sum((mean - mean_later) ** 2 / variance))
+            cost[i, j] = float(off) / error**2 + shape
+    return cost
+
+
+def _may_follow(
+    old: Tracklet, new: Tracklet, gap: int, place: Floats, later: Floats, length: float
+) -> bool:
+    if old.ends_in is not None and new.begins_in is not None:
+        return old.ends_in == new.begins_in
+    near = float(np.hypot(*(later - place))) < _REACH * length
+    return gap <= _MOST_GAP and near
+
+
+def _spread(tracklets: Sequence[Tracklet]) -> Floats:
+    """(3,) usual spread of an animal's shape from frame to frame."""
+    apart = [
+        np.abs(np.array(one.shapes) - np.median(one.shapes, axis=0))
+        for one in tracklets
+        if len(one.frames) >= _MOTION_FRAMES
+    ]
+    if not apart:
+        return np.array(_LEAST_SPREAD)
+    return np.asarray(1.4826 * np.median(np.concatenate(apart), axis=0))
+
+
+def _shapes(
+    tracklets: Sequence[Tracklet], known: Sequence[_Link]
+) -> tuple[list[tuple[Floats, int]], list[tuple[Floats, int]]]:
+    """Shape and number of frames of each animal up to each tracklet, and from it on."""
+    earlier = {one.after: one.before for one in known if one.margin >= SURE}
+    later = {one.before: one.after for one in known if one.margin >= SURE}
+    return (
+        [_shape_along(tracklets, k, earlier) for k in range(len(tracklets))],
+        [_shape_along(tracklets, k, later) for k in range(len(tracklets))],
+    )
+
+
+def _shape_along(
+    tracklets: Sequence[Tracklet], k: int, following: dict[int, int]
+) -> tuple[Floats, int]:
+    shapes = list(tracklets[k].shapes)
+    while k in following and len(shapes) < 2000:
+        k = following[k]
+        shapes += tracklets[k].shapes
+    return np.median(shapes, axis=0), len(shapes)
+
+
+def _motion(one: Tracklet, *, last: bool) -> tuple[Floats, Floats]:
+    """Place at the end or start of a tracklet, px, and velocity there, px a frame."""
+    some = slice(-_MOTION_FRAMES, None) if last else slice(None, _MOTION_FRAMES)
+    places = np.array(one.middles[some])
+    end = places[-1] if last else places[0]
+    if len(places) < 2:
+        return end, np.zeros(2)
+    at = np.array(one.frames[some], dtype=float)
+    at -= at.mean()
+    velocity = (at[:, None] * (places - places.mean(axis=0))).sum(axis=0) / (at**2).sum()
+    return end, np.asarray(velocity)

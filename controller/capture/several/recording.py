@@ -1,0 +1,234 @@
+"""A film of several animals captured: identities, one track each, one page, one film for all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.capture import CaptureFile
+from snakewalk.controller.capture.capturing import CaptureFacts, facts_of, marker_scale
+from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
+from snakewalk.controller.capture.options import AUTO, CaptureOptions, check_options, track_files
+from snakewalk.controller.capture.plots.capture import overlay_film
+from snakewalk.controller.capture.results import write_captures
+from snakewalk.controller.capture.review import picture_scale, review_page
+from snakewalk.controller.capture.scale import scale_of_length
+from snakewalk.controller.capture.several.animal_films import (
+    AnimalsFound,
+    CapturedAnimal,
+    capture_animals,
+    find_animals,
+)
+from snakewalk.controller.capture.several.blobs import detector_of_several
+from snakewalk.controller.console.messages import LOGGER, stderr_console
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.track.frame_status import FrameStatus
+
+
+@dataclass(frozen=True, slots=True)
+class AnimalFacts:
+    """One animal of a film."""
+
+    animal: int
+    """Number, from 1."""
+    frames_merged: int
+    """Frames in which it is in one silhouette with others; they have no points."""
+    contacts_bridged: int
+    """Gaps, mostly contacts, through which the animal is followed."""
+    identity_uncertain_after: tuple[int, ...]
+    """Frames after which it may be another animal."""
+    capture: CaptureFacts | None
+    """None: it has no track; ``fault`` says why."""
+    fault: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class AnimalsFacts:
+    """The animals of a film."""
+
+    recording: str
+    frames: int
+    animals: tuple[AnimalFacts, ...]
+    left_out: int
+    """Objects that were followed for too short a time to be one of the animals."""
+    background: str
+
+
+def capture_several(options: CaptureOptions) -> AnimalsFacts:
+    """Capture all animals of a film and write all results that the options name.
+
+    Raises:
+        InputError: no animal that can be used, a result that exists, or a bad option.
+
+    """
+    check_options(options)
+    wanted = None if options.animals in {None, AUTO} else int(str(options.animals))
+    if wanted is not None:
+        refuse_to_overwrite(track_files(options, wanted), options.force)
+    with stderr_console().status("learning the background ..."):
+        film = open_film(options)
+        name = str(options.recording)
+        if not film.one_size:
+            raise InputError(f"{name}: --animals needs images of one size; these differ")
+        detector = detector_of_several(
+            film.some,
+            film.background,
+            inside=film.region.inside,
+            threshold=film.threshold,
+            wanted=wanted,
+        )
+    count = film.footage.count
+    scale = 1.0
+    if options.review is not None:
+        scale = picture_scale(film.some[::3], count, name)
+    with ProgressBar("identities", count, transient=True) as bar:
+        found = find_animals(
+            film.frames(), film.some, detector, wanted=wanted, name=name, on_progress=bar.advance
+        )
+        refuse_to_overwrite(track_files(options, len(found.identities)), options.force)
+        bar.update(0, count, description="frames")
+        animals = capture_animals(
+            film.frames(),
+            detector,
+            found,
+            film.footage.rate_hz,
+            name=name,
+            on_progress=bar.advance,
+        )
+        held = _files(options, film, detector, animals)
+        _write(options, film, held, bar, scale)
+    facts = _facts(options, film, detector, found, animals, held)
+    _warn(options, facts)
+    return facts
+
+
+def _files(
+    options: CaptureOptions,
+    film: OpenedFilm,
+    detector: BodyDetector,
+    animals: Sequence[CapturedAnimal],
+) -> list[CaptureFile | None]:
+    """The file of each animal, or None for an animal without a track.
+
+    Raises:
+        InputError: no animal has a track.
+
+    """
+    good = [one.captured for one in animals if one.captured is not None]
+    if not good:
+        raise InputError(str(animals[0].fault))
+    m_per_px = marker_scale(options, detector, film)
+    if options.length_m is not None:
+        lengths = np.concatenate([one.length_px for one in good])
+        m_per_px = scale_of_length(options.length_m, lengths)
+    out: list[CaptureFile | None] = []
+    for number, one in enumerate(animals, start=1):
+        if one.captured is None:
+            out.append(None)
+            continue
+        time_s, rate_hz = film.times(options.rate_hz, one.captured.time_s)
+        moved = film.region.moved(one.captured.points_px)
+        captured = replace(one.captured, points_px=moved, time_s=time_s, rate_hz=rate_hz)
+        out.append(
+            CaptureFile(
+                captured,
+                name=f"{options.recording.stem}-{number}",
+                m_per_px=m_per_px,
+                rate_assumed=film.footage.rate_assumed,
+                source=f"captured from {options.recording.name}, animal {number}",
+                identity_uncertain_after=one.identity.uncertain_after,
+            )
+        )
+    return out
+
+
+def _write(
+    options: CaptureOptions,
+    film: OpenedFilm,
+    held: Sequence[CaptureFile | None],
+    bar: ProgressBar,
+    scale: float,
+) -> None:
+    files = track_files(options, len(held))
+    good = [one for one in held if one is not None]
+    if options.output.suffix.lower() != ".npz":
+        write_captures(options.output, good, wide=options.wide)
+    else:
+        for file, one in zip(files, held, strict=True):
+            if one is not None:
+                write_captures(file, [one])
+    count = film.footage.count
+    if options.overlay is not None:
+        bar.update(0, count, description="overlay film")
+        overlay_film(
+            options.overlay, film.footage.read(), [one.captured for one in good], bar.advance
+        )
+    if options.review is not None:
+        bar.update(0, count, description="review page")
+        named = [(one, file) for one, file in zip(held, files, strict=True) if one is not None]
+        text = review_page(
+            [one for one, _ in named],
+            map(film.region.cut, film.footage.read()),
+            scale=scale,
+            tracks=[file for _, file in named],
+            origin_px=film.region.origin_px,
+            on_progress=bar.advance,
+        )
+        with atomic_write(options.review) as part:
+            part.write_text(text, encoding="utf-8")
+
+
+def _facts(
+    options: CaptureOptions,
+    film: OpenedFilm,
+    detector: BodyDetector,
+    found: AnimalsFound,
+    animals: Sequence[CapturedAnimal],
+    held: Sequence[CaptureFile | None],
+) -> AnimalsFacts:
+    files = track_files(options, len(held))
+    listed = []
+    for number, (one, file) in enumerate(zip(animals, held, strict=True), start=1):
+        facts, merged = None, 0
+        if file is not None:
+            track = files[min(number, len(files)) - 1]
+            captured = file.captured
+            facts = facts_of(options, film.footage, detector, captured, file.m_per_px, track)
+            merged = captured.status.count(FrameStatus.MERGED)
+        listed.append(
+            AnimalFacts(
+                number,
+                merged,
+                one.identity.bridged,
+                one.identity.uncertain_after,
+                facts,
+                one.fault,
+            )
+        )
+    return AnimalsFacts(
+        recording=str(options.recording),
+        frames=found.frames,
+        animals=tuple(listed),
+        left_out=found.left_out,
+        background=detector.background_source,
+    )
+
+
+def _warn(options: CaptureOptions, facts: AnimalsFacts) -> None:
+    """Warn of animals without a track, of doubtful identities and of doubtful heads."""
+    for one in facts.animals:
+        if one.fault is not None:
+            LOGGER.warning("%s", one.fault)
+        if one.identity_uncertain_after:
+            frames = ", ".join(map(str, one.identity_uncertain_after))
+            LOGGER.warning(
+                "%s: animal %d: identity uncertain after frame %s; look at --review or --overlay",
+                options.recording,
+                one.animal,
+                frames,
+            )
+        if one.capture is not None and one.capture.warning is not None:
+            LOGGER.warning("animal %d: %s", one.animal, one.capture.warning)

@@ -1,0 +1,223 @@
+"""Tracklets: consecutive frames in which a blob is one animal; and the crossings between them.
+
+Blobs of consecutive frames that share pixels are linked. Where several blobs become one, or one
+becomes several, a crossing lies between the tracklets, and only ``identities`` says which
+tracklets belong to the same animal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.controller.capture.several.blobs import Blobs
+
+_SHARED = 0.15  # of the smaller blob's pixels: the blobs show the same animal
+_SAME = 0.5  # of the smaller blob's pixels: for sure the same, whatever else is shared
+_ALONE = (0.65, 1.5)  # of the tracklet's area: the blob is still that animal alone
+_JOINED = 1.6  # of the usual area: the blob is more than one animal
+_PART = 0.6  # of the usual area: the blob is a part of an animal
+_REACH = 0.6  # of the body's length: how far a blob without shared pixels may have moved
+_FEWEST = 3  # frames; shorter tracklets between crossings belong to the crossing
+
+
+@dataclass(slots=True)
+class Tracklet:
+    """One animal alone, in consecutive frames."""
+
+    begins_in: int | None
+    """The crossing that it comes from; None: it appears."""
+    ends_in: int | None = None
+    """The crossing that it goes to; None: it vanishes."""
+    frames: list[int] = field(default_factory=list)
+    blobs: list[int] = field(default_factory=list)
+    """Number of the blob in each of these frames, from 0."""
+    middles: list[Floats] = field(default_factory=list)
+    shapes: list[Floats] = field(default_factory=list)
+    area_px: float = 0.0
+    """Running mean of the blob's area."""
+
+    def add(self, frame: int, blobs: Blobs, number: int) -> None:
+        """Add the blob of the next frame."""
+        self.frames.append(frame)
+        self.blobs.append(number)
+        self.middles.append(blobs.middle_px[number])
+        self.shapes.append(blobs.shape[number])
+        weight = 1.0 / min(len(self.frames), 20)
+        self.area_px += weight * (float(blobs.area_px[number]) - self.area_px)
+
+
+@dataclass(slots=True)
+class _Crossing:
+    """Animals in contact: a blob of several animals, or a part of one."""
+
+    number: int
+    count: int
+
+
+_Node = Tracklet | _Crossing
+
+
+@dataclass(slots=True)
+class TrackletBuilder:
+    """Makes tracklets of the blobs of a film, frame by frame."""
+
+    usual_px: float
+    """Usual area of an animal."""
+    tracklets: list[Tracklet] = field(default_factory=list)
+    _parents: list[int] = field(default_factory=list)
+    _nodes: list[_Node] = field(default_factory=list)
+    _before: Blobs | None = None
+    _frame: int = 0
+
+    def add(self, blobs: Blobs) -> None:
+        """Link the blobs of the next frame to those of the frame before."""
+        count = len(blobs.area_px)
+        nodes: list[_Node | None] = [None] * count
+        if self._before is not None and len(self._nodes):
+            links = self._links(self._before, blobs)
+            for olds, news in _components(links):
+                self._link(olds, news, blobs, nodes)
+        for number in range(count):
+            if nodes[number] is None:
+                nodes[number] = self._appeared(blobs, number)
+        self._nodes = [one for one in nodes if one is not None]
+        for number, node in enumerate(self._nodes):
+            if isinstance(node, Tracklet):
+                node.add(self._frame, blobs, number)
+        self._before = blobs
+        self._frame += 1
+
+    def done(self) -> list[Tracklet]:
+        """All tracklets, in order of their first frames; crossings have their final numbers."""
+        kept = []
+        for one in self.tracklets:
+            begins, ends = one.begins_in, one.ends_in
+            short = len(one.frames) < _FEWEST
+            if short and begins is not None and ends is not None:
+                self._joined([begins, ends])
+            elif not short or begins is not None or ends is not None:
+                kept.append(one)
+        for one in kept:
+            one.begins_in = None if one.begins_in is None else self._root(one.begins_in)
+            one.ends_in = None if one.ends_in is None else self._root(one.ends_in)
+        return sorted(kept, key=lambda one: one.frames[0])
+
+    def _links(self, before: Blobs, blobs: Blobs) -> Bools:
+        """(n, m) whether a blob of the frame before shows the same animal as one of this frame."""
+        shared = _shared_pixels(before.label, blobs.label, len(before.area_px), len(blobs.area_px))
+        smaller = np.minimum(before.area_px[:, None], blobs.area_px[None, :])
+        part = shared / np.maximum(smaller, 1.0)
+        links = part > _SHARED
+        for old, node in enumerate(self._nodes):
+            if not isinstance(node, Tracklet) or not links[old].any():
+                continue
+            new = int(np.argmax(part[old]))
+            alone = _ALONE[0] < blobs.area_px[new] / node.area_px < _ALONE[1]
+            if alone and part[old, new] > _SAME and int(np.argmax(part[:, new])) == old:
+                near = part > _SAME
+                links[old] &= near[old] | (np.arange(links.shape[1]) == new)
+                links[:, new] &= near[:, new] | (np.arange(links.shape[0]) == old)
+        lost, fresh = np.asarray(~links.any(axis=1)), np.asarray(~links.any(axis=0))
+        if lost.any() and fresh.any():
+            moved = before.middle_px[:, None] - blobs.middle_px[None]
+            apart = np.hypot(moved[..., 0], moved[..., 1])
+            reach = _REACH * np.exp(before.shape[:, :1])
+            free: Bools = np.asarray(lost[:, None] & fresh[None, :] & (apart < reach))
+            away: Floats = np.where(free, apart, np.inf)
+            for lone in np.flatnonzero(free.any(axis=1)).tolist():
+                nearest = int(np.argmin(away[lone]))
+                if int(np.argmin(away[:, nearest])) == lone:
+                    links[lone, nearest] = True
+        return np.asarray(links)
+
+    def _link(self, olds: Ints, news: Ints, blobs: Blobs, nodes: list[_Node | None]) -> None:
+        """Continue what ``olds`` are in the blobs ``news``, which show the same animals."""
+        before = [self._nodes[old] for old in olds]
+        if len(olds) == len(news) == 1:
+            node, new = before[0], int(news[0])
+            area = float(blobs.area_px[new])
+            if isinstance(node, Tracklet):
+                if area < _ALONE[1] * max(node.area_px, 1.0) or area < _ALONE[1] * self.usual_px:
+                    nodes[new] = node
+                    return
+            elif node.count > 1 or area < _PART * self.usual_px:
+                nodes[new] = node
+                return
+        count = sum(1 if isinstance(one, Tracklet) else one.count for one in before)
+        crossing = self._joined([one.number for one in before if isinstance(one, _Crossing)])
+        for one in before:
+            if isinstance(one, Tracklet):
+                one.ends_in = crossing
+        for new, share in zip(news, self._shares(blobs.area_px[news], count), strict=True):
+            whole = blobs.area_px[new] >= _PART * self.usual_px
+            if share == 1 and whole:
+                nodes[int(new)] = self._new(crossing)
+            else:
+                nodes[int(new)] = _Crossing(crossing, share)
+
+    def _shares(self, areas: Floats, count: int) -> list[int]:
+        """How many animals each of some blobs shows, ``count`` in all; at least one each."""
+        shares = np.ones(len(areas), dtype=int)
+        if len(areas) == 1:
+            return [max(count, 1 if areas[0] < _JOINED * self.usual_px else 2)]
+        for _ in range(count - len(areas)):
+            shares[int(np.argmax(areas / self.usual_px - shares))] += 1
+        return [int(one) for one in shares]
+
+    def _appeared(self, blobs: Blobs, number: int) -> _Node:
+        """A blob that shows nothing of the frame before."""
+        times = float(blobs.area_px[number]) / self.usual_px
+        if times < _JOINED:
+            return self._new(None)
+        return _Crossing(self._joined([]), round(times))
+
+    def _new(self, crossing: int | None) -> Tracklet:
+        tracklet = Tracklet(crossing)
+        self.tracklets.append(tracklet)
+        return tracklet
+
+    def _joined(self, crossings: Sequence[int]) -> int:
+        """The number of some crossings that are one; of a new one without any."""
+        roots = {self._root(one) for one in crossings}
+        if not roots:
+            self._parents.append(len(self._parents))
+            return len(self._parents) - 1
+        first = min(roots)
+        for one in roots:
+            self._parents[one] = first
+        return first
+
+    def _root(self, crossing: int) -> int:
+        while self._parents[crossing] != crossing:
+            crossing = self._parents[crossing]
+        return crossing
+
+
+def _shared_pixels(
+    before: NDArray[np.int32], label: NDArray[np.int32], olds: int, news: int
+) -> Floats:
+    """(n, m) pixels that two blobs of two frames share."""
+    both = (before > 0) & (label > 0)
+    pair = (before[both] - 1) * news + (label[both] - 1)
+    return np.bincount(pair, minlength=olds * news).reshape(olds, news).astype(float)
+
+
+def _components(links: Bools) -> list[tuple[Ints, Ints]]:
+    """Groups of linked blobs of two frames (n, m), each with at least one of both."""
+    out, free = [], set(np.flatnonzero(links.any(axis=1)).tolist())
+    while free:
+        olds: set[int] = {free.pop()}
+        news: set[int] = set()
+        while True:
+            more = set(np.flatnonzero(links[sorted(olds)].any(axis=0)).tolist()) - news
+            news |= more
+            back = set(np.flatnonzero(links[:, sorted(news)].any(axis=1)).tolist()) - olds
+            olds |= back
+            if not more and not back:
+                break
+        free -= olds
+        out.append((np.array(sorted(olds)), np.array(sorted(news))))
+    return out

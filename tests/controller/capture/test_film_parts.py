@@ -1,0 +1,112 @@
+"""Long films: captured in parts, with bounded memory, and continued after an interruption."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from snakewalk.config.arrays import DeepImage
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture import capturing
+from snakewalk.controller.capture.capture import load_capture
+from snakewalk.controller.capture.capturing import capture_recording
+from snakewalk.controller.capture.film_parts import FilmParts
+from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.images.body_detector import Detection, make_detector
+from snakewalk.controller.images.silhouette import Polarity
+from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
+from tests.oracles.skeleton_accuracy import point_error
+
+SCENE = SnakeScene(rows=210, columns=240, length_px=125.0, frames=36, wave_hz=1.0)
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of images."""
+    folder = tmp_path_factory.mktemp("frames")
+    for number, frame in enumerate(film(SCENE)):
+        cv2.imwrite(str(folder / f"{number}.png"), frame)
+    cv2.imwrite(str(folder.with_name("ground.png")), empty(SCENE))
+    return folder
+
+
+def options_of(frames: Path, folder: Path) -> CaptureOptions:
+    """Options with a known background, which need no time to learn it."""
+    ground = frames.with_name("ground.png")
+    return CaptureOptions(frames, folder / "t.npz", rate_hz=30.0, background=ground)
+
+
+@pytest.fixture
+def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts of 10 frames."""
+    monkeypatch.setattr(capturing, "PART_FRAMES", 10)
+
+
+@pytest.mark.usefixtures("short_parts")
+def test_an_interrupted_capture_is_continued(
+    frames: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+    add, most = FilmParts.add, [10**6]
+
+    def counted(self: FilmParts, frame: DeepImage, detection: Detection, at_s: float) -> None:
+        if len(seen) == most[0]:
+            raise KeyboardInterrupt
+        seen.append(0)
+        add(self, frame, detection, at_s)
+
+    monkeypatch.setattr(FilmParts, "add", counted)
+    options = options_of(frames, tmp_path)
+    capture_recording(options)
+    plain = load_capture(options.output)
+    assert not (tmp_path / "t.npz.part").exists()
+    options.output.unlink()
+
+    seen.clear()
+    most[0] = 25
+    with pytest.raises(KeyboardInterrupt) as stop:
+        capture_recording(options)
+    assert "continue by --resume" in stop.value.__notes__[0]
+    assert not options.output.exists()
+    with pytest.raises(InputError, match="holds an interrupted capture; continue it with --resume"):
+        capture_recording(options)
+    with pytest.raises(InputError, match="its capture has other values of threshold"):
+        capture_recording(replace(options, resume=True, threshold=20.0))
+
+    seen.clear()
+    most[0] = 10**6
+    capture_recording(replace(options, resume=True))
+    assert len(seen) == 16, "two parts of 10 frames were finished"
+    assert load_capture(options.output).fingerprint == plain.fingerprint
+    assert not (tmp_path / "t.npz.part").exists()
+    options.output.unlink()
+    with pytest.raises(InputError, match="there is nothing to continue; leave --resume out"):
+        capture_recording(replace(options, resume=True))
+
+
+@pytest.mark.usefixtures("short_parts")
+def test_parts_are_joined_with_the_head_first_in_all(frames: Path, tmp_path: Path) -> None:
+    facts = capture_recording(options_of(frames, tmp_path))
+    assert facts.frames_used == 36
+    held = load_capture(tmp_path / "t.npz").captured
+    truth = true_midlines(SCENE)
+    assert max(point_error(held.points_px[k], truth[k]) for k in range(36)) < 2.0
+    assert held.head_by == "travel"
+    assert held.margin.min() > 0.1
+    assert np.allclose(held.time_s, np.arange(36) / 30.0)
+
+
+def test_a_part_without_the_animal_has_no_points() -> None:
+    ground = empty(SCENE)
+    detector = make_detector([ground], ground)
+    parts = FilmParts(30.0, 36, "film", part_frames=8)
+    for k, image in enumerate(film(SCENE)):
+        shown = ground if 10 <= k < 28 else image
+        parts.add(shown, replace(detector, polarity=Polarity.DARK).detect(shown))
+    captured, _ = parts.done()
+    assert len(captured.status) == 36
+    assert captured.used[:10].all()
+    assert captured.used[28:].all()
+    assert not captured.used[10:28].any()

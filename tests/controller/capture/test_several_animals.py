@@ -1,0 +1,171 @@
+"""Several animals in one film: identities through contact, tracks, tables and the page."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.crossings import compare, identities_in
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.capture import capture, load_capture, save_capture
+from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.results import write_captures
+from snakewalk.controller.capture.several.identities import identities_of
+from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
+from snakewalk.controller.capture.several.tracklets import Tracklet
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.readers.keypoints import Choice
+from snakewalk.controller.track.readers.load import load_file
+from tests.oracles.rendered_crossings import CrossingScene, crossing_film, crossing_midlines
+from tests.oracles.skeleton_accuracy import point_error
+
+PAIR = CrossingScene(
+    animals=2, rows=420, columns=420, length_px=130.0, frames=24, rate_hz=10.0, speed=1.0,
+    sizes=0.05, seed=25,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [500, 503])
+def test_identities_are_kept_through_crossings(seed: int) -> None:
+    scene = CrossingScene(seed=seed, frames=110)
+    midlines = crossing_midlines(scene)
+    count = compare(identities_in(list(crossing_film(scene, midlines))), midlines, 60.0)
+    assert count.found == 3
+    assert count.kept == count.bridged > 0
+    assert count.swapped_silently == 0
+
+
+def _alone(
+    frames: range, start: Floats, step: Floats, begins: int | None, ends: int | None
+) -> Tracklet:
+    one = Tracklet(begins, ends)
+    for k, frame in enumerate(frames):
+        one.frames.append(frame)
+        one.blobs.append(0)
+        one.middles.append(start + k * step)
+        one.shapes.append(np.log([50.0, 4.0, 90.0]))
+    return one
+
+
+def test_a_crossing_that_motion_and_shape_do_not_decide_is_reported() -> None:
+    """Animals that look the same: two that pass each other, and two that rest on each other."""
+    right, up = np.array([2.0, 0.0]), np.array([0.0, 2.0])
+    decided = [
+        _alone(range(20), np.array([0.0, 60.0]), right, None, 0),
+        _alone(range(20), np.array([60.0, 0.0]), up, None, 0),
+        _alone(range(30, 50), np.array([60.0, 60.0]), right, 0, None),
+        _alone(range(30, 50), np.array([60.0, 60.0]), up, 0, None),
+    ]
+    one, other = identities_of(decided)
+    assert one.uncertain_after == other.uncertain_after == ()
+    for identity in (one, other):
+        before, after = identity.tracklets
+        step = np.subtract(before.middles[-1], before.middles[0])
+        assert np.allclose(step, np.subtract(after.middles[-1], after.middles[0]))
+    still = np.zeros(2)
+    undecided = [
+        _alone(range(20), np.array([50.0, 60.0]), still, None, 0),
+        _alone(range(20), np.array([70.0, 60.0]), still, None, 0),
+        _alone(range(60, 80), np.array([60.0, 50.0]), still, 0, None),
+        _alone(range(60, 80), np.array([60.0, 70.0]), still, 0, None),
+    ]
+    assert [one.uncertain_after for one in identities_of(undecided)] == [(19,), (19,)]
+
+
+@pytest.fixture(scope="module")
+def dish(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, AnimalsFacts]:
+    """A film of two animals that cross, captured."""
+    folder = tmp_path_factory.mktemp("dish")
+    film = folder / "dish.avi"
+    size = (PAIR.columns, PAIR.rows)
+    writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"MJPG"), PAIR.rate_hz, size)
+    for frame in crossing_film(PAIR, crossing_midlines(PAIR)):
+        writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
+    writer.release()
+    options = CaptureOptions(
+        film, folder / "track.npz", animals="auto", review=folder / "page.html",
+        overlay=folder / "film.avi",
+    )  # fmt: skip
+    return folder, capture_several(options)
+
+
+def test_each_animal_has_a_track_without_the_frames_in_contact(
+    dish: tuple[Path, AnimalsFacts],
+) -> None:
+    folder, facts = dish
+    assert [one.fault for one in facts.animals] == [None, None]
+    truth = crossing_midlines(PAIR)
+    names = set()
+    for one in facts.animals:
+        held = load_capture(folder / f"track-{one.animal}.npz")
+        captured = held.captured
+        assert captured.status.count(FrameStatus.MERGED) == one.frames_merged > 0
+        assert captured.used.sum() >= 24 - one.frames_merged - 2
+        name = int(np.argmin([point_error(captured.points_px[0], line[0]) for line in truth]))
+        names.add(name)
+        for k in np.flatnonzero(captured.used):
+            assert point_error(captured.points_px[k], truth[name, k]) < 2.0
+        assert captured.head_by == "travel"
+    assert names == {0, 1}
+    assert (folder / "film.avi").exists()
+
+
+def test_the_page_shows_all_animals(dish: tuple[Path, AnimalsFacts]) -> None:
+    folder, _ = dish
+    text = (folder / "page.html").read_text()
+    data = json.loads(text.split('id="data">')[1].split("</script>")[0])
+    assert [one["name"] for one in data["animals"]] == ["dish-1", "dish-2"]
+    tracks = [load_capture(folder / f"track-{k}.npz").fingerprint for k in (1, 2)]
+    assert [one["track"] for one in data["animals"]] == tracks
+    assert len(data["images"]) == 24
+
+
+@pytest.mark.parametrize(("name", "wide"), [("t.csv", False), ("t.csv", True), ("t.wcon", False)])
+def test_tables_of_all_animals_are_read_back_identically(
+    dish: tuple[Path, AnimalsFacts], tmp_path: Path, name: str, wide: bool
+) -> None:
+    folder, _ = dish
+    held = [load_capture(folder / f"track-{k}.npz") for k in (1, 2)]
+    for scale in (None, 0.001):
+        write_captures(tmp_path / name, [replace(one, m_per_px=scale) for one in held], wide=wide)
+        for number in (1, 2):
+            one = replace(held[number - 1], m_per_px=scale)
+            save_capture(tmp_path / "one.npz", one)
+            expected = load_file(tmp_path / "one.npz")
+            again = load_file(tmp_path / name, choice=Choice(individual=f"dish-{number}"))
+            assert again.rate_hz == pytest.approx(expected.rate_hz, rel=1e-12)
+            np.testing.assert_array_equal(again.angles_rad, expected.angles_rad)
+            if scale is not None:
+                np.testing.assert_array_equal(again.points, expected.points)
+                assert again.length_m == expected.length_m
+            np.testing.assert_allclose(again.points, expected.points, rtol=1e-14)
+
+
+def test_two_animals_in_a_film_of_one_are_rejected() -> None:
+    scene = CrossingScene(animals=2, rows=120, columns=160, length_px=40.0, frames=4)
+    images = list(crossing_film(scene, crossing_midlines(scene)))
+    with pytest.raises(InputError, match="several animals: give --animals"):
+        capture(images, make_detector(images), 15.0)
+
+
+def test_what_does_not_fit_several_animals_is_rejected(
+    dish: tuple[Path, AnimalsFacts], tmp_path: Path
+) -> None:
+    folder, _ = dish
+    plain = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz", animals="2")
+    with pytest.raises(InputError, match=r"--animals 5: \d animals can be followed"):
+        capture_several(replace(plain, animals="5"))
+    with pytest.raises(InputError, match="--animals many: expected a number"):
+        capture_several(replace(plain, animals="many"))
+    with pytest.raises(InputError, match="--animals and --head"):
+        capture_several(replace(plain, head="3,4"))
+    with pytest.raises(InputError, match="--wide"):
+        capture_several(replace(plain, wide=True))
+    with pytest.raises(InputError, match="--review"):
+        capture_several(replace(plain, output=tmp_path / "t.csv", review=tmp_path / "r.html"))
+    assert list(tmp_path.iterdir()) == []
