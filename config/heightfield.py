@@ -7,7 +7,7 @@ columns, 3), which pictures of the world show.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -114,7 +114,7 @@ def surface(field: HeightField) -> tuple[Floats, Ints]:
 def write_map(file: Path, ground: HeightField) -> None:
     """Write a height field as a map's file."""
     known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
-    colour = {} if ground.colour is None else {"colour": ground.colour}
+    colour: dict[str, Any] = {} if ground.colour is None else {"colour": ground.colour}
     with file.open("wb") as stream:
         np.savez_compressed(
             stream,

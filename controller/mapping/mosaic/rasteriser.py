@@ -96,7 +96,7 @@ def _texel(picture: Image, u: float, v: float, channel: int) -> float:
     a, b = v - i, u - j
     low = (1 - b) * picture[i, j, channel] + b * picture[i, j + 1, channel]
     high = (1 - b) * picture[i + 1, j, channel] + b * picture[i + 1, j + 1, channel]
-    return (1 - a) * low + a * high
+    return float((1 - a) * low + a * high)
 
 
 @compiled(f"boolean({_FLOATS}, {_MATRIX}, int64[:, ::1], float64[:, ::1], float64[::1])")

@@ -44,7 +44,7 @@ class ScaleMatches:
 
 def grey(image: Image) -> NDArray[np.float32]:
     """(H, W) grey levels."""
-    return np.asarray(image, dtype=np.float32).mean(axis=2)
+    return np.asarray(np.asarray(image, dtype=np.float32).mean(axis=2), dtype=np.float32)
 
 
 def reduced(picture: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
@@ -120,20 +120,18 @@ def _best(
         region = picture[top : max(high[1], 0), left : max(high[0], 0)]
         if min(region.shape) < 2 * _RADIUS_PX + 3:
             continue
-        likeness = np.asarray(cv2.matchTemplate(region, patch, cv2.TM_CCOEFF_NORMED))
-        row, column = np.unravel_index(int(likeness.argmax()), likeness.shape)
+        likeness = np.asarray(cv2.matchTemplate(region, patch, cv2.TM_CCOEFF_NORMED), np.float32)
+        row, column = divmod(int(likeness.argmax()), likeness.shape[1])
         top_value = float(likeness[row, column])
-        fine_row, fine_column = (
-            row + _vertex(likeness[:, column], row),
-            column + _vertex(likeness[row], column),
-        )
+        fine_row = row + _vertex(likeness[:, column], row)
+        fine_column = column + _vertex(likeness[row], column)
         u = float(fine_column + left + _RADIUS_PX) * scale
         v = float(fine_row + top + _RADIUS_PX) * scale
         found.append((u, v, scale, top_value))
         near = slice(max(row - _RADIUS_PX, 0), row + _RADIUS_PX + 1)
         beside = slice(max(column - _RADIUS_PX, 0), column + _RADIUS_PX + 1)
         likeness[near, beside] = -1.0
-        row, column = np.unravel_index(int(likeness.argmax()), likeness.shape)
+        row, column = divmod(int(likeness.argmax()), likeness.shape[1])
         rivals.append(
             (
                 float(column + left + _RADIUS_PX) * scale,
