@@ -3,6 +3,7 @@
 python -m benchmarks.walkthrough                    # tables, as Markdown
 python -m benchmarks.walkthrough --write FOLDER     # pictures and positions.toml of the same route
 python -m benchmarks.walkthrough --picture FILE     # stages as one picture
+python -m benchmarks.walkthrough --positions 2      # the first step alone
 """
 
 import argparse
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.provenance import provenance
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.loader import load
 from snakewalk.config.walkthrough import WalkthroughConfig
 from snakewalk.controller.mapping.mosaic.labelling import cheapest, descend, energy, labelled
@@ -36,9 +37,10 @@ from tests.oracles.ravine import Camera, Station, station, write_route
 
 PLACES_M = (0.0, 0.7, 1.4, 2.1, 2.8, 3.5)
 CAMERA = Camera()
+Truth = tuple[Floats, Floats, Bools]
 
 
-def truth(first: Station, second: Station) -> tuple[Floats, Floats, Bools]:
+def truth(first: Station, second: Station) -> Truth:
     """Flow (H, W, 2) between two stations, scale (H, W), and whether the second shows the point."""
     depth, depth_two = (CAMERA.look(at, fine=1)[1] for at in (first, second))
     wide, tall = CAMERA.size_px
@@ -56,13 +58,14 @@ def truth(first: Station, second: Station) -> tuple[Floats, Floats, Bools]:
     return place - np.stack([u, v], -1), depth / there[..., 2], shown
 
 
-def matches_table(walk: StereoWalk, known: list[tuple[Floats, Floats, Bools]]) -> None:
+def matches_table(walk: StereoWalk, known: list[Truth]) -> None:
     """Fig. 3: matches over ten scales and at one scale."""
     print("| positions | scales | matches | within 2 px | within 4 px | median scale error |")
     print("| --- | --- | ---: | ---: | ---: | ---: |")
     for k, (flow, scale, _) in enumerate(known):
         for scales in (SCALES, (1.0,)):
-            found = match_over_scale(*walk.models[k : k + 2], scales, distance_m=0.7)
+            first, second = walk.models[k], walk.models[k + 1]
+            found = match_over_scale(first, second, scales, distance_m=0.7)
             column, row = found.first_px.astype(int).T
             off = np.linalg.norm(found.second_px - found.first_px - flow[row, column], axis=1)
             off = np.nan_to_num(off, nan=np.inf)
@@ -73,7 +76,7 @@ def matches_table(walk: StereoWalk, known: list[tuple[Floats, Floats, Bools]]) -
             )
 
 
-def flow_row(name: str, problem: FlowProblem, flow_px: Floats, known: tuple, value: str) -> None:  # type: ignore[type-arg]
+def flow_row(name: str, problem: FlowProblem, flow_px: Floats, known: Truth, value: str) -> None:
     """Print the errors of a flow of labelled pixels that the second picture shows."""
     grid = np.ix_(problem.rows, problem.columns)
     off = np.linalg.norm(flow_px - known[0][grid], axis=-1)
@@ -85,7 +88,7 @@ def flow_row(name: str, problem: FlowProblem, flow_px: Floats, known: tuple, val
     )
 
 
-def flow_table(walk: StereoWalk, known: list[tuple[Floats, Floats, Bools]], off_m: float) -> None:
+def flow_table(walk: StereoWalk, known: list[Truth], off_m: float) -> None:
     """Fig. 4: flow of the first step, by solver, with a pose that is off by a length."""
     print("| flow | labelled | median | within 1 px | within 2 px | energy |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
@@ -213,8 +216,9 @@ def stages(walk: StereoWalk, file: Path) -> None:
     scale = np.nan_to_num(flow.scale, nan=1.0)
     level = np.clip(255 * (scale - 1.0) / 2.0, 0, 255).astype(np.uint8)
     level = cv2.resize(level, CAMERA.size_px, interpolation=cv2.INTER_NEAREST)
-    psi = np.where(morph.common[..., None], morph.first.image, morph.first.image // 4)
-    upper = np.hstack([morph.first.image, morph.second.image, psi.astype(np.uint8)])
+    share = np.where(morph.common, 1.0, 0.25)[..., None]
+    psi = np.asarray(share * morph.first.image, dtype=np.uint8)
+    upper = np.hstack([morph.first.image, morph.second.image, psi])
     lower = np.hstack([drawn[0], drawn[1], drawn[2]])
     third = np.hstack(
         [
@@ -223,11 +227,10 @@ def stages(walk: StereoWalk, file: Path) -> None:
             _depth_picture(morph.destination_m[..., 2]),
         ]
     )
-    whole = np.vstack([upper, lower, third])
-    cv2.imwrite(str(file), cv2.resize(whole, None, fx=0.75, fy=0.75)[..., ::-1])
+    cv2.imwrite(str(file), np.vstack([upper, lower, third])[..., ::-1])
 
 
-def _depth_picture(depth: Floats) -> np.ndarray:  # type: ignore[type-arg]
+def _depth_picture(depth: Floats) -> Image:
     grey = np.clip(255.0 * 0.6 / np.nan_to_num(depth, nan=1e9), 0, 255).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
 
@@ -236,19 +239,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", type=Path)
     parser.add_argument("--picture", type=Path)
+    parser.add_argument("--positions", type=int, default=len(PLACES_M))
     chosen = parser.parse_args()
     if chosen.write is not None:
         chosen.write.mkdir(parents=True, exist_ok=True)
         print(write_route(chosen.write, PLACES_M, CAMERA))
         return
     with tempfile.TemporaryDirectory() as folder:
-        file = write_route(Path(folder), PLACES_M, CAMERA)
+        file = write_route(Path(folder), PLACES_M[: chosen.positions], CAMERA)
         walk = read_walk(file, load(file, WalkthroughConfig))
     if chosen.picture is not None:
         stages(walk, chosen.picture)
         return
     print(provenance("python -m benchmarks.walkthrough"))
-    stations = [station(x_m) for x_m in PLACES_M]
+    stations = [station(x_m) for x_m in PLACES_M[: chosen.positions]]
     known = [truth(*stations[k : k + 2]) for k in range(len(stations) - 1)]
     for title, table in (
         ("Matches", lambda: matches_table(walk, known)),
@@ -259,7 +263,7 @@ def main() -> None:
         ("Mosaic", mosaic_table),
     ):
         print(f"\n{title}\n", flush=True)
-        table()
+        table()  # type: ignore[no-untyped-call]
     camera = picture_camera(walk, (640, 480))
     took = []
     for view in views_along(walk, 3):
