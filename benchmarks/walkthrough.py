@@ -215,7 +215,7 @@ def stages(walk: StereoWalk, file: Path) -> None:
     flow = solve_flow(flow_problem(morph.first, morph.second, morph.pose))
     scale = np.nan_to_num(flow.scale, nan=1.0)
     level = np.clip(255 * (scale - 1.0) / 2.0, 0, 255).astype(np.uint8)
-    level = cv2.resize(level, CAMERA.size_px, interpolation=cv2.INTER_NEAREST)
+    level = np.asarray(cv2.resize(level, CAMERA.size_px, interpolation=cv2.INTER_NEAREST), np.uint8)
     share = np.where(morph.common, 1.0, 0.25)[..., None]
     psi = np.asarray(share * morph.first.image, dtype=np.uint8)
     upper = np.hstack([morph.first.image, morph.second.image, psi])
