@@ -1,18 +1,19 @@
 """The height field: elevation over a regular grid in the world's horizontal plane; a map's file.
 
 A map's file is an ``.npz`` with ``z_m`` (rows, columns), row 0 with the smallest y, ``known`` of
-the same shape, and the numbers ``spacing_m``, ``x0_m``, ``y0_m``.
+the same shape, and the numbers ``spacing_m``, ``x0_m``, ``y0_m``. It may hold ``colour`` (rows,
+columns, 3), which pictures of the world show.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.archive import read_arrays
-from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Image, Ints
 from snakewalk.config.errors import InputError
 
 MOST_SAMPLES: Final = 4_000_000
@@ -36,6 +37,8 @@ class HeightField:
     known: Bools | None = None
     """(rows, columns) whether a sample was measured; elsewhere ``z_m`` is filled in, and no path
     leads there. None: all were."""
+    colour: Image | None = None
+    """(rows, columns, 3) colour of each sample, red first; None: coloured by height."""
 
     def __post_init__(self) -> None:
         if self.z_m.ndim != 2 or min(self.z_m.shape) < 2 or not np.isfinite(self.z_m).all():
@@ -44,6 +47,10 @@ class HeightField:
             if self.known.shape != self.z_m.shape or self.known.dtype != bool:
                 raise ValueError("known must be booleans of the shape of z_m")
             self.known.setflags(write=False)
+        if self.colour is not None:
+            if self.colour.shape != (*self.z_m.shape, 3) or self.colour.dtype != np.uint8:
+                raise ValueError("colour must be bytes (rows, columns, 3) of the shape of z_m")
+            self.colour.setflags(write=False)
         self.z_m.setflags(write=False)
 
     @property
@@ -107,6 +114,7 @@ def surface(field: HeightField) -> tuple[Floats, Ints]:
 def write_map(file: Path, ground: HeightField) -> None:
     """Write a height field as a map's file."""
     known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
+    colour: dict[str, Any] = {} if ground.colour is None else {"colour": ground.colour}
     with file.open("wb") as stream:
         np.savez_compressed(
             stream,
@@ -115,6 +123,7 @@ def write_map(file: Path, ground: HeightField) -> None:
             spacing_m=np.float64(ground.spacing_m),
             x0_m=np.float64(ground.x0_m),
             y0_m=np.float64(ground.y0_m),
+            **colour,
         )
 
 
@@ -126,14 +135,14 @@ def read_map(file: Path) -> HeightField:
 
     """
     try:
-        held, _ = read_arrays(file, {"z_m", "known", *_NUMBERS})
+        held, _ = read_arrays(file, {"z_m", "known", "colour", *_NUMBERS})
         z_m, known = held["z_m"].astype(float), held["known"]
         spacing_m, x0_m, y0_m = (float(held[name]) for name in _NUMBERS)
         if not (0.0 < spacing_m < np.inf and np.isfinite([x0_m, y0_m]).all()):
             raise ValueError("spacing_m must be above 0, x0_m and y0_m must be finite")
         if z_m.size > MOST_SAMPLES:
             raise ValueError(f"holds {z_m.size} samples; {MOST_SAMPLES} are the most")
-        return HeightField(z_m, spacing_m, x0_m, y0_m, known)
+        return HeightField(z_m, spacing_m, x0_m, y0_m, known, held.get("colour"))
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except OSError as error:

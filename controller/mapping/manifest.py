@@ -5,5 +5,6 @@
 PLUGINS = (
     ("command", "terrain from", "Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown.", "snakewalk.controller.mapping.commands.elevation:elevation", ""),
     ("command", "terrain from-stereo", "Make a world of the ground in front of a stereo camera; unseen ground stays unknown.", "snakewalk.controller.mapping.commands.stereo:stereo", ""),
+    ("command", "terrain walkthrough", "Film a walk along several stereo positions: each local model morphs into the next one.", "snakewalk.controller.mapping.commands.walkthrough:walkthrough", ""),
     ("map", "stereo", "A map from the pictures of the robot's stereo head.", "snakewalk.controller.mapping.stereo_map:StereoMap", ""),
 )

@@ -171,9 +171,11 @@ def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:
 def thinned(ground: HeightField) -> dict[str, Any]:
     """Every n-th sample of a height field: enough to draw it."""
     step = max(1, -(-max(ground.z_m.shape) // _GROUND_POINTS))
+    colour = ground.colour
     return {
         "z_m": ground.z_m[::step, ::step].round(4).tolist(),
         "spacing_m": ground.spacing_m * step,
         "x0_m": ground.x0_m,
         "y0_m": ground.y0_m,
+        **({} if colour is None else {"colour": colour[::step, ::step].tolist()}),
     }

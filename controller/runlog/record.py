@@ -165,11 +165,7 @@ class Header:
                 predicted_speed_m_s=float(array(plan["predicted_speed_m_s"])),
                 states=plan["states"],
             ),
-            ground=None
-            if ground is None
-            else HeightField(
-                array(ground["z_m"]), ground["spacing_m"], ground["x0_m"], ground["y0_m"]
-            ),
+            ground=None if ground is None else _field(ground),
             torque_constant_n_m_a=float(array(row["torque_constant_n_m_a"])),
             winding=None if winding is None else Winding(**winding),
             initial_pose=None
@@ -182,6 +178,17 @@ class Header:
             if evidence is None
             else evidence["port_is_pseudo_terminal"],
         )
+
+
+def _field(ground: dict[str, Any]) -> HeightField:
+    colour = ground.get("colour")
+    return HeightField(
+        array(ground["z_m"]),
+        ground["spacing_m"],
+        ground["x0_m"],
+        ground["y0_m"],
+        colour=None if colour is None else np.array(colour, dtype=np.uint8),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.film import MovieFile
 from snakewalk.sim.rendering.looks import EYE, Rgba, dressed_model
+from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 
 FOVY_DEG: Final = 45.0

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Floats
@@ -17,12 +15,10 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
+from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import add_shade
 from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
-
-if TYPE_CHECKING:
-    import av
 
 SMOOTHING_S = 1.2
 """The camera's smoothing, in seconds of film."""
@@ -255,34 +251,3 @@ def _scale_m(length_m: float) -> float:
     """A round length of about a fifth of the body's."""
     power = 10.0 ** np.floor(np.log10(0.2 * length_m))
     return float(power * max(each for each in (1.0, 2.0, 5.0) if each * power <= 0.2 * length_m))
-
-
-class MovieFile:
-    """An MP4 file that stores frames."""
-
-    def __init__(self, path: Path, fps: int, size: tuple[int, int]) -> None:
-        try:
-            import av  # noqa: PLC0415  an extra
-        except ImportError:
-            raise InputError("films need PyAV: pip install 'snakewalk[view]'") from None
-        self._frame = av.VideoFrame.from_ndarray
-        self._file = av.open(str(path), "w")
-        codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
-        self._stream = cast("av.VideoStream", self._file.add_stream(codec, rate=Fraction(fps)))
-        self._stream.width, self._stream.height = size
-        self._stream.pix_fmt = "yuv420p"
-        self._stream.options = (
-            {"crf": "23", "preset": "veryfast"} if codec == "libx264" else {"qscale": "4"}
-        )
-
-    def add(self, pixels: NDArray[np.uint8]) -> None:
-        """Append one frame (height, width, 3)."""
-        frame = self._frame(np.ascontiguousarray(pixels), format="rgb24")
-        self._file.mux(self._stream.encode(frame))
-
-    def __enter__(self) -> "MovieFile":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.mux(self._stream.encode())
-        self._file.close()

@@ -259,7 +259,7 @@ def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) 
 
 
 def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
-    """Colour by elevation, with contour lines and a little of the slope's shade."""
+    """Colour by the map's own colours; else by elevation, with contour lines."""
     w, h = ground.size_m
     x = ground.x0_m + (np.arange(TEXELS) + 0.5) / TEXELS * w
     y = ground.y0_m + (np.arange(TEXELS) + 0.5) / TEXELS * h
@@ -267,6 +267,10 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
     level = (z - z.min()) / max(float(np.ptp(z)), 1e-9)
     colour = LOWLAND + (HIGHLAND - LOWLAND) * level[..., None]
     colour *= 1.0 - 0.28 * _contours(level * CONTOURS)[..., None]
+    if ground.colour is not None:
+        column = np.rint((x - ground.x0_m) / ground.spacing_m).astype(int)
+        row = np.rint((y - ground.y0_m) / ground.spacing_m).astype(int)
+        colour = ground.colour[row[:, None], column[None]]
     texture = model.tex("ground")
     size = TEXELS * TEXELS * 3
     start = int(texture.adr[0])

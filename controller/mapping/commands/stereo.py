@@ -5,10 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-import numpy as np
 import typer
 
-from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
@@ -25,7 +23,6 @@ from snakewalk.controller.mapping.commands.elevation import (
 from snakewalk.controller.mapping.world_file import MapWorld
 
 if TYPE_CHECKING:
-    from snakewalk.config.arrays import Image
     from snakewalk.controller.mapping.stereo_ground import StereoGround
 
 _UNITS_M: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048}
@@ -96,6 +93,7 @@ def stereo(
     """
     require_extra("stereo pictures need", "cv2", "PIL")
     from snakewalk.controller.mapping import stereo_camera, stereo_ground  # noqa: PLC0415  an extra
+    from snakewalk.controller.mapping.colour_picture import read_colours  # noqa: PLC0415  an extra
 
     faults = not_positive(
         {"--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale}
@@ -108,7 +106,7 @@ def stereo(
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
     calibrated = stereo_camera.read_calibration(calibration, _UNITS_M[unit])
-    pair = stereo_camera.rectify(calibrated, _picture(left), _picture(right))
+    pair = stereo_camera.rectify(calibrated, read_colours(left), read_colours(right))
     stand = None
     if height is not None and tilt is not None:
         stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))
@@ -169,21 +167,3 @@ def _facts(made: "StereoGround") -> dict[str, object]:
         "matched_share": round(made.told_share, 4),
         "mapped_share": round(made.used_share, 4),
     }
-
-
-def _picture(file: Path) -> "Image":
-    """(H, W, 3), blue first."""
-    import cv2  # noqa: PLC0415  an extra
-    from PIL import Image as Pictures  # noqa: PLC0415  an extra
-
-    data = file.read_bytes()
-    try:
-        with Pictures.open(file) as opened:
-            columns, rows = opened.size
-        check_expansion(file, len(data), 3 * columns * rows)
-        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError, cv2.error):
-        found = None
-    if found is None:
-        raise InputError(f"{file}: cannot be read as a picture")
-    return np.asarray(found, dtype=np.uint8)

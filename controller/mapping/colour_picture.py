@@ -1,0 +1,33 @@
+"""Colour pictures of a camera's files."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image as Pictures
+
+from snakewalk.config.archive import check_expansion
+from snakewalk.config.arrays import Image
+from snakewalk.config.errors import InputError
+
+
+def read_colours(file: Path) -> Image:
+    """(H, W, 3) colours, blue first.
+
+    Raises:
+        InputError: no such file, or no picture.
+
+    """
+    try:
+        data = file.read_bytes()
+        with Pictures.open(file) as opened:
+            columns, rows = opened.size
+        check_expansion(file, len(data), 3 * columns * rows)
+        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
+    except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError, cv2.error):
+        found = None
+    if found is None:
+        raise InputError(f"{file}: cannot be read as a picture")
+    return np.asarray(found, dtype=np.uint8)

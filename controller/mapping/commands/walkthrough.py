@@ -1,0 +1,151 @@
+"""``snakewalk terrain walkthrough``: a film along several stereo positions, and their ground."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.config.loader import load
+from snakewalk.config.walkthrough import WalkthroughConfig
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.mapping.commands.elevation import (
+    Fill,
+    Picture,
+    check_fill,
+    check_world_files,
+    finish,
+    not_positive,
+)
+from snakewalk.controller.mapping.commands.stereo import Error, SampleSpacing
+from snakewalk.controller.mapping.world_file import MapWorld
+
+if TYPE_CHECKING:
+    from snakewalk.controller.mapping.mosaic.walk import Step
+
+Positions = Annotated[Path, typer.Argument(help="file of the positions and their pictures (.toml)")]
+Out = Annotated[Path, typer.Option("--out", "-o", help="write the film here (.mp4)")]
+Seconds = Annotated[
+    float, typer.Option(min=0.1, max=600.0, help="duration of the film between two positions")
+]
+Fps = Annotated[int, typer.Option(min=1, max=120, help="frames per second of the film")]
+Size = Annotated[str, typer.Option(help="WIDTHxHEIGHT of the film in pixels, both even")]
+World = Annotated[
+    Path | None,
+    typer.Option(help="write the ground of the route, with colours and holes, as a world (.toml)"),
+]
+Alone = Annotated[
+    bool,
+    typer.Option(
+        "--alone", help="draw the morphing model alone; leave its holes empty, as in the paper"
+    ),
+]
+
+
+@command(
+    "terrain walkthrough",
+    examples=(
+        "terrain walkthrough positions.toml -o film.mp4",
+        "terrain walkthrough positions.toml -o film.mp4 --world ravine.toml --spacing 0.02",
+    ),
+)
+def walkthrough(
+    positions: Positions,
+    out: Out,
+    seconds: Seconds = 2.0,
+    fps: Fps = 25,
+    size: Size = "640x480",
+    alone: Alone = False,
+    world: World = None,
+    spacing: SampleSpacing = 0.03,
+    error: Error = 0.03,
+    fill: Fill = 0.0,
+    picture: Picture = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Film a walk along several stereo positions: each local model morphs into the next one."""
+    require_extra("walk-throughs need", "cv2", "PIL", "av")
+    faults = not_positive({"--spacing": spacing, "--error": error})
+    check_fill(fill, faults)
+    if out.suffix != ".mp4":
+        faults.append(f"{out}: a film ends in .mp4; choose another name")
+    if picture is not None and world is None:
+        faults.append("--picture: draws the world; add --world")
+    size_px = _size(size, faults)
+    if faults:
+        raise InputError(faults)
+    refuse_to_overwrite([out], force)
+    if world is not None:
+        check_world_files(world, picture, [positions, out], force)
+    config = load(positions, WalkthroughConfig)
+    from snakewalk.controller.mapping.mosaic import route, walk, walk_ground  # noqa: PLC0415  an extra
+
+    with ProgressBar("models", transient=True) as bar:
+        made = walk.read_walk(positions, config, bar.update)
+    ground = None
+    if world is not None:
+        ground = walk_ground.walk_ground(made, spacing, error, fill)
+    per_step = max(1, round(seconds * fps))
+    with ProgressBar("frames", transient=True) as bar, atomic_write(out) as part:
+        facts = route.film(made, part, size_px, per_step, fps, alone=alone, on_frame=bar.update)
+    shown = {
+        "film": str(out),
+        "frames": facts.frames,
+        "frame_ms": round(1000.0 * facts.frame_s, 1),
+        "hole_share": round(facts.hole_share, 4),
+        "valid_share": [round(float(model.valid.mean()), 4) for model in made.models],
+        **_step_facts(made.steps),
+    }
+    if world is None or ground is None:
+        show(shown, as_json)
+        return
+    written = MapWorld.of(world, ground.field)
+    written.write(
+        [
+            f"From {positions.name}, {len(made.models)} positions; samples {spacing:g} m apart.",
+            "(0, 0) is below the first left camera, x is where it looked.",
+            *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
+        ]
+    )
+    finish(written, shown, picture, as_json=as_json)
+
+
+def _size(text: str, faults: list[str]) -> tuple[int, int]:
+    """Width and height of ``--size``; adds a fault if the text is not a size."""
+    parts = text.split("x")
+    if len(parts) != 2 or not all(part.isdecimal() for part in parts):
+        faults.append(f"--size {text}: is not a size; write it as 640x480")
+        return 0, 0
+    wide, tall = (int(part) for part in parts)
+    if not (16 <= wide <= 4096 and 16 <= tall <= 4096) or wide % 2 or tall % 2:
+        faults.append(f"--size {text}: must be even numbers from 16 to 4096; write it as 640x480")
+    return wide, tall
+
+
+def _step_facts(steps: "Sequence[Step]") -> dict[str, object]:
+    """Lists with a value for each pair of successive positions."""
+    facts: dict[str, object] = {
+        "matches": [step.matches for step in steps],
+        "inliers": [step.inliers for step in steps],
+        "reprojection_px": [round(step.error_px, 2) for step in steps],
+        "distance_m": [round(step.distance_m, 4) for step in steps],
+        "common_share": [round(step.common_share, 3) for step in steps],
+        "step_s": [round(step.seconds, 1) for step in steps],
+    }
+    places, angles = (
+        [None if each is None else 1000.0 * each for each in errors]
+        for errors in (
+            [step.place_error_m for step in steps],
+            [step.angle_error_rad for step in steps],
+        )
+    )
+    if any(each is not None for each in places):
+        facts["place_error_mm"] = [None if each is None else round(each, 2) for each in places]
+        facts["angle_error_mrad"] = [None if each is None else round(each, 2) for each in angles]
+    return facts

@@ -1,0 +1,1 @@
+"""Local models of stereo positions, and the morph between them along a route ([KP] 3)."""

@@ -1,0 +1,108 @@
+"""Local model of a position: points, colours and valid region of a stereo pair ([KP] 3.2)."""
+
+from dataclasses import dataclass
+from typing import Final, Self
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.disparity import match
+from snakewalk.controller.mapping.stereo_camera import RectifiedPair
+from snakewalk.controller.mapping.stereo_ground import DISPARITY_ERROR_PX
+
+LEAST_DISPARITY_PX: Final = 2.0
+"""Below it a depth is uncertain by 15 % or more and the pixel is a hole (ours)."""
+_WINDOW_PX: Final = 7
+_LEAST_SPREAD: Final = 2.0
+"""Variance of the grey levels of a window that shows something (ours)."""
+LARGEST_STEP: Final = 0.08
+"""Relative difference of depth between neighbours that belong to one surface (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalModel:
+    """Maps ``X, Y, Z`` and ``I`` of a picture over its valid region.
+
+    Coordinates of the camera: x to the right, y down, z forward.
+    """
+
+    points_m: Floats
+    """(H, W, 3) points in the camera's axes; NaN outside of the valid region."""
+    image: Image
+    """(H, W, 3) colours."""
+    camera: Floats
+    """(3, 3) camera matrix, pixels."""
+    baseline_m: float
+
+    @classmethod
+    def of_pair(cls, pair: RectifiedPair, count: int) -> Self:
+        """Return the model of a rectified pair.
+
+        Args:
+            pair: pictures with three channels.
+            count: number of disparities to try, from the disparity of a point at infinity.
+
+        Raises:
+            InputError: fewer than a hundredth of the pixels match.
+
+        """
+        least = max(0, int(np.floor(-pair.offset_px)))
+        disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
+        disparity[_is_plain(pair.left)] = np.nan
+        with np.errstate(invalid="ignore"):
+            disparity[disparity + pair.offset_px < LEAST_DISPARITY_PX] = np.nan
+        if np.isfinite(disparity).mean() < 0.01:
+            raise InputError(
+                "stereo: fewer than 1 % of the pixels match between left and right picture; "
+                "check the pictures, the calibration and `disparities`"
+            )
+        points_m = pair.points_m(disparity) @ pair.turned.T  # in the axes of the rectified picture
+        f, (u, v) = pair.focal_px, pair.centre_px
+        camera = np.array([[f, 0.0, u], [0.0, f, v], [0.0, 0.0, 1.0]])
+        return cls(np.ascontiguousarray(points_m), pair.left, camera, pair.baseline_m)
+
+    @property
+    def valid(self) -> Bools:
+        """(H, W) the valid region of the maps."""
+        return np.asarray(np.isfinite(self.points_m[..., 2]))
+
+    @property
+    def error_m(self) -> Floats:
+        """(H, W) expected errors of the points; NaN outside of the valid region."""
+        distance = np.linalg.norm(self.points_m, axis=-1)
+        per_m = DISPARITY_ERROR_PX / (self.camera[0, 0] * self.baseline_m)
+        return np.asarray(distance * self.points_m[..., 2] * per_m)
+
+
+def _is_plain(image: Image) -> Bools:
+    """(H, W) pixels of a region that shows nothing, such as the sky.
+
+    A matcher continues the depths of its border into it.
+    """
+    grey = np.asarray(image, dtype=np.float32).mean(axis=2)
+    window = (_WINDOW_PX, _WINDOW_PX)
+    spread = cv2.blur(grey * grey, window) - cv2.blur(grey, window) ** 2
+    plain = (spread < _LEAST_SPREAD).astype(np.uint8)
+    return np.asarray(cv2.dilate(plain, np.ones(window, np.uint8)) > 0)
+
+
+def project(camera: Floats, points_m: Floats) -> Floats:
+    """(..., 2) pixels of points (..., 3) in a camera's axes; NaN behind the camera."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        depth = np.where(points_m[..., 2] > 1e-6, points_m[..., 2], np.nan)
+        u = camera[0, 0] * points_m[..., 0] / depth + camera[0, 2]
+        v = camera[1, 1] * points_m[..., 1] / depth + camera[1, 2]
+    return np.asarray(np.stack([u, v], axis=-1))
+
+
+def joined(depth_m: Floats, axis: int) -> Bools:
+    """Whether neighbours along an axis of a depth map belong to one surface.
+
+    The result is one shorter along the axis. Neighbours outside of the valid region never do.
+    """
+    one, two = (np.moveaxis(depth_m, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+    with np.errstate(invalid="ignore"):
+        together = np.abs(one - two) <= LARGEST_STEP * np.minimum(one, two)
+    return np.asarray(np.moveaxis(together, 0, axis))

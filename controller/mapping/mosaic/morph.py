@@ -1,0 +1,107 @@
+"""Morphable model: a local model and its destination at the next position ([KP] 3.4)."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
+from snakewalk.controller.mapping.mosaic.poisson import continued
+from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
+from snakewalk.controller.mapping.mosaic.scale_flow import LEAST_CORRELATION, ScaleFlow
+
+LARGEST_GAP: Final = 0.12
+"""Relative difference of depth between a point and its counterpart (ours); more is occlusion."""
+_LEAST_ISLAND_PX: Final = 40
+
+
+@dataclass(frozen=True, slots=True)
+class MorphableModel:
+    """Model of a position with maps of its destination, in the axes of that position."""
+
+    first: LocalModel
+    second: LocalModel
+    pose: RelativePose
+    common: Bools
+    """(H, W) Psi: pixels of the valid region with a counterpart in the second model."""
+    counterpart_px: Floats
+    """(H, W, 2) ``u(p)`` in the second picture; NaN outside of Psi."""
+    destination_m: Floats
+    """(H, W, 3) ``X_dst, Y_dst, Z_dst``; NaN outside of the valid region."""
+
+    def points_m(self, share: float) -> Floats:
+        """(H, W, 3) vertices by Eq. 1: ``(1 - m) X_k + m X_dst``."""
+        return (1.0 - share) * self.first.points_m + share * self.destination_m
+
+    def colours(self, share: float) -> Floats:
+        """(H, W, 3) colours of the vertices by Eq. 2 to 4."""
+        own = self.first.image.astype(float)
+        other = sampled(self.second.image.astype(np.float32), self.counterpart_px)
+        there = np.where(self.common[..., None], other, own)
+        return (1.0 - share) * own + share * there
+
+
+def sampled(image: Floats, places_px: Floats) -> Floats:
+    """(H, W, k) bilinear samples of an image at columns and rows (H, W, 2); NaN outside of it."""
+    at = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
+    return np.asarray(
+        cv2.remap(
+            image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(np.nan,) * 4,
+        )
+    )  # fmt: skip
+
+
+def dense_flow(
+    first: LocalModel, second: LocalModel, pose: RelativePose, flow: ScaleFlow
+) -> Floats:
+    """(H, W, 2) counterparts of all pixels in the second picture; NaN without one.
+
+    Between labelled pixels the difference from the reprojection is interpolated.
+    """
+    pixel = np.stack(np.meshgrid(*(np.arange(n) for n in first.valid.shape[::-1])), axis=-1)
+    seen = project(second.camera, pose.moved(first.points_m))
+    grid = np.ix_(flow.rows, flow.columns)
+    off = flow.flow_px + pixel[grid] - seen[grid]
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(off).all(axis=-1) & (flow.correlation >= LEAST_CORRELATION)
+    weight = good.astype(np.float32)
+    held = np.where(good[..., None], off, 0.0).astype(np.float32)
+    size = 3
+    smooth = cv2.blur(weight, (size, size))
+    mean = cv2.blur(held, (size, size)) / np.maximum(smooth, 1e-6)[..., None]
+    step = flow.rows[1] - flow.rows[0]
+    at_row = ((np.arange(seen.shape[0]) - flow.rows[0]) / step).astype(np.float32)
+    at_column = ((np.arange(seen.shape[1]) - flow.columns[0]) / step).astype(np.float32)
+    map_x, map_y = np.meshgrid(at_column, at_row)
+    spread = [
+        np.asarray(cv2.remap(each, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+        for each in (mean * weight[..., None], weight)
+    ]
+    known = spread[1] > 0.5
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(known[..., None], seen + spread[0] / spread[1][..., None], np.nan)
+
+
+def morphable(
+    first: LocalModel, second: LocalModel, pose: RelativePose, flow: ScaleFlow
+) -> MorphableModel:
+    """Fill the destination maps: Eq. 3 where there is a counterpart, Eq. 5 elsewhere."""
+    places = dense_flow(first, second, pose, flow)
+    met = pose.back(sampled(second.points_m.astype(np.float32), places).astype(float))
+    with np.errstate(invalid="ignore"):
+        gap = np.linalg.norm(met - first.points_m, axis=-1) / first.points_m[..., 2]
+        common = first.valid & (gap <= LARGEST_GAP)
+    common = _without_islands(common)
+    destination = continued(met, common, first.points_m)
+    places = np.where(common[..., None], places, np.nan)
+    return MorphableModel(first, second, pose, common, places, destination)
+
+
+def _without_islands(mask: Bools) -> Bools:
+    """Mask without its small islands."""
+    _, label, facts, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    large = facts[:, cv2.CC_STAT_AREA] >= _LEAST_ISLAND_PX
+    return np.asarray(mask & large[label])

@@ -1,0 +1,169 @@
+"""Cameras along a route through the key positions, and the film of it ([KP] 3.5)."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation, Slerp
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
+from snakewalk.controller.mapping.mosaic.walk import StereoWalk
+from snakewalk.sim.rendering.movie_file import MovieFile
+
+_SWAY: Final = 0.04
+"""Radius of the circle of the camera at a single position, in median depths (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RouteView:
+    """One picture of the film."""
+
+    step: int
+    """Number of the position behind the camera."""
+    share: float
+    """Amount of morphing m."""
+    rotation: Floats
+    """(3, 3) from the axes of that position to the camera's."""
+    place_m: Floats
+    """(3,) of the camera, in the axes of that position."""
+
+
+@dataclass(frozen=True, slots=True)
+class FilmFacts:
+    """Measures of a film."""
+
+    frames: int
+    frame_s: float
+    """Median time to draw a frame."""
+    hole_share: float
+    """Mean share of the pixels that no model covers."""
+
+
+def views_along(walk: StereoWalk, per_step: int) -> Iterator[RouteView]:
+    """Cameras from the first position to the last one, ``per_step`` for each step.
+
+    Places lie on a smooth curve through the positions; axes turn at a constant rate between them.
+    A single position is seen from a small circle around it.
+    """
+    count = len(walk.models)
+    if count == 1:
+        depth_m = float(np.nanmedian(walk.models[0].points_m[..., 2]))
+        for angle in np.arange(2 * per_step) * np.pi / per_step:
+            place = _SWAY * depth_m * np.array([np.sin(angle), 0.4 * (np.cos(angle) - 1.0), 0.0])
+            yield RouteView(0, 0.0, np.eye(3), place)
+        return
+    numbers = np.arange(count, dtype=float)
+    places = PchipInterpolator(numbers, walk.poses[:, :, 3])
+    turns = Slerp(numbers, Rotation.from_matrix(walk.poses[:, :, :3]))
+    for at in np.linspace(0.0, count - 1.0, per_step * (count - 1) + 1):
+        step = min(int(at), count - 2)
+        own = walk.poses[step]
+        axes = turns(at).as_matrix()
+        yield RouteView(
+            step, at - step, axes.T @ own[:, :3], own[:, :3].T @ (places(at) - own[:, 3])
+        )
+
+
+def render(
+    walk: StereoWalk,
+    view: RouteView,
+    camera: Floats,
+    size_px: tuple[int, int],
+    *,
+    alone: bool = False,
+) -> Canvas:
+    """Draw the morphable model of a view.
+
+    Args:
+        walk: models and morphs.
+        view: camera along the route.
+        camera: (3, 3) matrix of the picture.
+        size_px: width and height.
+        alone: leave the holes of the morphable model empty. Otherwise they show the models of the
+            positions around it (ours); places that no position shows stay empty.
+
+    """
+    canvas = Canvas.blank(*size_px)
+    if walk.morphs:
+        morph = walk.morphs[view.step]
+        points = (morph.points_m(view.share) - view.place_m) @ view.rotation.T
+        shown = cells(morph.first.points_m) & cells(morph.destination_m)
+        draw(
+            canvas, points, camera, shown, morph.first.image, morph.second.image,
+            morph.counterpart_px, view.share,
+        )  # fmt: skip
+    else:
+        _draw_model(canvas, walk, 0, view, camera)
+    if not alone:
+        for number in (view.step + 1, view.step - 1, view.step + 2):
+            if 0 <= number < len(walk.models):
+                behind = Canvas.blank(*size_px)
+                _draw_model(behind, walk, number, view, camera)
+                canvas.fill(behind)
+    return canvas
+
+
+def _draw_model(
+    canvas: Canvas, walk: StereoWalk, number: int, view: RouteView, camera: Floats
+) -> None:
+    """Draw the model of a position, without a morph, from the camera of a view."""
+    model, pose, base = walk.models[number], walk.poses[number], walk.poses[view.step]
+    points = (model.points_m @ pose[:, :3].T + pose[:, 3] - base[:, 3]) @ base[:, :3]
+    points = (points - view.place_m) @ view.rotation.T
+    draw(canvas, points, camera, cells(model.points_m), model.image)
+
+
+def film(
+    walk: StereoWalk,
+    file: Path,
+    size_px: tuple[int, int],
+    per_step: int,
+    fps: int,
+    *,
+    alone: bool = False,
+    on_frame: Callable[[int, int], None] = lambda *_: None,
+) -> FilmFacts:
+    """Write the film of a route.
+
+    Args:
+        walk: models and morphs.
+        file: MP4.
+        size_px: even width and height.
+        per_step: frames between two positions.
+        fps: frames per second.
+        alone: as of ``render``.
+        on_frame: called with (frames done, of).
+
+    """
+    views = list(views_along(walk, per_step))
+    camera = picture_camera(walk, size_px)
+    took, holes = [], []
+    with MovieFile(file, fps, size_px) as movie:
+        for k, view in enumerate(views):
+            begin = perf_counter()
+            canvas = render(walk, view, camera, size_px, alone=alone)
+            took.append(perf_counter() - begin)
+            holes.append(1.0 - float(canvas.drawn.mean()))
+            movie.add(canvas.colour)
+            on_frame(k + 1, len(views))
+    return FilmFacts(len(views), float(np.median(took)), float(np.mean(holes)))
+
+
+def picture_camera(walk: StereoWalk, size_px: tuple[int, int]) -> Floats:
+    """(3, 3) camera whose picture shows as much height as the first position's."""
+    model = walk.models[0]
+    tall, wide = model.valid.shape
+    scale = max(size_px[1] / tall, size_px[0] / wide)
+    focal = scale * model.camera[0, 0]
+    return np.array(
+        [
+            [focal, 0.0, 0.5 * (size_px[0] - 1)],
+            [0.0, focal, 0.5 * (size_px[1] - 1)],
+            [0.0, 0.0, 1.0],
+        ]
+    )

@@ -1,0 +1,143 @@
+"""Local models of all positions, joined along the route ([KP] 3.1)."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.walkthrough import PositionConfig, WalkthroughConfig
+from snakewalk.controller.mapping.colour_picture import read_colours
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel
+from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
+from snakewalk.controller.mapping.mosaic.mosaic import mosaic
+from snakewalk.controller.mapping.mosaic.relative_pose import pose_error, relative_pose
+from snakewalk.controller.mapping.mosaic.scale_flow import flow_problem, solve_flow
+from snakewalk.controller.mapping.mosaic.scale_matches import match_over_scale
+from snakewalk.controller.mapping.stereo_camera import (
+    RectifiedPair,
+    StereoCalibration,
+    read_calibration,
+    rectify,
+)
+
+_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Facts about the way from a position to the next one."""
+
+    matches: int
+    inliers: int
+    error_px: float
+    distance_m: float
+    common_share: float
+    """Share of the valid region that has a counterpart."""
+    seconds: float
+    place_error_m: float | None = None
+    """Errors of the pose; None where the positions' poses are not known."""
+    angle_error_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StereoWalk:
+    """Everything that is drawn along a route."""
+
+    models: tuple[LocalModel, ...]
+    morphs: tuple[MorphableModel, ...]
+    """One for each pair of successive positions."""
+    poses: Floats
+    """(n, 3, 4) from each position's camera to the axes of the first one."""
+    steps: tuple[Step, ...]
+
+
+def read_walk(
+    file: Path, config: WalkthroughConfig, on_step: Callable[[int, int], None] = lambda *_: None
+) -> StereoWalk:
+    """Build the models and the morphs of a route.
+
+    Args:
+        file: the positions' file; pictures lie in its folder.
+        config: its content.
+        on_step: called with (steps done, of).
+
+    Raises:
+        InputError: a picture or the calibration cannot be used, or two positions do not match.
+
+    """
+    calibration = read_calibration(file.parent / config.calibration, _UNITS_M[config.unit])
+    count = len(config.positions)
+    total = 2 * count - 1
+    models = []
+    for k, position in enumerate(config.positions):
+        with _at(f"{file}: position {k + 1}"):
+            models.append(_model(file.parent, position, calibration, config.disparities))
+        on_step(k + 1, total)
+    morphs, steps, poses = [], [], [np.eye(3, 4)]
+    for k in range(count - 1):
+        with _at(f"{file}: positions {k + 1} and {k + 2}"):
+            morph, step = _step(models[k], models[k + 1], config.positions[k : k + 2])
+        morphs.append(morph)
+        steps.append(step)
+        turn, shift = morph.pose.rotation.T, morph.pose.back(np.zeros(3))
+        last = poses[-1]
+        poses.append(np.column_stack([last[:, :3] @ turn, last[:, :3] @ shift + last[:, 3]]))
+        on_step(count + k + 1, total)
+    return StereoWalk(tuple(models), tuple(morphs), np.array(poses), tuple(steps))
+
+
+class _at:  # noqa: N801  reads as a clause
+    """Put a place in front of the faults of a block."""
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, InputError):
+            raise InputError(f"{self._where}: {error}") from None
+
+
+def rectified(folder: Path, left: str, right: str, calibration: StereoCalibration) -> RectifiedPair:
+    """Read and rectify a pair of pictures, red first."""
+    pictures = (read_colours(folder / name)[..., ::-1] for name in (left, right))
+    one, two = (np.ascontiguousarray(picture) for picture in pictures)
+    return rectify(calibration, one, two)
+
+
+def _model(
+    folder: Path, position: PositionConfig, calibration: StereoCalibration, disparities: int
+) -> LocalModel:
+    views = [
+        LocalModel.of_pair(rectified(folder, pair.left, pair.right, calibration), disparities)
+        for pair in position.pairs
+    ]
+    return views[0] if len(views) == 1 else mosaic(views).model
+
+
+def _step(
+    first: LocalModel, second: LocalModel, positions: tuple[PositionConfig, ...]
+) -> tuple[MorphableModel, Step]:
+    begin = time.perf_counter()
+    matches = match_over_scale(first, second, distance_m=positions[0].distance_m)
+    pose = relative_pose(first, second, matches)
+    morph = morphable(first, second, pose, solve_flow(flow_problem(first, second, pose)))
+    errors: tuple[float | None, float | None] = (None, None)
+    if positions[0].pose is not None and positions[1].pose is not None:
+        errors = pose_error(pose, *(np.array(each.pose) for each in positions))
+    step = Step(
+        len(matches.scale),
+        int(pose.inliers.sum()),
+        pose.error_px,
+        float(np.linalg.norm(pose.translation_m)),
+        float(morph.common.sum() / max(morph.first.valid.sum(), 1)),
+        time.perf_counter() - begin,
+        *errors,
+    )
+    return morph, step

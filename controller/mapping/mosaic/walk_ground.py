@@ -1,0 +1,87 @@
+"""Ground of a walk: heights and colours of all models, with holes where no position shows it."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.controller.mapping.mosaic.walk import StereoWalk
+from snakewalk.controller.mapping.stereo_ground import CameraStand, fit_ground
+from snakewalk.controller.terrain.elevation_map import ElevationMap
+
+_LEAST_POINTS: Final = 2
+"""In a cell that is known (ours)."""
+_HOLE: Final = (150, 150, 150)
+"""Colour of unknown ground (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class WalkGround:
+    """A map of the route, and the first camera's stand above it."""
+
+    field: HeightField
+    """x is where the first camera looks, its origin below this camera."""
+    stand: CameraStand
+    fitted: bool
+    """Whether the stand was fitted to the points."""
+
+
+def walk_ground(
+    walk: StereoWalk,
+    spacing_m: float,
+    error_m: float,
+    fill_m: float,
+    stand: CameraStand | None = None,
+) -> WalkGround:
+    """Map the ground along a route.
+
+    Args:
+        walk: models and poses of the positions.
+        spacing_m: distance of samples.
+        error_m: points with a larger expected error from their own camera are left out.
+        fill_m: width of holes that count as known.
+        stand: of the first camera; None fits a plane to its points.
+
+    Raises:
+        InputError: no ground is visible, or no point is near enough for the error.
+
+    """
+    points, colours, errors = [], [], []
+    for model, pose in zip(walk.models, walk.poses, strict=True):
+        expected = model.error_m
+        with np.errstate(invalid="ignore"):
+            good = expected <= error_m
+        points.append(model.points_m[good] @ pose[:, :3].T + pose[:, 3])
+        colours.append(model.image[good])
+        errors.append(expected[good])
+    if len(points[0]) < 100:
+        raise InputError(
+            f"the first position shows {len(points[0])} points with an error of at most "
+            f"{error_m:g} m; raise --error, or record the pictures from nearer"
+        )
+    fitted = stand is None
+    if stand is None:
+        stand = fit_ground(points[0], errors[0])
+    world = np.concatenate(points) @ stand.world_from_camera().T
+    world[:, 2] += stand.height_m
+    seen = ElevationMap.of_points(world, spacing_m, "median", _LEAST_POINTS)
+    field = seen.height_field(fill_m)
+    colour = _colours(seen, world, np.concatenate(colours))
+    return WalkGround(replace(field, colour=colour), stand, fitted)
+
+
+def _colours(seen: ElevationMap, points_m: Floats, colours: Floats | Image) -> Image:
+    """(rows, columns, 3) mean colours of the points near the surface of each sample."""
+    rows, columns = seen.z_m.shape
+    place = points_m[:, :2] - [seen.x0_m, seen.y0_m]
+    column, row = np.rint(place / seen.spacing_m).astype(int).T
+    near = np.abs(points_m[:, 2] - seen.z_m[row, column]) <= seen.spacing_m
+    cell = (row * columns + column)[near]
+    count = np.bincount(cell, minlength=rows * columns)
+    sums = [np.bincount(cell, each, rows * columns) for each in colours[near].T.astype(float)]
+    mean = np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
+    mean[count == 0] = _HOLE
+    return np.rint(mean).astype(np.uint8).reshape(rows, columns, 3)

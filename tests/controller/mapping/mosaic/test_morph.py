@@ -1,0 +1,111 @@
+"""Eq. 1 to 4, and pictures of a morphing model."""
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable, sampled
+from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
+from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
+from snakewalk.controller.mapping.mosaic.scale_flow import flow_problem, solve_flow
+from tests.controller.mapping.mosaic.test_relative_pose import K, nearer, wall
+
+
+def approach(ahead_m: float = 0.5) -> MorphableModel:
+    first = wall()
+    second = nearer(first, ahead_m)
+    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -ahead_m]), np.ones(1, bool), 0.0)
+    return morphable(first, second, pose, solve_flow(flow_problem(first, second, pose)))
+
+
+def test_the_morph_begins_at_one_model_and_ends_at_the_next() -> None:
+    morph = approach()
+    common, places = morph.common, morph.counterpart_px
+    assert common.mean() > 0.4
+    np.testing.assert_array_equal(morph.points_m(0.0), morph.first.points_m)  # Eq. 1
+    np.testing.assert_array_equal(morph.colours(0.0), morph.first.image)  # Eq. 2
+    there = sampled(morph.second.points_m.astype(np.float32), places)
+    met = morph.pose.back(there)  # Eq. 3
+    np.testing.assert_allclose(morph.points_m(1.0)[common], met[common], atol=1e-6)
+    colour = sampled(morph.second.image.astype(np.float32), places)
+    np.testing.assert_allclose(morph.colours(1.0)[common], colour[common], atol=1e-3)
+    outside = morph.first.valid & ~common  # Eq. 4
+    np.testing.assert_array_equal(morph.colours(1.0)[outside], morph.first.image[outside])
+    half = 0.5 * (morph.points_m(0.0) + morph.points_m(1.0))
+    np.testing.assert_allclose(morph.points_m(0.5), half)
+
+
+def test_the_flow_of_a_wall_is_its_growth() -> None:
+    morph = approach()
+    rows, columns = np.nonzero(morph.common)
+    truth = (np.stack([columns, rows], -1) - K[:2, 2]) * (2.0 / 1.5) + K[:2, 2]
+    off = np.linalg.norm(morph.counterpart_px[rows, columns] - truth, axis=1)
+    assert np.median(off) < 0.4
+    assert np.quantile(off, 0.95) < 1.5
+
+
+def test_flow_at_one_scale_is_worse() -> None:
+    """Fig. 4 (c)."""
+    first = wall()
+    second = nearer(first, 1.0)
+    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -1.0]), np.ones(1, bool), 0.0)
+    exact = {}
+    for name, scales in (("all", (1.0, 1.25, 1.67, 2.0, 2.5)), ("one", (1.0,))):
+        flow = solve_flow(flow_problem(first, second, pose, scales))
+        v, u = np.meshgrid(flow.rows, flow.columns, indexing="ij")
+        truth = np.stack([u - K[0, 2], v - K[1, 2]], -1)  # the wall becomes twice as large
+        off = np.linalg.norm(flow.flow_px - truth, axis=-1)
+        exact[name] = float((off < 1.0).sum() / np.isfinite(off).sum())
+    assert exact["all"] > 0.85
+    assert exact["one"] < 0.6
+
+
+def test_the_printed_potts_term_is_less_exact() -> None:
+    first = wall()
+    second = nearer(first, 0.5)
+    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -0.5]), np.ones(1, bool), 0.0)
+    problem = flow_problem(first, second, pose)
+    exact = []
+    for printed in (False, True):
+        flow = solve_flow(problem, 0.5, printed)
+        v, u = np.meshgrid(flow.rows, flow.columns, indexing="ij")
+        truth = np.stack([u - K[0, 2], v - K[1, 2]], -1) / 3.0
+        off = np.linalg.norm(flow.flow_px - truth, axis=-1)
+        exact.append(float((off < 1.0).sum() / np.isfinite(off).sum()))
+    assert exact[0] > exact[1] + 0.1
+
+
+def test_the_first_picture_is_the_photograph_and_holes_stay_holes() -> None:
+    model = wall()
+    points = model.points_m.copy()
+    points[40:60, 80:120] = np.nan
+    canvas = Canvas.blank(240, 180)
+    draw(canvas, points, K, cells(points), model.image)
+    inside = canvas.drawn
+    assert not inside[41:59, 81:119].any()
+    assert inside.mean() > 0.95
+    off = np.abs(canvas.colour[inside].astype(int) - model.image[inside])
+    assert off.max() <= 1
+    assert canvas.depth_m[inside] == pytest.approx(2.0)
+
+
+def test_a_slanted_plane_is_drawn_in_perspective_and_the_nearer_surface_wins() -> None:
+    """A colour ramp on a floor: the column of a pixel's texel follows from its own depth."""
+    far, near = 8.0, 1.0
+    z = np.linspace(far, near, 30)
+    points = np.stack(np.broadcast_arrays(np.linspace(-1, 1, 5)[None], 0.5, z[:, None]), -1)
+    ramp = np.repeat(np.linspace(0, 250, 30)[:, None, None], 5, axis=1)
+    image = np.repeat(ramp, 3, axis=2).astype(np.uint8)
+    canvas = Canvas.blank(240, 180)
+    whole = np.ones((29, 4), bool)
+    draw(canvas, points, K, whole, image)
+    rows = np.arange(110, 170)
+    depth = 0.5 * 200.0 / (rows - K[1, 2])
+    kept = (depth > near + 0.1) & (depth < far - 0.1)
+    np.testing.assert_allclose(canvas.depth_m[rows[kept], 120], depth[kept], rtol=1e-6)
+    wanted = 250 * (far - depth[kept]) / (far - near)
+    np.testing.assert_allclose(canvas.colour[rows[kept], 120, 0], wanted, atol=2.0)
+    across, down = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 30))
+    wall_m = np.stack([across, down, np.full_like(down, 3.0)], -1)
+    draw(canvas, wall_m, K, whole, np.full_like(image, 77))
+    assert canvas.colour[rows[depth > 3.1], 120, 0] == pytest.approx(77)
+    assert (canvas.colour[rows[kept & (depth < 2.9)], 120, 0] > 77).all()
