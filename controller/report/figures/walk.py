@@ -5,15 +5,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from snakewalk.config.arrays import Bools, Ints
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    RED,
-    canvas,
-    legend_above,
-)
+from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, PALE, RED
+from snakewalk.controller.figures.style import canvas, legend_above
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -28,7 +21,7 @@ def walk_figure(record: RunRecord) -> Figure | None:
     figure, panels = canvas(2 if many else 1, 5.4 if many else 3.0)
     if many:
         states = panels[0]
-        states.plot(number, walk.state, color="#dbe3ea", linewidth=0.8, zorder=1)
+        states.plot(number, walk.state, color=PALE, linewidth=0.8, zorder=1)
         size = float(np.clip(1800 / steps, 6, 26))
         for chosen, colour, label in zip(
             _kinds_of_decision(walk.state),
