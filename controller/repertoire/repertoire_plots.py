@@ -42,9 +42,9 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
                 axes.plot(*body.T, color=colour, lw=2.5, solid_capstyle="round", label=label)
                 axes.plot(*body[0], "o", color=colour, ms=5)
             axes.plot(*track.T, color=INK, lw=0.9, ls=":", label="centre of the body")
-            turn = np.rad2deg(segment.turn_rad_s * segment.duration_s)
+            turn = round(np.rad2deg(segment.turn_rad_s * segment.duration_s))
             axes.set_title(
-                f"{segment.name}: {segment.speed_m_s:.2f} m/s, {turn:+.0f}° in "
+                f"{segment.name}: {segment.speed_m_s:.2f} m/s, {turn:+d}° in "
                 f"{segment.duration_s:.2f} s",
                 fontsize=9,
             )

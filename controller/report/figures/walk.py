@@ -26,14 +26,14 @@ def walk_figure(record: RunRecord) -> Figure | None:
         for chosen, colour, label in zip(
             _kinds_of_decision(walk.state),
             (GREEN, BLUE, AMBER),
-            ("state started", "state continued", "state repeated"),
+            ("started", "continued", "repeated"),
             strict=True,
         ):
             states.scatter(
                 number[chosen], walk.state[chosen], s=size, color=colour, label=label, zorder=2
             )
         is_wide = walk.carrier_rad > 0.0
-        label = f"on wide waves, {is_wide.mean():.0%}"
+        label = f"wide waves, {is_wide.mean():.0%}"
         if is_wide.any():
             states.fill_between(
                 number, 0.0, 1.0, where=is_wide, step="mid", color=GREY, alpha=0.25, linewidth=0.0,
