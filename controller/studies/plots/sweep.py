@@ -29,7 +29,6 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
             panel.set_axis_off()
         for panel, gait in zip(axes.flat, gaits, strict=False):
             _panel(panel, gait, [row for row in rows if row["gait"] == gait], colours)
-        figure.supylabel("cost of transport, logarithmic", fontsize=9.5)
         dot = {"marker": "o", "ls": ""}
         handles = [Line2D([], [], color=colours[robot], label=robot, **dot) for robot in robots]
         ring = Line2D([], [], color=GREY, ms=9, mfc="none", label="default parameters", **dot)
@@ -50,6 +49,7 @@ def _panel(axes: Axes, gait: str, rows: list[dict[str, str]], colours: dict[str,
             if r["number"] == "0":
                 axes.scatter([x], [y], s=70, facecolors="none", edgecolors=colour)
     axes.set_title(gait)
+    axes.set_ylabel("cost of transport")
     axes.set_xlabel(f"pace ({UNITS[GAITS[gait].aim]})")
     axes.xaxis.set_major_locator(MaxNLocator(4))
     if is_measured:  # else none moved far enough to have a cost
