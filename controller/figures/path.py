@@ -86,7 +86,7 @@ def draw_ground(axes: Axes, ground: HeightField) -> None:
         linewidths=0.5,
         alpha=0.5,
     )
-    axes.clabel(lines, lines.levels[1::2], fontsize=8.5, fmt="%.2f m")
+    axes.clabel(lines, list(lines.levels)[1::2], fontsize=8.5, fmt="%.2f m")
     axes.grid(visible=False)
     if isinstance(axes.figure, Figure | SubFigure):
         bar = axes.figure.colorbar(heights, ax=axes, pad=0.02, aspect=18, shrink=0.8)

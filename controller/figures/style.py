@@ -113,10 +113,10 @@ def legend_above(axes: Axes, columns: int = 6) -> None:
 
 def colour_bar(figure: Figure, image: ScalarMappable, axes: Axes, label: str) -> None:
     """Draw the scale of an image; arrows at its ends mark values beyond it."""
-    values = np.ma.filled(np.ma.asarray(image.get_array(), float), np.nan)
-    low, high = image.norm.vmin, image.norm.vmax
-    below = low is not None and bool((values < low * (1.0 + 1e-9 * np.sign(-low))).any())
-    above = high is not None and bool((values > high * (1.0 + 1e-9 * np.sign(high))).any())
+    values: Floats = np.ma.filled(np.ma.asarray(image.get_array(), float), np.nan)
+    low, high = (float(edge) for edge in image.get_clim())
+    slack = 1e-9 * (high - low)
+    below, above = bool((values < low - slack).any()), bool((values > high + slack).any())
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}
     bar = figure.colorbar(
         image, ax=axes, pad=0.02, aspect=14, extend=extend.get((below, above), "both")

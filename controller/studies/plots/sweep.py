@@ -29,9 +29,12 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
             panel.set_axis_off()
         for panel, gait in zip(axes.flat, gaits, strict=False):
             _panel(panel, gait, [row for row in rows if row["gait"] == gait], colours)
-        dot = {"marker": "o", "ls": ""}
-        handles = [Line2D([], [], color=colours[robot], label=robot, **dot) for robot in robots]
-        ring = Line2D([], [], color=GREY, ms=9, mfc="none", label="default parameters", **dot)
+        handles = [
+            Line2D([], [], color=colours[robot], label=robot, marker="o", linestyle="")
+            for robot in robots
+        ]
+        ring = Line2D([], [], color=GREY, markersize=9, markerfacecolor="none", marker="o",
+                      linestyle="", label="default parameters")  # fmt: skip
         figure.legend(handles=[*handles, ring], loc="outside upper center", ncols=4)
         save_picture(figure, path, dpi=110)
 
