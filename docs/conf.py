@@ -1,17 +1,19 @@
 """The site: ``make docs`` builds it of these pages by Sphinx, with warnings as errors."""
 
 import re
+import sys
 from importlib.metadata import version as installed
 from pathlib import Path
 
 from pydantic import BaseModel
 from sphinx.application import Sphinx
 
+sys.path.insert(0, str(Path(__file__).parent))  # notebook_page
 project = "snakewalk"
 author = "the authors of snakewalk"
 copyright = "Apache-2.0"
 version = release = installed("snakewalk")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "notebook_page", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["tables"]
 nitpicky = True
@@ -34,6 +36,8 @@ PAGES = Path(__file__).parent
 
 def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
     """Make a link of each page that stands in backticks, as one reads it in the repository."""
+    if not (PAGES / f"{name}.md").is_file():
+        return  # a notebook
     folder = (PAGES / f"{name}.md").parent
 
     def link(found: re.Match[str]) -> str:

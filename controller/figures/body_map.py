@@ -6,7 +6,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.figures.style import ANGLES, GREY, PALE
+from snakewalk.config.colours import GREY, PALE
+from snakewalk.controller.figures.style import ANGLES, SPEEDS, colour_bar
 from snakewalk.controller.track.track import Track
 
 _COLUMNS = 330  # more cannot be seen
@@ -19,9 +20,9 @@ def body_map(
     values: Floats,
     label: str,
     kept: NDArray[np.int64] | None = None,
-    limit: float | None = None,
+    limits: tuple[float, float] | None = None,
 ) -> None:
-    """Draw values (S, N), one row a frame, with zero white; unknown values stay grey.
+    """Draw values (S, N), one row a frame; unknown values stay grey.
 
     Args:
         figure: for the colour bar.
@@ -30,31 +31,34 @@ def body_map(
         values: NaN where unknown.
         label: of the colour bar.
         kept: (S,) indices of the track's frames that the rows belong to; default all.
-        limit: of the colours; default what 99 % of the values stay within.
+        limits: of the colours; default what 99 % of the values stay within, with zero white.
 
     """
     rows = np.arange(track.frames) if kept is None else kept
     frame = np.rint(track.time_s * track.rate_hz).astype(int)
     full = np.full((frame[-1] + 1, values.shape[1]), np.nan)
     full[frame[rows]] = values
-    top = float(np.nanpercentile(np.abs(values), 99.0)) if limit is None else limit
+    if limits is None:
+        top = float(np.nanpercentile(np.abs(values), 99.0))
+        limits = (-top, top)
+    low, high = limits
     axes.set_facecolor(PALE)
     image = axes.imshow(
         _thin(full).T,
         aspect="auto",
-        cmap=ANGLES,
-        vmin=-top,
-        vmax=top,
+        cmap=ANGLES if low < 0.0 < high else SPEEDS,
+        vmin=low,
+        vmax=high,
         extent=(0.0, float(track.time_s[-1]), 1.0, 0.0),
         interpolation="nearest",
     )
     axes.grid(visible=False)
-    axes.set_xlabel("time, s" + (" (rate assumed)" if track.rate_assumed else ""))
+    axes.set_xlabel("time (s" + (", rate assumed)" if track.rate_assumed else ")"))
     axes.set_yticks([0.0, 1.0], ["head", "tail"])
     axes.tick_params(axis="y", length=0, colors=GREY)
-    bar = figure.colorbar(image, ax=axes, pad=0.02, fraction=0.05)
-    bar.set_label(label)
-    bar.outline.set_visible(False)
+    known = values[np.isfinite(values)]
+    beyond = float(np.mean((known < low) | (known > high)))
+    colour_bar(figure, image, axes, label if beyond < 0.02 else f"{label} ({beyond:.0%} beyond)")
 
 
 def _thin(rows: Floats) -> Floats:

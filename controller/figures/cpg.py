@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from snakewalk.config.colours import AMBER, INK
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.figures.style import save_picture
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.cpg_motion import CpgMotion
@@ -25,6 +28,11 @@ STAY_S = 5.0
 
 def draw(out: Path) -> None:
     """Draw angles and speeds of all joints over four gaits, and rest."""
+    with style():
+        _draw(out)
+
+
+def _draw(out: Path) -> None:
     robot = load_robot(ROBOT)
     nowhere = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
     motion = CpgMotion(robot, np.zeros(robot.joint_count))
@@ -38,9 +46,9 @@ def draw(out: Path) -> None:
             angles.append(motion.step(STEP_S, nowhere))
             speeds.append(motion.velocity_rad_s())
     time_s = STEP_S * np.arange(len(angles))
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
-    colours = colormaps["viridis"](np.linspace(0.0, 0.9, robot.joint_count))
+    colours = colormaps["viridis"](np.linspace(0.0, 1.0, robot.joint_count))
     for axis, rows, limit in (
         (axes[0], np.array(angles), max(robot.limit_rad)),
         (axes[1], np.array(speeds), robot.joint_speed_limit_rad_s),
@@ -48,15 +56,17 @@ def draw(out: Path) -> None:
         for joint, colour in enumerate(colours):
             axis.plot(time_s, rows[:, joint], color=colour, linewidth=0.6)
         for bound in (-limit, limit):
-            axis.axhline(bound, color="0.4", linewidth=0.8, linestyle="--")
+            axis.axhline(bound, color=INK, linewidth=0.8, linestyle="--")
         for start_s, _, taken_s in changes:
-            axis.axvspan(start_s, start_s + taken_s, color="tab:orange", alpha=0.13, linewidth=0)
+            axis.axvspan(start_s, start_s + taken_s, color=AMBER, alpha=0.2, linewidth=0)
     for start_s, name, _ in changes:
         axes[0].annotate(name, (start_s, 1.02), xycoords=("data", "axes fraction"), fontsize=9)
-    axes[0].set_ylabel("joint, rad")
-    axes[1].set_ylabel("joint speed, rad/s")
-    axes[1].set_xlabel("time, s (orange: the change; dashed: limits)")
-    save_picture(figure, out, dpi=72)
+    axes[0].set_ylabel("joint angle (rad)")
+    axes[1].set_ylabel("joint speed (rad/s)")
+    axes[1].set_xlabel("time (s); amber: the change; dashed: limits")
+    scale = ScalarMappable(Normalize(1, robot.joint_count), "viridis")
+    figure.colorbar(scale, ax=list(axes), pad=0.02, aspect=30, label="joint, 1: the head")
+    save_picture(figure, out, dpi=110)
 
 
 if __name__ == "__main__":

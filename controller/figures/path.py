@@ -2,22 +2,15 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LightSource
-from matplotlib.figure import Figure
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LightSource, Normalize
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Circle, Polygon
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.colours import CENTRE, GREY, HEAD, INK, MEASURED, PATH, REACHED, TO_COME
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    GROUND,
-    INK,
-    RED,
-    WIDTH_IN,
-    legend_above,
-)
+from snakewalk.controller.figures.style import GROUND, WIDTH_IN, legend_above
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -46,15 +39,15 @@ def path_figure(record: RunRecord) -> Figure | None:
     known = "" if is_measured else ", dead-reckoned"
     axes.plot(
         *pose.centre_m[:, :2].T,
-        color=BLUE,
+        color=CENTRE,
         linewidth=2.0,
         label=f"centre of mass{known}",
         linestyle="-" if is_measured else (0, (3, 2)),
     )
-    axes.plot(*pose.head_m[:, :2].T, color=BLUE, linewidth=0.7, alpha=0.55, label="head")
+    axes.plot(*pose.head_m[:, :2].T, color=HEAD, linewidth=0.9, label="head")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
-    legend_above(axes)
+    legend_above(axes, 3)
     return figure
 
 
@@ -69,20 +62,43 @@ def _extent(record: RunRecord) -> tuple[Floats, Floats]:
 
 
 def draw_ground(axes: Axes, ground: HeightField) -> None:
-    """Draw hills as colours, shade and contour lines."""
+    """Draw hills as colours, lighter the higher, with shade, contour lines and a scale."""
     w, h = ground.size_m
     extent = (ground.x0_m, ground.x0_m + w, ground.y0_m, ground.y0_m + h)
-    colour = GROUND((ground.z_m - ground.z_m.min()) / max(float(np.ptp(ground.z_m)), 1e-9))
+    low, high = float(ground.z_m.min()), float(ground.z_m.max())
+    heights = ScalarMappable(Normalize(low, max(high, low + 1e-9)), GROUND)
+    colour = heights.to_rgba(ground.z_m)
     light = LightSource(azdeg=315, altdeg=50)
     shade = light.hillshade(ground.z_m, vert_exag=1.0, dx=ground.spacing_m, dy=ground.spacing_m)
-    colour[..., :3] *= (0.72 + 0.36 * shade)[..., None]
-    pale = np.clip(0.35 + 0.65 * colour[..., :3], 0.0, 1.0)
-    axes.imshow(pale, origin="lower", extent=extent, interpolation="bilinear", zorder=0)
+    shaded = np.clip(colour[..., :3] * (0.86 + 0.18 * shade)[..., None], 0.0, 1.0)
+    axes.imshow(shaded, origin="lower", extent=extent, interpolation="bilinear", zorder=0)
     x = np.linspace(extent[0], extent[1], ground.z_m.shape[1])
     y = np.linspace(extent[2], extent[3], ground.z_m.shape[0])
-    lines = axes.contour(x, y, ground.z_m, levels=8, colors=INK, linewidths=0.4, alpha=0.45)
-    axes.clabel(lines, fontsize=7, fmt="%.2f m")
+    columns, rows = slice(None), slice(None)
+    if not axes.get_autoscalex_on():  # labels only where they are seen
+        columns, rows = _within(x, axes.get_xlim()), _within(y, axes.get_ylim())
+    lines = axes.contour(
+        x[columns],
+        y[rows],
+        ground.z_m[rows, columns],
+        levels=8,
+        colors=INK,
+        linewidths=0.5,
+        alpha=0.5,
+    )
+    axes.clabel(lines, list(lines.levels)[1::2], fontsize=8.5, fmt="%.2f m")
     axes.grid(visible=False)
+    if isinstance(axes.figure, Figure | SubFigure):
+        bar = axes.figure.colorbar(heights, ax=axes, pad=0.02, aspect=18, shrink=0.8)
+        bar.set_label("height of the ground (m)")
+        bar.outline.set_visible(False)
+
+
+def _within(values: Floats, limits: tuple[float, float]) -> slice:
+    """Slice of the rising values inside limits, at least two."""
+    first, last = np.searchsorted(values, limits).tolist()
+    first = min(max(first, 0), len(values) - 2)
+    return slice(first, max(last, first + 2))
 
 
 def _plan(axes: Axes, record: RunRecord) -> None:
@@ -93,7 +109,7 @@ def _plan(axes: Axes, record: RunRecord) -> None:
         strong = number == 0
         axes.plot(
             *path[:, :2].T,
-            color=INK if strong else GREY,
+            color=PATH if strong else GREY,
             linewidth=1.4 if strong else 1.0,
             linestyle=(0, (5, 3)) if strong else (0, (1, 2)),
             label=label,
@@ -102,7 +118,7 @@ def _plan(axes: Axes, record: RunRecord) -> None:
     reached = len(waypoint_times_s(record.pose, plan))
     measured = record.header.pose_evidence.is_measured
     for number, point in enumerate(plan.waypoints_m):
-        colour = GREEN if number < reached else RED
+        colour = REACHED if number < reached else TO_COME
         axes.add_patch(
             Circle(
                 (float(point[0]), float(point[1])),
@@ -139,7 +155,7 @@ def _bodies(axes: Axes, record: RunRecord) -> None:
             Polygon(
                 outline,
                 closed=True,
-                facecolor=BLUE,
+                facecolor=MEASURED,
                 edgecolor="white",
                 linewidth=0.7,
                 alpha=strength,

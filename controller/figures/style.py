@@ -10,43 +10,30 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.colours import GREEN, GREY, INK
 from snakewalk.controller.console.result_files import atomic_write
 
-INK: Final = "#22303c"
-GREY: Final = "#8796a5"
-PALE: Final = "#d9e0e6"
-BLUE: Final = "#0072b2"
-SKY: Final = "#56b4e9"
-GREEN: Final = "#009e73"
-AMBER: Final = "#e69f00"
-RED: Final = "#d55e00"
-PURPLE: Final = "#a4508b"
-COLOURS: Final = {
-    "ink": INK,
-    "grey": GREY,
-    "pale": PALE,
-    "blue": BLUE,
-    "sky": SKY,
-    "green": GREEN,
-    "amber": AMBER,
-    "red": RED,
-    "purple": PURPLE,
-}
-"""The palette by name, as ``column.Curve`` uses it."""
-GROUND: Final = LinearSegmentedColormap.from_list(
-    "ground", ["#7fa08c", "#b9c7a0", "#e6dcb8", "#cdb292", "#a68a78"]
-)
+GROUND: Final = LinearSegmentedColormap.from_list("ground", ["#93a07c", "#c3bd98", "#f2ead6"])
+"""Heights, lighter the higher: the tones of the film, paler, so that lines on them are seen."""
 ANGLES: Final = "RdBu_r"
-WIDTH_IN: Final = 11.0
+"""Values about zero, which is white."""
+TIMES: Final = "viridis_r"
+"""Times, later ones darker."""
+SPEEDS: Final = "viridis"
+"""Values of one sign."""
+WIDTH_IN: Final = 8.0
+"""Width of a figure: at 600 px, text of 8.5 points is 9 px high."""
 _POINTS: Final = 900  # across a figure: more cannot be seen
 _RC: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",
-    "font.size": 10.0,
-    "axes.titlesize": 10.5,
+    "font.size": 9.5,
+    "axes.titlesize": 10.0,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.labelcolor": INK,
@@ -117,11 +104,26 @@ def thin(time_s: Floats, values: Floats) -> tuple[Floats, Floats, Floats, Floats
 
 
 def legend_above(axes: Axes, columns: int = 6) -> None:
-    """Legend in one row over the right end of the panel: it never covers a curve."""
+    """Place the legend over the right end of the panel, where it never covers a curve."""
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1,
         handlelength=1.6, columnspacing=1.4,
     )  # fmt: skip
+
+
+def colour_bar(figure: Figure, image: ScalarMappable, axes: Axes, label: str) -> None:
+    """Draw the scale of an image; arrows at its ends mark values beyond it."""
+    values: Floats = np.ma.filled(np.ma.asarray(image.get_array(), float), np.nan)
+    low, high = (float(edge) for edge in image.get_clim())
+    slack = 1e-9 * (high - low)
+    below, above = bool((values < low - slack).any()), bool((values > high + slack).any())
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}
+    bar = figure.colorbar(
+        image, ax=axes, pad=0.02, aspect=14, extend=extend.get((below, above), "both")
+    )
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+    bar.ax.yaxis.set_major_locator(MaxNLocator(5))
 
 
 def name_joints(axes: Axes, names: Sequence[str]) -> None:

@@ -6,19 +6,20 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from snakewalk.config.colours import BLUE, INK
 from snakewalk.controller.figures.path import draw_ground
-from snakewalk.controller.figures.style import GREEN, INK, save_picture, style
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.terrain.relief import Relief
 
 
 def draw_terrain_map(relief: Relief, file: Path, title: str) -> None:
-    """Draw a map, hatched where nothing was measured, green where a path may go."""
+    """Draw a map, hatched where nothing was measured, blue where a path may go."""
     ground = relief.ground
     w, h = ground.size_m
-    wide_in = 8.0 if w >= h else max(4.0, 8.0 * w / h + 1.5)
+    wide_in = WIDTH_IN
     with style():
-        tall_in = float(np.clip(wide_in * h / w, 3.0, 8.5)) + 1.2
-        figure = Figure(figsize=(wide_in, tall_in), layout="constrained", dpi=100)
+        tall_in = float(np.clip(0.8 * wide_in * h / w, 3.0, 8.5)) + 1.2
+        figure = Figure(figsize=(wide_in, tall_in), layout="constrained", dpi=110)
         axes = figure.subplots(1, 1)
         draw_ground(axes, ground)
         rows, columns = ground.z_m.shape
@@ -27,9 +28,9 @@ def draw_terrain_map(relief: Relief, file: Path, title: str) -> None:
         at = np.meshgrid(x, y)
         known = np.ones((rows, columns), bool) if ground.known is None else ground.known
         safe = relief.safe(*at)
-        marks = [Patch(facecolor=GREEN, alpha=0.35, label="safe for a path")]
+        marks = [Patch(facecolor=BLUE, alpha=0.35, label="safe for a path")]
         if safe.any():
-            axes.contourf(*at, safe, levels=[0.5, 1.5], colors=[GREEN], alpha=0.35)
+            axes.contourf(*at, safe, levels=[0.5, 1.5], colors=[BLUE], alpha=0.35)
         if not known.all():
             axes.contourf(*at, ~known, levels=[0.5, 1.5], colors=["white"], alpha=0.75)
             axes.contourf(*at, ~known, levels=[0.5, 1.5], colors=["none"], hatches=["////"])

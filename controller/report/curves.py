@@ -12,14 +12,8 @@ import numpy as np
 from plotly.offline import get_plotlyjs
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    COLOURS,
-    GREEN,
-    INK,
-    RED,
-)
+from snakewalk.config.colours import AMBER, BLUE, COLOURS, GREEN, INK, RED, rgb
+from snakewalk.controller.figures.style import thin
 from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
 from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import panel_curves
@@ -27,8 +21,10 @@ from snakewalk.controller.runlog.record import RunRecord
 
 _ROWS: Final = 4000
 """Most rows of a curve: of a longer run every second, third ... row is on the page (ours)."""
-_PANEL_PX: Final = 150
-_GAP: Final = 0.055
+_BLOCK: Final = 2700
+"""Cycles from which a curve that jumps in most of them would be drawn as a block (ours)."""
+_PANEL_PX: Final = 160
+_GAP: Final = 0.06
 Curve = tuple[str, str, Floats, Floats]
 """Name, colour, times, values."""
 
@@ -49,7 +45,8 @@ def curves_html(record: RunRecord) -> str:
         "<section id='curves'><h2>Curves</h2><figure>"
         f"<p class='facts'><label>Last two panels: <select id='joint'>{joints}</select></label></p>"
         "<div id='plot'><noscript>Curves need scripts. The pictures below do not.</noscript></div>"
-        "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
+        "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. A "
+        "pale band reaches from least to largest. "
         "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is the "
         f"film's time.{which}{constant}</figcaption></figure>"
         f"<script id='plotly' type='text/plain'>{_library()}</script>"
@@ -62,7 +59,9 @@ def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
     error_m = path_error_m(record)
     panels: list[tuple[str, list[Curve]]] = []
     if np.isfinite(error_m).any():
-        panels.append(("from the path, m", [("from the path", BLUE, record.pose.time_s, error_m)]))
+        panels.append(
+            ("distance from the path, m", [("from the path", BLUE, record.pose.time_s, error_m)])
+        )
     constant = []
     for panel in Panel:
         curves = [] if panel.is_of_one_joint else panel_curves(record, panel)
@@ -82,9 +81,10 @@ def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dic
     """Traces, layout, and the values that the two panels of each joint show, for Plotly."""
     joint = [(each, panel_curves(record, each)) for each in Panel if each.is_of_one_joint]
     traces = [
-        _trace(name, colour, row, time_s, values)
+        trace
         for row, (_, curves) in enumerate(panels, start=1)
         for name, colour, time_s, values in curves
+        for trace in _traces(name, colour, row, time_s, values)
     ]
     first = len(traces)
     traces += [
@@ -115,7 +115,6 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
         "hovermode": "x",
         "showlegend": True,
-        "legend": {"orientation": "h", "y": -40.0 / (_PANEL_PX * count), "yanchor": "top"},
         "dragmode": "zoom",
         "xaxis": {
             "range": [0.0, max(record.end_s, 1e-3)],
@@ -143,6 +142,9 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
             "zerolinecolor": "#d9e0e6",
             "nticks": 5,
         }
+        layout["legend" if row == 1 else f"legend{row}"] = {
+            "orientation": "h", "x": 1.0, "xanchor": "right", "y": top, "yanchor": "bottom",
+        }  # fmt: skip
         layout["annotations"].append(
             {
                 "text": f"<b>{title}</b>", "xref": "paper", "yref": "paper", "x": 0.0, "y": top,
@@ -159,6 +161,28 @@ def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _traces(
+    name: str, colour: str, row: int, time_s: Floats, values: Floats
+) -> list[dict[str, Any]]:
+    """Return the trace of a curve; of one that jumps in most cycles, the mean in a pale band."""
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    if len(steps) < _BLOCK or np.median(steps) < 0.1 * float(np.ptp(values[np.isfinite(values)])):
+        return [_trace(name, colour, row, time_s, values)]
+    at_s, low, mean, high = thin(time_s, values)
+    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+    return [
+        _trace(name, colour, row, at_s, low) | edge,
+        _trace(name, colour, row, at_s, high)
+        | edge
+        | {"fill": "tonexty", "fillcolor": _pale(colour)},
+        _trace(f"{name}, mean", colour, row, at_s, mean),
+    ]
+
+
+def _pale(colour: str) -> str:
+    return f"rgba({', '.join(str(part) for part in rgb(colour))}, 0.25)"
+
+
 def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> dict[str, Any]:
     return {
         "type": "scatter",
@@ -168,6 +192,7 @@ def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> 
         "y": _packed(values),
         "xaxis": "x",
         "yaxis": "y" if row == 1 else f"y{row}",
+        "legend": "legend" if row == 1 else f"legend{row}",
         "line": {"color": colour, "width": 1.3},
         "hovertemplate": f"{name} %{{y:.4g}}<extra></extra>",
     }

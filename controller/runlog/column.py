@@ -45,7 +45,7 @@ class Panel(StrEnum):
 
     SPEED = "forward speed, m/s"
     CURRENT = "current, A"
-    CYCLE = "in a cycle, ms"
+    CYCLE = "time in a cycle, ms"
     HEAT = "hottest servo, °C"
     SUPPLY = "lowest supply, V"
     CHAIN = "whole chain, A"

@@ -1,6 +1,6 @@
 """The panels next to the scene: state, a row of bars for each servo, curves over time, events."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Final
 
@@ -8,6 +8,7 @@ import numpy as np
 import viser
 from viser import uplot
 
+from snakewalk.config import colours
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.ground_slope import carrier_share, ground_slope
 from snakewalk.controller.runlog.column import Panel
@@ -24,12 +25,8 @@ _EVENTS: Final = 7
 _AMBIENT_C: Final = 20.0
 _LATE_CYCLES: Final = 3.0
 """Readings that are this number of cycles old are shown in another colour (ours)."""
-_GOOD, _WARN, _BAD, _INK = "#3a7dbd", "#e39a1b", "#d62026", "#666"
+_GOOD, _WARN, _BAD, _INK = colours.MEASURED, colours.WARNING, colours.FAULT, "#666"
 _LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD}
-_COLORS: Final = (
-    *("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f"),
-    *("#bcbd22", "#17becf", "#3949ab", "#00897b", "#6d4c41", "#c0ca33", "#5e35b1", "#f4511e"),
-)
 
 
 class Dashboard:
@@ -51,20 +48,20 @@ class Dashboard:
         self._picture: viser.GuiImageHandle | None = None
         self._state = gui.add_html("")
         self.follow = gui.add_checkbox("follow the body", not header.run.waypoints_m)
-        self.goals = gui.add_checkbox("show goals", True, hint="yellow, where joints should be")
+        self.goals = gui.add_checkbox("show goals", True, hint="amber, where joints should be")
         self.tabs = tabs = gui.add_tab_group()
         with tabs.add_tab("servos"):
             self._bars = gui.add_html("")
         with tabs.add_tab("curves"):
             self.joint = gui.add_dropdown("joint", tuple(self._names))
-            self._angle = _plot(gui, "angle, rad", ("goal", "measured"))
-            self._current = _plot(gui, "current of all joints, A", tuple(self._names), legend=False)
-            self._apart = _plot(
-                gui, "current less its shadow's, A", tuple(self._names), legend=False
-            )
+            goal, measured = colours.GOAL, colours.MEASURED
+            self._angle = _plot(gui, "angle, rad", {"goal": goal, "measured": measured})
+            joints = _of_joints(self._names)
+            self._current = _plot(gui, "current of all joints, A", joints, legend=False)
+            self._apart = _plot(gui, "current less its shadow's, A", joints, legend=False)
             self._apart.visible = False
             self._panels = {
-                panel: _plot(gui, panel, _curve_names(panel))
+                panel: _plot(gui, panel, _curve_colours(panel))
                 for panel in Panel
                 if not panel.is_of_one_joint and panel != Panel.CURRENT  # above, of all joints
             }
@@ -176,12 +173,10 @@ class Dashboard:
 
 
 def _plot(
-    gui: viser.GuiApi, title: str, names: tuple[str, ...], *, legend: bool = True
+    gui: viser.GuiApi, title: str, names: Mapping[str, str], *, legend: bool = True
 ) -> viser.GuiUplotHandle:
-    series = [
-        uplot.Series(label=name, stroke=_COLORS[k % len(_COLORS)], width=1.5)
-        for k, name in enumerate(names)
-    ]
+    """Add a plot of curves, names with their colours."""
+    series = [uplot.Series(label=name, stroke=colour, width=1.5) for name, colour in names.items()]
     return gui.add_uplot(
         tuple(np.zeros(2) for _ in range(len(names) + 1)),
         (uplot.Series(label="s"), *series),
@@ -207,17 +202,29 @@ def _spread(first: int, last: int) -> np.ndarray:
     return np.unique(np.linspace(first, last, max(count, 2)).astype(int))
 
 
-def _curve_names(panel: Panel) -> tuple[str, ...]:
-    """Names of all curves of a panel."""
+def _of_joints(names: Sequence[str]) -> dict[str, str]:
+    """Colours of all joints, from dark at the head to light at the tail."""
+    share = np.linspace(0.0, 0.75, len(names))[:, None]
+    dark, white = (np.array(colours.rgb(one)) for one in (colours.MEASURED, "#ffffff"))
+    tones = np.rint(dark + share * (white - dark)).astype(int).tolist()
+    return {
+        name: f"#{red:02x}{green:02x}{blue:02x}"
+        for name, (red, green, blue) in zip(names, tones, strict=True)
+    }
+
+
+def _curve_colours(panel: Panel) -> dict[str, str]:
+    """Names of all curves of a panel with their colours, which the report shares."""
     columns = [column for table in TABLES for column in table.topic.columns.values()]
-    return tuple(c.name for column in columns for c in column.curves if c.panel == panel)
+    curves = [curve for column in columns for curve in column.curves if curve.panel == panel]
+    return {curve.name: colours.COLOURS[curve.colour] for curve in curves}
 
 
 def _newest(panel: Panel, curves: Sequence[CurveValues], time_s: Floats) -> list[Floats]:
     """Values (n,) of each curve of a panel that were the newest at some times."""
     known = {each.curve.name: each.values[_rows_at(each.time_s, time_s)] for each in curves}
     unknown = np.full(len(time_s), np.nan)
-    return [known.get(name, unknown) for name in _curve_names(panel)]
+    return [known.get(name, unknown) for name in _curve_colours(panel)]
 
 
 def _rows_at(of_s: Floats, time_s: Floats) -> np.ndarray:

@@ -9,6 +9,7 @@ from io import StringIO
 
 import viser
 
+from snakewalk.config import colours
 from snakewalk.controller.view.gate import Gate, Insert
 
 _LEFT_PX, _TOP_PX, _WIDTH_PX = 16.0, 170.0, 300.0
@@ -96,7 +97,7 @@ class StopPanel:
     def ended(self, text: str) -> None:
         """The run is over."""
         self._button.disabled = True
-        self.show(f"the run has ended: {text}", "#b3121a")
+        self.show(f"the run has ended: {text}", colours.FAULT)
 
     def _pressed(self, event: object) -> None:
         self.show(self._press("E-STOP of the page"))

@@ -10,7 +10,9 @@ import trimesh
 import viser
 from scipy.spatial.transform import Rotation
 
+from snakewalk.config import colours
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.colours import rgb
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.kinematics.legs import leg_segments_m
@@ -24,14 +26,14 @@ _HEAD: Final = (205, 72, 12)
 _LINKS: Final = ((26, 70, 128), (60, 118, 180)), ((30, 104, 52), (84, 168, 96))
 """Two colours in turn, of the first run in a page and of the second."""
 _HOT: Final = (214, 32, 38)
-_GOAL: Final = (250, 190, 40)
-_PATH: Final = (240, 170, 20)
-_OLD_PATH: Final = (165, 160, 150)
-_TRAIL: Final = (120, 120, 132)
+_GOAL: Final = rgb(colours.GOAL)
+_PATH: Final = rgb(colours.PATH)
+_OLD_PATH: Final = rgb(colours.GREY)
+_TRAIL: Final = rgb(colours.CENTRE)
 _WATER: Final = (140, 204, 235)
-_WAYPOINT: Final = (40, 160, 80)
-_REACHED: Final = (150, 150, 150)
-_GROUND: Final = np.array([(96, 104, 84), (214, 208, 182)])
+_WAYPOINT: Final = rgb(colours.TO_COME)
+_REACHED: Final = rgb(colours.REACHED)
+_GROUND: Final = np.array([rgb(colours.LOWLAND), rgb(colours.HIGHLAND)])
 """Colours (ours); a link's hot at full current, the ground's from lowest to highest."""
 _CONTOUR: Final = (92, 84, 66)
 _CONTOUR_ABOVE_M: Final = 0.002

@@ -7,11 +7,12 @@ from typing import Final
 
 import viser
 
+from snakewalk.config import colours
 from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.walk.live_course import ADD, CLEAR, END, NEXT
 
 _HINT: Final = "Shift and a click on the ground add a waypoint, too"
-_BAD: Final = "#b3121a"
+_BAD: Final = colours.FAULT
 
 
 class WaypointPanel:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from snakewalk.config import colours
 from snakewalk.config.arrays import Floats, Image, Ints
+from snakewalk.config.colours import rgb, rgba
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField
@@ -22,12 +24,12 @@ HEAD: Rgba = (0.25, 0.15, 0.08, 1)
 EYE: Rgba = (0.95, 0.80, 0.25, 1)
 PUPIL: Rgba = (0.02, 0.02, 0.02, 1)
 TONGUE: Rgba = (0.75, 0.10, 0.15, 1)
-AHEAD: Rgba = (0.93, 0.33, 0.12, 1)
-REACHED: Rgba = (0.10, 0.62, 0.38, 1)
+AHEAD: Rgba = rgba(colours.TO_COME)
+REACHED: Rgba = rgba(colours.REACHED)
 HIDDEN: Rgba = (0.0, 0.0, 0.0, 0.0)
 """Colour of hidden objects."""
 RING_PARTS = 32
-LOWLAND, HIGHLAND = np.array([96.0, 112, 70]), np.array([214.0, 192, 152])
+LOWLAND, HIGHLAND = (np.array(rgb(one), float) for one in (colours.LOWLAND, colours.HIGHLAND))
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
 SURFACE: Rgba = (0.55, 0.80, 0.92, 0.13)
 CONTOURS = 12

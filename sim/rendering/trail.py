@@ -7,17 +7,19 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from snakewalk.config import colours
 from snakewalk.config.arrays import Floats
+from snakewalk.config.colours import rgba
 from snakewalk.config.heightfield import HeightField
 
 Rgba = tuple[float, float, float, float]
-PATH: Final[Rgba] = (0.98, 0.98, 0.95, 1)
+PATH: Final[Rgba] = rgba(colours.PATH)
 """Colour of the path in force."""
-FORMER: Final[Rgba] = (0.98, 0.98, 0.95, 0.35)
+FORMER: Final[Rgba] = rgba(colours.PATH, 0.35)
 """Colour of a path that another one replaced."""
-TRAIL: Final[Rgba] = (0.20, 0.33, 0.62, 1)
+TRAIL: Final[Rgba] = rgba(colours.HEAD)
 """Colour of the trail of the head."""
-CENTRE: Final[Rgba] = (0.85, 0.30, 0.10, 1)
+CENTRE: Final[Rgba] = rgba(colours.CENTRE)
 """Colour of the trail of the body's centre."""
 AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
 """The world's x and y."""
@@ -74,11 +76,11 @@ class Trail:
         Drawn are the path in force, pale the one before it, and the trails.
         """
         current = int(np.searchsorted(self.starts_s, now_s, side="right")) - 1
-        for k, rgba in ((current - 1, FORMER), (current, PATH)):
+        for k, colour in ((current - 1, FORMER), (current, PATH)):
             for at_m in self.dots_m[k] if k >= 0 else ():
                 mujoco.mjv_initGeom(
                     _next(scene), mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.012), at_m,
-                    np.eye(3).ravel(), rgba,
+                    np.eye(3).ravel(), colour,
                 )  # fmt: skip
         for line in self.lines:
             line.add(scene, now_s)
@@ -122,10 +124,10 @@ def add_axes(
     foot = np.array([*at_m, highest_m + 0.03 * length_m])  # no hill covers a rod
     rod, still = mujoco.mjtGeom.mjGEOM_CAPSULE, (np.zeros(3), np.zeros(3), np.eye(3).ravel())
     _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
-    for axis, (name, rgba) in enumerate(zip("xy", AXES, strict=True)):
+    for axis, (name, colour) in enumerate(zip("xy", AXES, strict=True)):
         along = np.eye(3)[axis] * length_m
         geom = _next(scene)
-        mujoco.mjv_initGeom(geom, rod, *still, rgba)
+        mujoco.mjv_initGeom(geom, rod, *still, colour)
         mujoco.mjv_connector(geom, rod, 0.03 * length_m, foot, foot + along)
         _label(scene, foot + 1.1 * along, name)
 

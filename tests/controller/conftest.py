@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -189,3 +190,18 @@ def make() -> Make:
 @pytest.fixture(scope="session")
 def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     return read_log(make_log(tmp_path_factory.mktemp("run") / "run.mcap"))
+
+
+@pytest.fixture
+def legible_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each figure that a test writes has labelled axes, and text that is whole and large enough."""
+    figure = pytest.importorskip("matplotlib.figure").Figure
+    from tests.helpers.legible_figures import figure_faults
+
+    save = figure.savefig
+
+    def saved(drawn: Any, *args: Any, **options: Any) -> None:
+        save(drawn, *args, **options)
+        assert figure_faults(drawn) == []
+
+    monkeypatch.setattr(figure, "savefig", saved)

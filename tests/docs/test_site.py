@@ -16,13 +16,17 @@ def held(page: Path) -> set[Path]:
         options, _, names = tree.partition("\n\n")
         for name in names.split():
             named = page.parent.glob(f"{name}.md") if ":glob:" in options else None
+            notebook = page.parent / f"{name}.ipynb"
+            if notebook.is_file():
+                found.add(notebook)
+                continue
             for child in named or [page.parent / f"{name}.md"]:
                 found |= {child} | (held(child) if child.is_file() else set())
     return found
 
 
 def test_the_tables_of_contents_hold_every_page_and_no_other() -> None:
-    pages = set(DOCS.rglob("*.md")) - {DOCS / "index.md"}
+    pages = {*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")} - {DOCS / "index.md"}
     assert held(DOCS / "index.md") == pages
 
 

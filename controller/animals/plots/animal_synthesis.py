@@ -8,23 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, INK, PURPLE, SKY
 from snakewalk.controller.animals.legged.animal_synthesis import SynthesisedAnimal
 from snakewalk.controller.animals.legged.prototype import LEGS
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.path import draw_ground
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    PURPLE,
-    SKY,
-    WIDTH_IN,
-    legend_above,
-    save_picture,
-    style,
-)
+from snakewalk.controller.figures.style import WIDTH_IN, legend_above, save_picture, style
 
 _MARGIN_M = 0.3
 _CYCLES = 4
@@ -44,7 +33,7 @@ def draw_animal(made: SynthesisedAnimal, file: Path, title: str) -> None:
     low, high = plan.min(axis=0) - _MARGIN_M, plan.max(axis=0) + _MARGIN_M
     map_in = float(np.clip(0.9 * WIDTH_IN * (high - low)[1] / (high - low)[0], 2.6, 6.0))
     with style():
-        figure = Figure(figsize=(WIDTH_IN, map_in + 4.0), layout="constrained", dpi=80)
+        figure = Figure(figsize=(WIDTH_IN, map_in + 4.0), layout="constrained", dpi=110)
         upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 4.0])[:, 0]
         axes = upper.subplots(1, 1)
         axes.set_xlim(low[0], high[0])
@@ -63,7 +52,7 @@ def _map(axes: Axes, made: SynthesisedAnimal, title: str) -> None:
         draw_ground(axes, made.ground)
     axes.set_aspect("equal")
     way = made.path.position(np.linspace(0.0, made.path.length_m, 400))
-    axes.plot(*way.T, color=INK, linewidth=1.0, linestyle=(0, (5, 3)), label="planned path")
+    axes.plot(*way.T, color=INK, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
     motion = made.motion
     for k, (leg, colour) in enumerate(zip(LEGS, _LEG_COLOURS, strict=True)):
         down = np.flatnonzero(np.diff(motion.on_ground[:, k].astype(int)) == 1) + 1
@@ -75,10 +64,10 @@ def _map(axes: Axes, made: SynthesisedAnimal, title: str) -> None:
     for number, point in enumerate(made.waypoints_m, start=1):
         axes.add_patch(Circle(tuple(point), made.waypoint_radius_m, fill=False, color=GREEN))
         axes.annotate(str(number), tuple(point), color=GREEN, fontweight="bold")
-    axes.set_title(title, pad=24.0)
+    axes.set_title(title, pad=36.0)
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
-    legend_above(axes, 5)
+    legend_above(axes, 3)
 
 
 def _body(axes: Axes, made: SynthesisedAnimal, frame: int) -> None:
@@ -99,6 +88,7 @@ def _contacts(axes: Axes, made: SynthesisedAnimal) -> None:
         axes.plot(cycles, row, color=colour, linewidth=7.0, solid_capstyle="butt")
     axes.set_yticks(range(len(LEGS)), LEGS)
     axes.set_ylim(len(LEGS) - 0.4, -0.6)
+    axes.set_ylabel("foot")
     axes.set_title("on the ground")
     axes.set_xlabel("cycles")
 
@@ -114,6 +104,6 @@ def _heights(axes: Axes, made: SynthesisedAnimal) -> None:
     axes.fill_between(along, ground, ground.min() - 0.02, color=GREY, alpha=0.35, linewidth=0)
     axes.plot(along, motion.hip_m[..., 2].mean(axis=1), color=BLUE, label="hips, mean")
     axes.plot(along, ground, color=INK, linewidth=1.0, label="ground below them")
-    axes.set_xlabel("way of the trunk (m)")
+    axes.set_xlabel("distance along the track of the trunk (m)")
     axes.set_ylabel("height (m)")
     legend_above(axes, 2)

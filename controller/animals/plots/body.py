@@ -10,11 +10,12 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.colours import AMBER, BLUE, INK, RED
 from snakewalk.controller.animals.mesh.body_model import BodyModel
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.figures.style import AMBER, BLUE, INK, RED, save_picture, style
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.images.mesh_files import SKIN_RGB
 from snakewalk.controller.track.bone_motion import BoneMotion
@@ -44,7 +45,7 @@ def draw_body(
     """
     check_picture(file)
     with style():
-        figure = Figure(figsize=(9.0, 4.2), layout="constrained", dpi=88)
+        figure = Figure(figsize=(WIDTH_IN, 4.2), layout="constrained", dpi=110)
         halves: Any = figure.subfigures(1, 2, width_ratios=[1.0, 1.6])
         left, right = halves
         if silhouette is None or texture is None:
@@ -79,7 +80,8 @@ def _sections(axes: Axes, model: BodyModel) -> None:
     axes.plot(s, model.half_height, color=INK, linestyle="--", label="half height")
     axes.set_ylim(0.0, 1.45 * float(max(model.half_width.max(), model.half_height.max())))
     axes.set_xticks([0.0, 1.0], ["head", "tail"])
-    axes.legend(ncols=2, loc="upper center", fontsize=8)
+    axes.legend(ncols=2, loc="upper center", fontsize=8.5)
+    axes.set_ylabel("body lengths")
     axes.set_title("ellipses, over the length")
 
 
@@ -94,7 +96,7 @@ def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image 
     shown = [0] if motion is None else np.linspace(0, len(motion.time_s) - 1, 5).astype(int)[:4]
     rig = None if motion is None else spine_rig(skin, motion.bone_m)
     with style():
-        figure = Figure(figsize=(9.0, 5.6), layout="constrained", dpi=88)
+        figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained", dpi=110)
         panels: Any = figure.subfigures(1 if motion is None else 2, len(shown) // 2 or 1)
         for frame, panel in zip(shown, np.ravel(panels), strict=True):
             corners = (

@@ -6,25 +6,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from snakewalk.config.colours import AMBER, INK, RED, SERIES, SKY
 from snakewalk.controller.animals.fish.match_film import FilmMatch
 from snakewalk.controller.animals.fish.postures import Postures
 from snakewalk.controller.animals.fish.silhouettes import grey
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    INK,
-    PURPLE,
-    RED,
-    SKY,
-    save_picture,
-    style,
-)
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.images.video import open_footage
 
 _SHOWN = 6
-_LINES = (BLUE, AMBER, GREEN, RED, PURPLE, SKY, INK, "#999933")
 
 
 def draw_match(
@@ -44,7 +34,7 @@ def draw_match(
     with style():
         tall = 1.2 + (1.15 if found.angles_rad.shape[1] < 6 else 0.8) * found.angles_rad.shape[1]
         figure = Figure(
-            figsize=(9.6, tall + (2.9 if matched else 0.0)), layout="constrained", dpi=96
+            figsize=(WIDTH_IN, tall + (2.9 if matched else 0.0)), layout="constrained", dpi=110
         )
         if matched is None:
             bottom = figure
@@ -91,7 +81,7 @@ def _angles(rows: list[Axes], found: Postures, known: Postures | None) -> None:
             axes.plot(
                 time, np.degrees(known.angles_rad[:, k]), color=INK, linewidth=2.6, alpha=0.28
             )
-        colour = _LINES[k % len(_LINES)]
+        colour = SERIES[k % len(SERIES)]
         axes.plot(time, np.degrees(found.angles_rad[:, k]), color=colour, linewidth=1.2)
         axes.set_ylabel(f"A{k} (deg)")
     rows[0].set_title(

@@ -5,23 +5,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
+from snakewalk.config.colours import BLUE, GREEN, GREY, INK, PALE, RED
 from snakewalk.controller.animals.fish.fish_synthesis import SynthesisedMotion, SynthesisOptions
 from snakewalk.controller.animals.fish.synthesis import junctions
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    PALE,
-    RED,
-    save_picture,
-    style,
-)
+from snakewalk.controller.figures.style import TIMES, WIDTH_IN, save_picture, style
 
 KINDS = {"glide": GREY, "forward": GREEN, "left": BLUE, "right": RED}
 _BODIES = 40
@@ -36,7 +28,7 @@ def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOption
     """
     check_picture(file)
     with style():
-        figure = Figure(figsize=(9.6, 7.6), layout="constrained", dpi=96)
+        figure = Figure(figsize=(WIDTH_IN, 7.6), layout="constrained", dpi=110)
         upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.0, 1.35])[:, 0]
         left, right = upper.subplots(1, 2, squeeze=False)[0]
         _pieces(left, made)
@@ -53,7 +45,8 @@ def _pieces(axes: Axes, made: SynthesisedMotion) -> None:
         axes.plot(*piece.base[-1], "o", color=KINDS[piece.kind], markersize=3)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(f"{len(made.pieces.pieces)} segments from one posture")
-    axes.set_xlabel(_unit(made))
+    axes.set_xlabel(f"x ({_unit(made)})")
+    axes.set_ylabel(f"y ({_unit(made)})")
     handles = [Line2D([], [], color=colour, label=kind) for kind, colour in KINDS.items()]
     axes.legend(handles=handles, loc="upper left")
 
@@ -73,7 +66,7 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
         axes.plot(*place[k], "o", color=KINDS[piece.kind], markersize=7, zorder=3)
         if count <= 24:
             x, y = 1.16 * place[k]
-            axes.text(x, y, piece.origin, ha="center", va="center", fontsize=7)
+            axes.text(x, y, piece.origin, ha="center", va="center", fontsize=8.5)
     axes.set_xlim(-1.35, 1.35)
     axes.set_ylim(-1.25, 1.25)
     axes.set_aspect("equal")
@@ -86,7 +79,7 @@ def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> Non
     motion = made.motion
     points = motion.points()
     some = np.unique(np.linspace(0, motion.frames - 1, _BODIES).astype(int))
-    bodies = LineCollection(list(points[some]), cmap="viridis_r", linewidths=2.0, capstyle="round")
+    bodies = LineCollection(list(points[some]), cmap=TIMES, linewidths=2.0, capstyle="round")
     bodies.set_array(some / motion.rate_hz)
     axes.plot(motion.base[:, 0], motion.base[:, 1], color=GREY, linewidth=0.8)
     axes.add_collection(bodies)
@@ -98,7 +91,10 @@ def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> Non
         axes.text(x, y, str(k + 1), color=RED, ha="center", va="center", weight="bold")
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(_unit(made))
+    axes.set_xlabel(f"x ({_unit(made)})")
+    axes.set_ylabel(f"y ({_unit(made)})")
+    if isinstance(axes.figure, Figure | SubFigure):
+        axes.figure.colorbar(bodies, ax=axes, pad=0.02, label="time (s)")
     kind = "through control points" if options.through else "at random"
     axes.set_title(f"{made.facts.seconds} s {kind}: {made.facts.pieces_used} segments")
 

@@ -10,20 +10,27 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.colours import (
+    AMBER,
+    BLUE,
+    CENTRE,
+    GREEN,
+    GREY,
+    INK,
+    PATH,
+    PURPLE,
+    REACHED,
+    RED,
+    SKY,
+    TO_COME,
+)
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.path import draw_ground
 from snakewalk.controller.figures.style import (
-    AMBER,
     ANGLES,
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    PURPLE,
-    RED,
-    SKY,
+    TIMES,
     WIDTH_IN,
     legend_above,
     save_picture,
@@ -45,10 +52,10 @@ def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, tit
     check_picture(file)
     low, high = _extent(made)
     wide, tall = high - low
-    map_in = float(np.clip(0.9 * WIDTH_IN * tall / wide, 2.6, 6.0))
+    map_in = float(np.clip(0.85 * WIDTH_IN * tall / wide + 0.8, 2.8, 6.0))
     with style():
-        figure = Figure(figsize=(WIDTH_IN, map_in + 5.6), layout="constrained", dpi=80)
-        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 5.6])[:, 0]
+        figure = Figure(figsize=(WIDTH_IN, map_in + 6.6), layout="constrained", dpi=110)
+        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 6.6])[:, 0]
         axes = upper.subplots(1, 1)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
@@ -71,14 +78,14 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
     centre = points.mean(axis=1)
     targets = made.targets
     way = made.path.position(np.linspace(0.0, made.path.length_m, 400))
-    axes.plot(*way.T, color=INK, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
-    axes.plot(*centre.T, color=BLUE, linewidth=1.6, label="mass centre")
+    axes.plot(*way.T, color=PATH, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
+    axes.plot(*centre.T, color=CENTRE, linewidth=1.6, label="mass centre")
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centre, axis=0).T))])
     length_m = float(np.hypot(*np.diff(points[0], axis=0).T).sum())
     marks = np.arange(0.0, along[-1], _BODY_SPACING * length_m)
     some = np.unique(np.append(np.searchsorted(along, marks), len(points) - 1))
     bodies = LineCollection(
-        list(points[some]), cmap="viridis_r", linewidths=2.6, capstyle="round", zorder=3
+        list(points[some]), cmap=TIMES, linewidths=2.6, capstyle="round", zorder=3
     )
     bodies.set_array(some / made.rate_hz)
     axes.add_collection(bodies)
@@ -87,7 +94,7 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
     axes.plot(*between.T, ".", color=GREY, markersize=5, label="targets between")
     number = np.cumsum(targets.required)
     for k in np.flatnonzero(targets.required):
-        colour = GREEN if k < targets.index else RED
+        colour = REACHED if k < targets.index else TO_COME
         x, y = targets.points_m[k]
         ring = Circle((x, y), targets.radius_m, fill=False, edgecolor=colour, linewidth=1.6)
         axes.add_patch(ring)
@@ -100,8 +107,8 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
     axes.set_aspect("equal")
     axes.set_xlabel("x (m); bodies darker with time, dots are heads")
     axes.set_ylabel("y (m)")
-    legend_above(axes)
-    axes.set_title(title)
+    axes.set_title(title, pad=24.0)
+    legend_above(axes, 3)
 
 
 def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
@@ -118,20 +125,19 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     distance.plot(time[:end], targets.distance_m, color=INK)
     distance.axhline(targets.radius_m, color=GREY, linewidth=0.8, linestyle="--")
     distance.set_ylim(bottom=0.0)
-    distance.set_title("mass centre to target, m (dashed: reached)")
+    distance.set_ylabel("m")
+    distance.set_title("mass centre to target; dashed: radius")
     speed.plot(time, made.plan.speed_m_s, color=BLUE)
     speed.set_ylim(bottom=0.0)
-    speed.set_title("speed, m/s; bends K, rad (dotted)")
+    speed.set_ylabel("m/s", color=BLUE)
+    speed.set_title("speed (line), bend K (dotted)")
     bends = speed.twinx()
     bends.plot(time, made.plan.angles_rad.std(axis=1), color=AMBER, linestyle=":")
     bends.set_ylim(bottom=0.0)
+    bends.set_ylabel("rad", color=AMBER)
     bends.grid(visible=False)
-    at, state = np.array(made.states).T
-    shown = np.append(state, state[-1])
-    states.step(np.append(time[at], time[-1]), shown, color=PURPLE, where="post", linewidth=1.0)
-    states.plot(time[at], state, "o", color=PURPLE, markersize=3)
-    states.set_title(f"state, {len(set(state))} of {len(made.library.shapes_rad)} taken")
-    states.set_xlabel("s")
+    _states(states, made)
+    _behaviour(behaviour, made)
     swing = made.plan.angles_rad - made.plan.angles_rad.mean(axis=1, keepdims=True)
     most = float(np.abs(swing).max())
     angles.imshow(
@@ -140,18 +146,39 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     )  # fmt: skip
     angles.grid(visible=False)
     angles.set_yticks([0.0, 1.0], ["head", "tail"])
-    angles.set_title(f"angles about the mean heading, to {most:.1f} rad")
-    behaviour.plot(time, made.sliding.mean(axis=1), color=RED, label="sliding")
-    behaviour.plot(time, made.head_held, color=GREEN, linestyle="--", label="head held")
-    behaviour.plot(time, made.calm_tail, color=SKY, linestyle="-.", label="calm tail")
-    behaviour.set_ylim(-0.05, 1.3)
-    behaviour.set_yticks([0.0, 0.5, 1.0])
-    behaviour.set_title("behaviour; pulse g, m/s (dotted, right)")
-    behaviour.legend(fontsize=7.5, ncols=3, loc="upper right")
-    pulse = behaviour.twinx()
+    angles.set_title(f"angle about the heading; to ±{most:.1f} rad")
+    angles.set_ylabel("body")
+    tongue.plot(time, made.tongue, color=RED, linewidth=0.8)
+    tongue.set_title("tongue: 0 in, 1 out")
+    tongue.set_ylabel("share")
+    tongue.set_xlabel("time (s)")
+    tongue.set_xlim(0.0, time[-1])
+
+
+def _states(axes: Axes, made: SynthesisedWalk) -> None:
+    """Draw the states over time."""
+    time = made.time_s
+    at, state = np.array(made.states).T
+    shown = np.append(state, state[-1])
+    axes.step(np.append(time[at], time[-1]), shown, color=PURPLE, where="post", linewidth=1.0)
+    axes.plot(time[at], state, "o", color=PURPLE, markersize=3)
+    axes.set_title(f"state, {len(set(state))} of {len(made.library.shapes_rad)} used")
+    axes.set_ylabel("number")
+    axes.set_xlabel("time (s)")
+
+
+def _behaviour(axes: Axes, made: SynthesisedWalk) -> None:
+    """Draw sliding, head and tail as shares, and the pulse on an axis of its own."""
+    time = made.time_s
+    axes.plot(time, made.sliding.mean(axis=1), color=RED, label="sliding")
+    axes.plot(time, made.head_held, color=GREEN, linestyle="--", label="head held")
+    axes.plot(time, made.calm_tail, color=SKY, linestyle="-.", label="calm tail")
+    axes.set_yticks([0.0, 0.5, 1.0])
+    axes.set_ylim(-0.05, 1.6)
+    axes.set_ylabel("share")
+    axes.set_title("behaviour; dotted: pulse g")
+    axes.legend(fontsize=8.5, ncols=3, loc="upper right", columnspacing=0.7, handlelength=1.2)
+    pulse = axes.twinx()
     pulse.plot(time, made.pulse_m_s.mean(axis=1), color=INK, linestyle=":")
     pulse.grid(visible=False)
-    tongue.plot(time, made.tongue, color=RED, linewidth=0.8)
-    tongue.set_title("tongue: 0 drawn in, 1 out")
-    tongue.set_xlabel("s")
-    tongue.set_xlim(0.0, time[-1])
+    pulse.set_ylabel("m/s")

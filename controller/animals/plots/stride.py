@@ -6,17 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from snakewalk.config.colours import BLUE, GREY, INK
 from snakewalk.controller.animals.legged.prototype import LEGS
 from snakewalk.controller.animals.legged.stride import Stride, model_ahead
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.figures.style import (
-    BLUE,
-    GREY,
-    INK,
-    WIDTH_IN,
-    save_picture,
-    style,
-)
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 
 
 def draw_stride(found: Stride, file: Path, title: str) -> None:
@@ -28,15 +22,17 @@ def draw_stride(found: Stride, file: Path, title: str) -> None:
     """
     check_picture(file)
     with style():
-        figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained", dpi=80)
+        figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained", dpi=110)
         panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
         for k, axes in enumerate(panels):
             _foot(axes, found, k)
         for axes in panels[2:]:
-            axes.set_xlabel("cycles since the front left foot came down")
+            axes.set_xlabel("cycles since front left touched down")
         for axes in panels[::2]:
-            axes.set_ylabel("ahead of the girdle (body lengths)")
+            axes.set_ylabel("ahead of girdle (body lengths)")
         figure.suptitle(title)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
@@ -47,7 +43,11 @@ def _foot(axes: Axes, found: Stride, k: int) -> None:
     cycle = np.linspace(0.0, 1.0, 401)
     on = (cycle - foot.down) % 1.0 < foot.duty
     low, high = np.nanmin(found.ahead), np.nanmax(found.ahead)
-    axes.fill_between(cycle, low, high, where=on, color=GREY, alpha=0.25, linewidth=0)
-    axes.plot(found.phase % 1.0, found.ahead[:, k], ".", color=BLUE, markersize=3.0)
-    axes.plot(cycle, model_ahead(found, k, cycle), color=INK, linewidth=1.2)
+    axes.fill_between(
+        cycle, low, high, where=on, color=GREY, alpha=0.25, linewidth=0, label="on the ground"
+    )
+    axes.plot(
+        found.phase % 1.0, found.ahead[:, k], ".", color=BLUE, markersize=3.0, label="tracked"
+    )
+    axes.plot(cycle, model_ahead(found, k, cycle), color=INK, linewidth=1.2, label="model")
     axes.set_title(f"{LEGS[k]}: {100.0 * foot.duty:.0f} % on the ground, down at {foot.down:.2f}")

@@ -11,19 +11,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, INK, PALE
 from snakewalk.controller.capture.plots.recording import midlines
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.body_map import body_map
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    PALE,
-    save_picture,
-    style,
-)
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.track.analysis import Analysis
 from snakewalk.controller.track.undulation import even_points
 
@@ -42,24 +34,24 @@ def draw_analysis(found: Analysis, file: Path) -> None:
     track, pulse, unknown = found.track, found.pulse, found.pulse_not_told
     scale = track.rate_hz / track.angles_rad.shape[1]
     with style():
-        figure = Figure(figsize=(10.5, 8.1), layout="constrained", dpi=76)
+        figure = Figure(figsize=(WIDTH_IN, 8.4), layout="constrained", dpi=110)
         (tracks, angles), (swings, speeds), (against, errors) = figure.subplots(
-            3, 2, gridspec_kw={"width_ratios": [1.0, 1.7]}
+            3, 2, gridspec_kw={"width_ratios": [1.0, 1.5]}
         )
         _tracks(tracks, found)
         swing = track.angles_rad - track.angles_rad.mean(axis=1, keepdims=True)
-        body_map(figure, angles, track, swing, "rad")
-        angles.set_title("tangent angle about the mean heading")
+        body_map(figure, angles, track, swing, "angle (rad)")
+        angles.set_title("angle about the mean heading")
         _swings(swings, found)
         if unknown is None:
             _speeds(figure, speeds, found, scale)
-            body_map(figure, errors, track, pulse.body_error_rad, "rad", kept=pulse.frame)
-            errors.set_title("error of one pulse speed for the whole body")
+            body_map(figure, errors, track, pulse.body_error_rad, "error (rad)", kept=pulse.frame)
+            errors.set_title("error of one speed for the whole body")
             _error_by_slope(against, found)
         else:
             for axes in (speeds, errors, against):
                 axes.set_axis_off()
-            speeds.text(0.0, 0.5, f"pulse speed not told:\n{unknown}", fontsize=9, wrap=True)
+            speeds.text(0.0, 0.5, f"pulse speed unknown:\n{unknown}", fontsize=9, wrap=True)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
@@ -67,19 +59,21 @@ def draw_analysis(found: Analysis, file: Path) -> None:
 def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
     """Draw the pulse speed of body and time, body lengths a second."""
     pulse = found.pulse
-    known = np.isfinite(pulse.points_per_frame)
-    usual = abs(pulse.typical) * scale
-    most = float(np.percentile(np.abs(pulse.points_per_frame[known]), 95.0)) * scale
+    speed = pulse.points_per_frame * scale
+    low, high = np.nanpercentile(speed, [2.5, 97.5]).tolist()
+    if low < 0.0 < high:
+        high = max(-low, high)
+        low = -high
     body_map(
         figure,
         axes,
         found.track,
-        pulse.points_per_frame * scale,
-        "body lengths a second",
+        speed,
+        "body lengths per s",
         kept=pulse.frame,
-        limit=max(1e-9, min(max(most, usual), 3.0 * usual)),
+        limits=(low, max(high, low + 1e-9)),
     )
-    axes.set_title("pulse speed, positive towards the tail; grey: not known")
+    axes.set_title("pulse speed to the tail; grey: unknown")
 
 
 def _tracks(axes: Axes, found: Analysis) -> None:
@@ -87,7 +81,7 @@ def _tracks(axes: Axes, found: Analysis) -> None:
     body = even_points(found.track)
     if body is None:
         midlines(axes, found.track)
-        axes.set_title("shapes (places not recorded)")
+        axes.set_title("shapes (no places)")
         return
     some = np.unique(np.linspace(0, len(body) - 1, _BODIES).astype(int))
     axes.add_collection(LineCollection(list(body[some]), linewidths=1.0, colors=PALE, zorder=1))
@@ -98,9 +92,10 @@ def _tracks(axes: Axes, found: Analysis) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     axes.xaxis.set_major_locator(MaxNLocator(5))
-    axes.legend(loc="best", fontsize=8, handlelength=1.2)
-    axes.set_xlabel("body lengths")
-    axes.set_title("tracks of head, middle and tail")
+    axes.legend(loc="best", fontsize=8.5, handlelength=1.0)
+    axes.set_xlabel("x (body lengths)")
+    axes.set_ylabel("y (body lengths)")
+    axes.set_title("tracks")
 
 
 def _error_by_slope(axes: Axes, found: Analysis) -> None:
@@ -114,16 +109,16 @@ def _error_by_slope(axes: Axes, found: Analysis) -> None:
         np.array([np.percentile(part, [25.0, 50.0, 75.0]) for part in parts[1]]).T,
     )
     axes.fill_between(x, low, high, color=PALE)
-    axes.plot(x, middle, color=BLUE, label="median, and half of all")
+    axes.plot(x, middle, color=BLUE, label="median, 25 to 75 %")
     fit = found.error_slope
     if fit is not None:
-        axes.plot(x, fit[0] * x, color=INK, linestyle="--", label=f"{fit[0]:.2f} points")
+        axes.plot(x, fit[0] * x, color=INK, linestyle="--", label=f"fit: {fit[0]:.2f} points")
     axes.set_xlim(0.0, float(x[-1]))
     axes.set_ylim(0.0, None)
-    axes.set_xlabel("slope along the body, rad a point")
-    axes.set_ylabel("rad")
-    axes.legend(loc="upper left", fontsize=8)
-    axes.set_title("that error by the slope")
+    axes.set_xlabel("slope along the body (rad per point)")
+    axes.set_ylabel("error (rad)")
+    axes.legend(loc="upper left", fontsize=8.5)
+    axes.set_title("error by the slope")
 
 
 def _swings(axes: Axes, found: Analysis) -> None:
@@ -132,7 +127,7 @@ def _swings(axes: Axes, found: Analysis) -> None:
     along = np.linspace(0.0, 1.0, len(how.lateral))
     axes.plot(along, how.lateral, color=BLUE)
     axes.set_ylim(0.0, 1.15 * float(how.lateral.max()))
-    axes.set_ylabel("sideways, body lengths", color=BLUE)
+    axes.set_ylabel("sideways (body lengths)", color=BLUE)
     axes.set_xticks([0.0, 0.5, 1.0], ["head", "middle", "tail"])
     other = axes.twinx()
     other.grid(visible=False)
@@ -140,5 +135,5 @@ def _swings(axes: Axes, found: Analysis) -> None:
     other.spines["right"].set_color(GREY)
     other.plot(0.5 * (along[1:] + along[:-1]), how.angle_rad, color=INK, linestyle="--")
     other.set_ylim(0.0, 1.15 * float(how.angle_rad.max()))
-    other.set_ylabel("angle, rad (dashed)", color=INK)
-    axes.set_title("amplitude along the body")
+    other.set_ylabel("angle (rad, dashed)", color=INK)
+    axes.set_title("amplitude")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.body_map import body_map
-from snakewalk.controller.figures.style import save_picture, style
+from snakewalk.controller.figures.style import TIMES, WIDTH_IN, save_picture, style
 from snakewalk.controller.track.track import Track
 
 _SHOWN = 24  # midlines over a recording: more run together
@@ -24,30 +24,33 @@ def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
     """
     check_picture(file)
     with style():
-        figure = Figure(figsize=(9.0, 2.9 * len(tracks)), layout="constrained", dpi=96)
+        figure = Figure(figsize=(WIDTH_IN, 2.9 * len(tracks)), layout="constrained", dpi=110)
         panels = figure.subplots(
             len(tracks), 2, squeeze=False, gridspec_kw={"width_ratios": [1.0, 1.7]}
         )
         for (track, caption), (left, right) in zip(tracks, panels, strict=True):
-            midlines(left, track)
+            figure.colorbar(midlines(left, track), ax=left, pad=0.02, label="time (s)")
             swing = track.angles_rad - track.angles_rad.mean(axis=1, keepdims=True)
-            body_map(figure, right, track, swing, "tangent angle, rad")
+            body_map(figure, right, track, swing, "tangent angle (rad)")
+            right.set_title("angle about the mean heading")
             left.set_title(caption)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 
-def midlines(axes: Axes, track: Track) -> None:
-    """Draw bodies where they were, light ones first; heads as dots."""
+def midlines(axes: Axes, track: Track) -> LineCollection:
+    """Draw bodies where they were, light ones first; heads as dots; return the lines."""
     some = np.unique(np.linspace(0, track.frames - 1, _SHOWN).astype(int))
     bodies = track.points[some]
     scale, unit = (1.0, "body lengths") if track.length_m is None else (1e3, "mm")
     bodies = (bodies - bodies.reshape(-1, 2).mean(axis=0)) * scale
-    lines = LineCollection(list(bodies), linewidths=1.3, cmap="viridis_r", capstyle="round")
+    lines = LineCollection(list(bodies), linewidths=1.3, cmap=TIMES, capstyle="round")
     lines.set_array(track.time_s[some])
     axes.add_collection(lines)
     heads = bodies[:, 0]
-    axes.scatter(heads[:, 0], heads[:, 1], c=track.time_s[some], cmap="viridis_r", s=9, zorder=3)
+    axes.scatter(heads[:, 0], heads[:, 1], c=track.time_s[some], cmap=TIMES, s=9, zorder=3)
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
-    axes.set_xlabel(unit)
+    axes.set_xlabel(f"x ({unit})")
+    axes.set_ylabel(f"y ({unit})")
+    return lines

@@ -3,15 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREY,
-    canvas,
-    legend_above,
-    mark_waypoints,
-    trace,
-)
+from snakewalk.config.colours import ASKED, GOAL, GREY, MEASURED
+from snakewalk.controller.figures.style import canvas, legend_above, mark_waypoints, trace
 from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -27,9 +20,9 @@ def advance_figure(record: RunRecord) -> Figure | None:
     speed = panels[0]
     measured = "simulated" if record.header.backend == "sim" else "measured"
     for values, colour, label in (
-        (pose.pulse_m_s, GREY, "pulse speed u"),
-        (pose.predicted_speed_m_s, AMBER, "predicted"),
-        (pose.speed_m_s, BLUE, measured),
+        (pose.pulse_m_s, ASKED, "pulse speed u"),
+        (pose.predicted_speed_m_s, GOAL, "predicted"),
+        (pose.speed_m_s, MEASURED, measured),
     ):
         if np.isfinite(values).any():
             trace(speed, pose.time_s, values, colour, label)
@@ -42,7 +35,7 @@ def advance_figure(record: RunRecord) -> Figure | None:
         legend_above(speed)
     if on_path:
         error = panels[1]
-        trace(error, pose.time_s, distance, BLUE, "distance")
+        trace(error, pose.time_s, distance, MEASURED, "distance")
         mean = float(np.nanmean(distance))
         error.axhline(
             mean, color=GREY, linewidth=1.0, linestyle=(0, (4, 3)), label=f"mean {mean:.3f} m"

@@ -4,16 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREY,
-    RED,
-    SKY,
-    canvas,
-    legend_above,
-    trace,
-)
+from snakewalk.config.colours import GREY, HIGHEST, MEAN, RED, SUPPLY
+from snakewalk.controller.figures.style import canvas, legend_above, trace
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import FLAT_V
 
@@ -36,8 +28,8 @@ def _current(axes: Axes, record: RunRecord) -> None:
     cycle = record.cycle
     size = np.abs(cycle.current_a)
     for values, colour, label in (
-        (size.max(axis=1), RED, "highest joint"),
-        (size.mean(axis=1), BLUE, "mean of all joints"),
+        (size.max(axis=1), HIGHEST, "highest joint"),
+        (size.mean(axis=1), MEAN, "mean of all joints"),
     ):
         trace(axes, cycle.time_s, values, colour, label)
     peak = float(np.nanmax(np.append(size, 0.0)))
@@ -69,12 +61,12 @@ def _slow(axes: Axes, record: RunRecord) -> None:
     time = np.append(slow.time_s, record.end_s)
     for k, joint in enumerate(slow.temperature_c.T):
         axes.step(
-            time, np.append(joint, joint[-1]), where="post", color=SKY, linewidth=0.8, alpha=0.7,
+            time, np.append(joint, joint[-1]), where="post", color=MEAN, linewidth=0.8, alpha=0.7,
             label="each servo" if k == 0 else None,
         )  # fmt: skip
     hottest = np.nanmax(np.where(np.isnan(slow.temperature_c), -1.0, slow.temperature_c), axis=1)
     hottest[hottest < 0.0] = np.nan
-    axes.step(time, np.append(hottest, hottest[-1]), where="post", color=RED, label="hottest")
+    axes.step(time, np.append(hottest, hottest[-1]), where="post", color=HIGHEST, label="hottest")
     axes.set_ylabel("temperature (°C)")
     limit = record.header.run.safety.temperature_limit_c
     axes.set_title(f"Temperature (limit {limit:g} °C) and supply")
@@ -88,13 +80,13 @@ def _slow(axes: Axes, record: RunRecord) -> None:
         legend_above(axes)
         return
     volts = axes.twinx()
-    volts.step(time, np.append(lowest, lowest[-1]), where="post", color=AMBER, linewidth=1.2)
-    volts.set_ylabel("lowest supply (V)", color=AMBER)
-    volts.tick_params(axis="y", colors=AMBER)
+    volts.step(time, np.append(lowest, lowest[-1]), where="post", color=SUPPLY, linewidth=1.2)
+    volts.set_ylabel("lowest supply (V)", color=SUPPLY)
+    volts.tick_params(axis="y", colors=SUPPLY)
     volts.grid(visible=False)
     if np.isfinite(lowest).any():
         volts.set_ylim(np.nanmin(lowest) - 1.0, np.nanmax(lowest) + 0.15)
     volts.spines["right"].set_visible(True)
     volts.spines["right"].set_color(GREY)
-    axes.plot([], [], color=AMBER, label="lowest supply")
+    axes.plot([], [], color=SUPPLY, label="lowest supply")
     legend_above(axes)

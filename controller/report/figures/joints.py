@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.figures.style import ANGLES, canvas, name_joints
+from snakewalk.config.colours import PALE
+from snakewalk.controller.figures.style import ANGLES, canvas, colour_bar, name_joints
 from snakewalk.controller.runlog.record import RunRecord
 
 _COLUMNS = 1400
@@ -37,12 +38,11 @@ def joints_figure(record: RunRecord) -> Figure | None:
         )  # fmt: skip
         axes.set_title(title)
         axes.grid(visible=False)
-        axes.set_facecolor("#c9d1d8")
+        axes.set_facecolor(PALE)
         name_joints(axes, record.header.robot.joint_names)
-        bar = figure.colorbar(image, ax=axes, pad=0.01, aspect=12)
-        bar.set_label("rad")
-        bar.outline.set_visible(False)
-    panels[-1].set_xlabel("time (s)      the head is at the top; grey: no reply in that cycle")
+        axes.set_ylabel("joint")
+        colour_bar(figure, image, axes, "rad")
+    panels[-1].set_xlabel("time (s); the head is at the top; grey: no reply in that cycle")
     return figure
 
 

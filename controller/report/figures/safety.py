@@ -5,20 +5,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    RED,
-    canvas,
-    legend_above,
-    name_joints,
-)
+from snakewalk.config.colours import BLUE, FAULT, GREY, INK, REACHED, WARNING
+from snakewalk.controller.figures.style import canvas, legend_above, name_joints
 from snakewalk.controller.runlog.record import RunRecord
 
-_EVENT_COLOURS = {"info": BLUE, "warning": AMBER, "error": RED}
+_EVENT_COLOURS = {"info": BLUE, "warning": WARNING, "error": FAULT}
 
 
 def safety_figure(record: RunRecord) -> Figure | None:
@@ -36,7 +27,7 @@ def safety_figure(record: RunRecord) -> Figure | None:
         _raster(panels[1], record)
     _line(panels[0], record)
     if calm:
-        panels[0].set_title("Events; every command passed unchanged, every read was answered")
+        panels[0].set_title("Events; no command was changed, every read was answered")
     panels[-1].set_xlabel("time (s)")
     panels[-1].set_xlim(0.0, max(record.end_s, 1e-3))
     return figure
@@ -44,17 +35,18 @@ def safety_figure(record: RunRecord) -> Figure | None:
 
 def _line(axes: Axes, record: RunRecord) -> None:
     for event in record.events:
-        colour = GREEN if event.kind == "waypoint" else _EVENT_COLOURS.get(event.level, INK)
+        colour = REACHED if event.kind == "waypoint" else _EVENT_COLOURS.get(event.level, INK)
         row = {"info": 0, "warning": 1, "error": 2}.get(event.level, 0)
         axes.scatter(event.time_s, row, marker="D", s=26, color=colour, zorder=3, clip_on=False)
     axes.set_yticks([0, 1, 2], ["info", "warning", "error"])
     axes.set_ylim(-0.6, 2.6)
+    axes.set_ylabel("level")
     axes.set_title("Events")
 
 
 def _raster(axes: Axes, record: RunRecord) -> None:
     cycle = record.cycle
-    for kind, colour in (("clamp", AMBER), ("veto", RED)):
+    for kind, colour in (("clamp", WARNING), ("veto", FAULT)):
         time, joint = _marks(record, kind)
         label = f"{kind} ({cycle.verdict.count(kind)} cycles)"
         axes.scatter(time, joint, marker="s", s=9, linewidths=0, color=colour, label=label)
@@ -64,8 +56,9 @@ def _raster(axes: Axes, record: RunRecord) -> None:
     )
     axes.set_ylim(cycle.valid.shape[1] - 0.5, -0.5)
     name_joints(axes, record.header.robot.joint_names)
-    axes.set_title("Commands changed by safety, and reads that failed")
-    legend_above(axes)
+    axes.set_ylabel("joint")
+    axes.set_title("Changed commands and failed reads")
+    legend_above(axes, 3)
 
 
 def _marks(record: RunRecord, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -3,15 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREY,
-    canvas,
-    legend_above,
-    mark_waypoints,
-    trace,
-)
+from snakewalk.config.colours import AMBER, BLUE, GREY
+from snakewalk.controller.figures.style import canvas, legend_above, mark_waypoints, trace
 from snakewalk.controller.metrics.ground_slope import ground_slope
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord

@@ -3,15 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREY,
-    RED,
-    canvas,
-    legend_above,
-    trace,
-)
+from snakewalk.config.colours import AMBER, BLUE, GREY, RED
+from snakewalk.controller.figures.style import canvas, legend_above, trace
 from snakewalk.controller.metrics.timing import skipped_cycles
 from snakewalk.controller.runlog.record import RunRecord
 

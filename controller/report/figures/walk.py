@@ -5,15 +5,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from snakewalk.config.arrays import Bools, Ints
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    RED,
-    canvas,
-    legend_above,
-)
+from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, PALE, RED
+from snakewalk.controller.figures.style import canvas, legend_above
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -28,19 +21,19 @@ def walk_figure(record: RunRecord) -> Figure | None:
     figure, panels = canvas(2 if many else 1, 5.4 if many else 3.0)
     if many:
         states = panels[0]
-        states.plot(number, walk.state, color="#dbe3ea", linewidth=0.8, zorder=1)
+        states.plot(number, walk.state, color=PALE, linewidth=0.8, zorder=1)
         size = float(np.clip(1800 / steps, 6, 26))
         for chosen, colour, label in zip(
             _kinds_of_decision(walk.state),
             (GREEN, BLUE, AMBER),
-            ("state started", "state continued", "state repeated"),
+            ("started", "continued", "repeated"),
             strict=True,
         ):
             states.scatter(
                 number[chosen], walk.state[chosen], s=size, color=colour, label=label, zorder=2
             )
         is_wide = walk.carrier_rad > 0.0
-        label = f"on wide waves, {is_wide.mean():.0%}"
+        label = f"wide waves, {is_wide.mean():.0%}"
         if is_wide.any():
             states.fill_between(
                 number, 0.0, 1.0, where=is_wide, step="mid", color=GREY, alpha=0.25, linewidth=0.0,

@@ -8,25 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    PURPLE,
-    RED,
-    SKY,
-    WIDTH_IN,
-    save_picture,
-    style,
-    thin,
-)
+from snakewalk.config.colours import GREY, SERIES
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style, thin
 from snakewalk.controller.studies.run_comparison import ComparedRun
 
 _OF_THE_POSE = ("path_error_m", "speed_m_s")
 """Panels that are dashed where the pose was dead-reckoned."""
-_COLOURS = (BLUE, RED, GREEN, AMBER, PURPLE, SKY, INK, GREY)
 
 
 def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
@@ -52,7 +39,7 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
             for number, (time_s, value) in enumerate(zip(times, values, strict=True)):
                 if np.isfinite(value).any():
                     at, _, mean, _ = thin(time_s, value)
-                    colour = _COLOURS[number % len(_COLOURS)]
+                    colour = SERIES[number % len(SERIES)]
                     is_solid = key not in _OF_THE_POSE or runs[number].summary.is_measured
                     dash = "-" if is_solid else "--"
                     axes.plot(at, mean, color=colour, linewidth=1.1, linestyle=dash)
@@ -71,7 +58,7 @@ def _draw_tracks(axes: Axes, runs: Sequence[ComparedRun]) -> None:
     for number, run in enumerate(runs):
         axes.plot(
             *run.centre_m.T,
-            color=_COLOURS[number % len(_COLOURS)],
+            color=SERIES[number % len(SERIES)],
             label=f"{run.name} ({run.pose})",
             linewidth=1.3,
             linestyle="-" if run.summary.is_measured else "--",
@@ -87,4 +74,4 @@ def _draw_tracks(axes: Axes, runs: Sequence[ComparedRun]) -> None:
     axes.set_title("Centre of mass from above")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
-    axes.legend(loc="upper left")
+    axes.figure.legend(loc="outside upper left")

@@ -2,53 +2,61 @@
 
 from pathlib import Path
 
-import matplotlib
-import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
-from snakewalk.controller.figures.style import save_picture
+from snakewalk.config.colours import GREY, SERIES
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.studies.sweep_table import UNITS, number, pace
 
-matplotlib.use("Agg")
-
-_COLOURS = ("#1f6fb2", "#c8553d", "#4f8a4f", "#7a5195")
+_ACROSS = 3
 
 
 def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
     """Draw small multiples, a panel a gait, a colour a robot, a ring around the defaults."""
     gaits = list(dict.fromkeys(row["gait"] for row in rows))
     robots = list(dict.fromkeys(row["robot"] for row in rows))
-    across = min(4, len(gaits))
+    colours = {robot: SERIES[k % len(SERIES)] for k, robot in enumerate(robots)}
+    across = min(_ACROSS, len(gaits))
     down = -(-len(gaits) // across)
-    figure, axes = plt.subplots(
-        down, across, figsize=(3.2 * across, 2.6 * down), squeeze=False, layout="constrained"
-    )
-    for panel in axes.flat[len(gaits) :]:
-        panel.axis("off")
-    for panel, gait in zip(axes.flat, gaits, strict=False):
-        measured = False
-        for colour, robot in zip(_COLOURS, robots, strict=False):
-            some = [r for r in rows if (r["gait"], r["robot"]) == (gait, robot) and r["cycles"]]
-            paces = [pace(row) for row in some]
-            cost = [number(r, "cost_of_transport") for r in some]
-            measured = measured or any(value > 0.0 for value in cost)
-            panel.scatter(paces, cost, s=9, color=colour, alpha=0.75, linewidths=0, label=robot)
-            for r, x, y in zip(some, paces, cost, strict=True):
-                if r["number"] == "0":
-                    panel.scatter([x], [y], s=60, facecolors="none", edgecolors=colour)
-        panel.set_title(gait, fontsize=10)
-        panel.set_xlabel(UNITS[GAITS[gait].aim], fontsize=8)
-        panel.xaxis.set_major_locator(MaxNLocator(4))
-        panel.set_yscale("log" if measured else "linear")  # none moved far enough to have a cost
-        panel.tick_params(labelsize=7)
-        panel.spines[["top", "right"]].set_visible(False)
-    figure.supylabel("cost of transport (log); rings: defaults", fontsize=9)
-    handles = [
-        Line2D([], [], marker="o", ls="", color=colour, label=robot)
-        for colour, robot in zip(_COLOURS, robots, strict=False)
-    ]
-    figure.legend(handles=handles, loc="outside upper right", fontsize=8, ncols=4, frameon=False)
-    save_picture(figure, path, dpi=110)
-    plt.close(figure)
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, 0.7 + 2.3 * down), layout="constrained")
+        axes = figure.subplots(down, across, squeeze=False)
+        for panel in axes.flat[len(gaits) :]:
+            panel.set_axis_off()
+        for panel, gait in zip(axes.flat, gaits, strict=False):
+            _panel(panel, gait, [row for row in rows if row["gait"] == gait], colours)
+        handles = [
+            Line2D([], [], color=colours[robot], label=robot, marker="o", linestyle="")
+            for robot in robots
+        ]
+        ring = Line2D([], [], color=GREY, markersize=9, markerfacecolor="none", marker="o",
+                      linestyle="", label="default parameters")  # fmt: skip
+        figure.legend(handles=[*handles, ring], loc="outside upper center", ncols=4)
+        save_picture(figure, path, dpi=110)
+
+
+def _panel(axes: Axes, gait: str, rows: list[dict[str, str]], colours: dict[str, str]) -> None:
+    """Draw the runs of one gait."""
+    is_measured = False
+    for robot, colour in colours.items():
+        some = [r for r in rows if r["robot"] == robot and r["cycles"]]
+        paces = [pace(row) for row in some]
+        cost = [number(r, "cost_of_transport") for r in some]
+        is_measured = is_measured or any(value > 0.0 for value in cost)
+        axes.scatter(paces, cost, s=11, color=colour, alpha=0.75, linewidths=0)
+        for r, x, y in zip(some, paces, cost, strict=True):
+            if r["number"] == "0":
+                axes.scatter([x], [y], s=70, facecolors="none", edgecolors=colour)
+    axes.set_title(gait)
+    axes.set_ylabel("cost of transport")
+    axes.set_xlabel(f"pace ({UNITS[GAITS[gait].aim]})")
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    if is_measured:  # else none moved far enough to have a cost
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=7))
+        axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())

@@ -10,14 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Rectangle
 
-from snakewalk.controller.figures.style import GREEN, INK, PALE, RED, save_picture
+from snakewalk.config.colours import BLUE, INK, PALE, RED
+from snakewalk.controller.figures.style import save_picture
 from snakewalk.controller.studies.trials import CaseSummary
 
 matplotlib.use("Agg")
 
-_SHARE = LinearSegmentedColormap.from_list("share", [RED, "#f6e7c8", GREEN])
+_SHARE = LinearSegmentedColormap.from_list("share", [RED, "#f7f2e4", BLUE])
 _CAUSES = 3
-"""Largest number of causes in a cell."""
+"""Largest number of lines about causes in a cell."""
 
 
 def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
@@ -73,14 +74,23 @@ def _label(names: list[str]) -> str:
     return names[0].replace("world.", "") if names else ""
 
 
+def _shown_causes(row: CaseSummary) -> list[tuple[str, int]]:
+    """Return the most frequent causes, and how many runs failed for all others."""
+    causes = list(row.causes.items())
+    if len(causes) <= _CAUSES:
+        return causes
+    shown = causes[: _CAUSES - 1]
+    return [*shown, ("other", sum(row.causes.values()) - sum(count for _, count in shown))]
+
+
 def _draw_cell(panel: Axes, x: int, y: int, row: CaseSummary) -> None:
     complete = row.runs - sum(row.causes.values())
     share = complete / row.runs if row.runs else 0.0
     colour = _SHARE(share) if row.runs else PALE
     panel.add_patch(Rectangle((x - 0.48, y - 0.48), 0.96, 0.96, color=colour, linewidth=0))
-    causes = [f"{count} {cause}" for cause, count in list(row.causes.items())[:_CAUSES]]
+    causes = [f"{count} {cause}" for cause, count in _shown_causes(row)]
     panel.text(
         x, y + 0.3, f"{complete} of {row.runs}",
         ha="center", va="center", fontsize=9, fontweight="bold", color=INK,
     )  # fmt: skip
-    panel.text(x, y + 0.12, "\n".join(causes), ha="center", va="top", fontsize=7.5, color=INK)
+    panel.text(x, y + 0.12, "\n".join(causes), ha="center", va="top", fontsize=8.5, color=INK)

@@ -6,17 +6,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from snakewalk.config.colours import AMBER, BLUE, GREEN, INK, PURPLE, RED
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.figures.style import (
-    AMBER,
-    BLUE,
-    GREEN,
-    INK,
-    PURPLE,
-    RED,
-    save_picture,
-    style,
-)
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.studies.graph_study import StudyResult
 
 _COLORS = {
@@ -43,8 +35,8 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
     columns = min(3, len(graphs))
     rows = -(-len(graphs) // columns)
     with style():
-        size = (3.2 * max(columns, 1.7), 0.7 + 2.4 * rows)
-        figure = Figure(figsize=size, layout="constrained", dpi=96)
+        size = (WIDTH_IN * max(columns, 1.7) / 3.0, 1.0 + 2.4 * rows)
+        figure = Figure(figsize=size, layout="constrained", dpi=110)
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         for axes, graph in zip(panels.flat, graphs, strict=False):
             for result in (one for one in results if one.graph == graph):
@@ -57,10 +49,10 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
         for axes in panels.flat[len(graphs) :]:
             axes.set_axis_off()
         for axes in panels[:, 0]:
-            axes.set_ylabel("states seen, %")
+            axes.set_ylabel("states seen (%)")
         for axes in panels[-1]:
-            axes.set_xlabel("steps / |V|  (dot: all seen, mean)")
+            axes.set_xlabel("steps / |V| (dot: all seen)")
         handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)

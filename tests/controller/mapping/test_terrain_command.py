@@ -16,6 +16,8 @@ from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.mapping.stereo_ground import CameraStand
 from snakewalk.controller.terrain.planner import TerrainPlanner
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 
 def call(*words: object) -> dict[str, object]:
     found = CliRunner().invoke(app, [*map(str, words), "--json"])

@@ -28,6 +28,8 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.replay import differences, replay
 from tests.helpers.in_process import leave_out_pages
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 runner = CliRunner()
 
 

@@ -13,6 +13,8 @@ from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.gaits.backbone import fit_backbone
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 runner = CliRunner()
 RUN_M = np.linspace(0.0, 1.4, 300)
 HELIX_M = np.stack(

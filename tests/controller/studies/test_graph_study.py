@@ -11,6 +11,8 @@ from snakewalk.controller.shape.walks import Walk
 from snakewalk.controller.studies.graph_study import StudyResult, return_gaps, run_study
 from tests.helpers.command import snakewalk
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 
 def walked(path: list[int], states: int) -> Walk:
     selected = np.bincount(path, minlength=states)

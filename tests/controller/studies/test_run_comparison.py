@@ -14,6 +14,8 @@ from snakewalk.controller.console import options
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.run_comparison import compared_run, differing, log_names
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 Make = Callable[..., Path]
 
 

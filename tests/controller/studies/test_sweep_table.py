@@ -15,6 +15,8 @@ from snakewalk.controller.studies.sweep_measure import Measurement
 from snakewalk.controller.studies.sweep_points import Point
 from snakewalk.controller.studies.sweep_table import COLUMNS, SweepTable, digest, read_table
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 POINTS = [
     Point("lateral-undulation", "yaw16", "flat", n, 0, 10.0, {"waves": 1.0 + 0.1 * n})
     for n in range(6)

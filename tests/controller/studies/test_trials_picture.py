@@ -47,6 +47,14 @@ def test_a_cell_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
     assert worst.get_xy() == pytest.approx((1.52, 0.52))  # the last slope and friction
 
 
+def test_a_cell_accounts_for_every_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case("ramp-10-up", "walk")
+    causes = ("climb", "climb", "climb", "slip", "slip", "roll", "joint", "time")
+    trials = [Trial(case, k, cause=cause) for k, cause in enumerate(causes)]
+    (axes,) = figure_of(monkeypatch, [case], [*trials, Trial(case, 9, complete=True)]).axes
+    assert [text.get_text() for text in axes.texts] == ["1 of 9", "3 climb\n2 slip\n3 other"]
+
+
 def test_worlds_are_an_axis(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = [Case("flat-square", "walk", world=world) for world in ("flat", "ramp-10")]
     (axes,) = figure_of(monkeypatch, cases, []).axes

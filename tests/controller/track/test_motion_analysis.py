@@ -18,6 +18,8 @@ from snakewalk.controller.track.track import Track, track_from_points
 from snakewalk.controller.walk.angle_track import AngleTrack
 from tests.helpers.command import snakewalk
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 N = np.arange(100)
 
 

@@ -16,6 +16,8 @@ from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.track.readers.load import load_track
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 PNG = b"\x89PNG"
 
 

@@ -22,6 +22,8 @@ from snakewalk.controller.track.readers.load import load_keypoints
 from tests.helpers.command import snakewalk
 from tests.oracles.tracked_animal import NOISE, table, tracked
 
+pytestmark = pytest.mark.usefixtures("legible_figures")
+
 TRACKER_FILES = Path(__file__).parents[3] / "oracles" / "tracked_lizard.zip"
 
 
