@@ -30,6 +30,10 @@ class Line:
     over_wire: float
 
 
+CALLS = 3
+"""How often the benchmark runs; two calls of the same code differ (docs/benchmarks)."""
+
+
 def lines_of(rows: Sequence[Row]) -> list[Line]:
     """Rows of the benchmark, one line for each way."""
     found = []
@@ -45,19 +49,30 @@ def lines_of(rows: Sequence[Row]) -> list[Line]:
     return found
 
 
+def span(values: Sequence[float | None], digits: int = 2, empty: str = "not measured") -> str:
+    """Least and greatest of the known values, or ``empty``."""
+    known = [each for each in values if each is not None]
+    if not known:
+        return empty
+    low, high = (f"{value:.{digits}f}" for value in (min(known), max(known)))
+    return low if low == high else f"{low} to {high}"
+
+
 def table(lines: Sequence[Line]) -> str:
-    """Markdown."""
+    """Markdown; a way of several calls is one row with its ranges."""
     text = [
         "| cycle | CPU, us | of `dynamixel-sdk` | of `rustypot` | over the wire time |",
         "| --- | ---: | ---: | ---: | ---: |",
     ]
-    for each in lines:
-        sdk, rusty = (
-            "" if value is None else f"{value:.2f}" for value in (each.of_sdk, each.of_rustypot)
+    for what in dict.fromkeys(each.what for each in lines):
+        some = [each for each in lines if each.what == what]
+        cells = (
+            span([each.cpu_us for each in some], 0),
+            span([each.of_sdk for each in some], empty=""),
+            span([each.of_rustypot for each in some], empty=""),
+            span([100 * each.over_wire for each in some], 1) + " %",
         )
-        text.append(
-            f"| {each.what} | {each.cpu_us:.0f} | {sdk} | {rusty} | {100 * each.over_wire:.1f} % |"
-        )
+        text.append(f"| {what} | {' | '.join(cells)} |")
     return "\n".join(text)
 
 
@@ -71,10 +86,6 @@ def measured_rows(lines: Sequence[Line], *, is_quiet: bool) -> dict[str, str]:
     plain = [each for each in ours if "fast" not in each.what]
     fast = [each for each in ours if "fast" in each.what]
     rusty = [each for each in lines if each.what.endswith(": rustypot")]
-
-    def span(values: Sequence[float | None], digits: int = 2) -> str:
-        known = [each for each in values if each is not None]
-        return f"{min(known):.{digits}f} to {max(known):.{digits}f}" if known else "not measured"
 
     def over(some: Sequence[Line]) -> str:
         return span([100 * each.over_wire for each in some], 1)
@@ -101,12 +112,13 @@ def main() -> None:
     """Measure, show, and write the pages."""
     parser = argparse.ArgumentParser(prog=COMMAND, description=__doc__)
     parser.add_argument("--rows", type=Path, help="rows of an earlier run, as JSON")
+    parser.add_argument("--calls", type=int, default=CALLS, help="default: %(default)s")
     given = parser.parse_args()
     load = 0.0
     if given.rows is None:
         load = os.getloadavg()[0]
-        lines = lines_of(run())
-        head = f"{provenance(COMMAND)} Load average at the start: {load:.1f}."
+        lines = [each for _ in range(given.calls) for each in lines_of(run())]
+        head = f"{provenance(COMMAND)} Calls: {given.calls}. Load average at the start: {load:.1f}."
     else:
         rows = json.loads(given.rows.read_text(encoding="utf-8"))["rows"]["cycle_codec"]
         keys = ("what", "value", "unit", "against", "ratio", "target")

@@ -45,4 +45,4 @@ class SlipMonitor:
             return False
         self.window = SlipWindow(self._displacement_m, self._gain * self._pulse_m)
         self._pulse_m = self._displacement_m = 0.0
-        return self.window.share < self._fraction
+        return bool(self.window.share < self._fraction)

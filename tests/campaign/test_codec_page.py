@@ -31,7 +31,14 @@ def test_each_way_is_a_line_with_its_ratios() -> None:
 
 
 def test_wall_times_are_those_of_a_quiet_machine() -> None:
-    for is_quiet, text in ((True, "5.0 to 5.0 % with sync reads"), (False, "not measured on a")):
+    for is_quiet, text in ((True, "5.0 % with sync reads"), (False, "not measured on a")):
         cpu, wire = measured_rows(lines_of(ROWS), is_quiet=is_quiet).values()
-        assert "0.80 to 0.90 of `rustypot` with sync reads, 1.20 to 1.20 with fast" in cpu
+        assert "0.80 to 0.90 of `rustypot` with sync reads, 1.20 with fast" in cpu
         assert text in wire
+
+
+def test_a_row_of_several_calls_is_a_range() -> None:
+    again = lines_of(rows("3 Mbaud: cycle", 120.0, 0.9))
+    assert table([*lines_of(ROWS), *again]).splitlines()[2] == (
+        "| 3 Mbaud: cycle | 100 to 120 | 0.10 | 0.80 to 0.90 | 5.0 % |"
+    )

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +81,7 @@ def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> N
     assert metrics.distance_m == pytest.approx(metrics.true_distance_m, abs=0.1)
     assert metrics.eta == pytest.approx(metrics.true_eta, rel=0.2)
     assert metrics.alarms == metrics.true_alarms == 0
+    json.dumps(asdict(metrics))
     still = replace(truth, head_m=np.tile(truth.head_m[:1], (len(truth.time_s), 1)))
     lost = metric_errors(still, first.record, first.summary)
     assert lost is not None

@@ -30,8 +30,9 @@ def test_a_ramp_meets_its_ends_and_its_limits(start, goal, speed, acceleration) 
 )
 def test_the_alarm_sounds_below_half_of_the_prediction(gain: float, alarm: bool) -> None:
     watch = SlipMonitor(length_m=1.2, gain=0.7, fraction=0.5)
-    pulse = 0.006
+    pulse = np.float64(0.006)
     sounded = [watch.update(pulse, gain * pulse) for _ in range(450)]
+    assert {type(each) for each in sounded} == {bool}
     assert any(sounded) is alarm
     assert watch.window is not None
     assert watch.window.share == pytest.approx(gain / 0.7, abs=0.01)
