@@ -68,7 +68,7 @@ def timed_pieces() -> Iterator[list[float]]:
             took_s.append(time.process_time() - start_s)
             yield answer
 
-    TwinTrial.answers = timed  # type: ignore[method-assign]
+    TwinTrial.answers = timed  # type: ignore[method-assign, assignment]
     try:
         yield took_s
     finally:
