@@ -60,7 +60,7 @@ class _Square(NamedTuple):
 
 
 class SlideEvidence(NamedTuple):
-    """What a span of motion shows about the friction, linearised at the filter's estimate."""
+    """Evidence of a span of motion about the friction, linearised at the filter's estimate."""
 
     information: _Square
     """Inverse covariance of (u, v), in the filter's axes."""

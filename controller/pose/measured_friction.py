@@ -1,6 +1,6 @@
 """Friction under a body whose pose another program measures: from the measured poses themselves.
 
-The filtered pose of a run is no evidence: between two measurements it follows dead reckoning, which
+The filtered pose of a run cannot show it: between two measurements it follows dead reckoning, which
 assumes the friction. The estimator compares the measured poses with the motion that the balance of
 friction predicts for the joints. This is valid on a level floor.
 """
