@@ -13,14 +13,14 @@ from typing import NamedTuple
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 
-_PRIOR = 0.4
+PRIOR = 0.4
 """Standard deviation of the logarithm about the file's (ours): half to twice it in 95 %."""
 _MEMORY_S = 40.0
 """In which the estimate returns to the file by a factor of e (ours)."""
 _STRAY = 0.1
 """Difference of the friction of one span from that of the ground (ours): no single span is more
 accurate, however far the body slid."""
-_STEP = 0.1
+STEP = 0.1
 """Step of the logarithms, between the hypotheses (ours)."""
 _MOST = 0.3
 """By which a span moves an estimate at most (ours)."""
@@ -59,6 +59,25 @@ class _Square(NamedTuple):
         return u * a + v * b
 
 
+class SlideEvidence(NamedTuple):
+    """Evidence of a span of motion about the friction, linearised at the filter's estimate."""
+
+    information: _Square
+    """Inverse covariance of (u, v), in the filter's axes."""
+    pull_u: float
+    """Product of the information and the correction of u, v."""
+    pull_v: float
+    square: float
+    """Squared difference between motion and prediction, in standard deviations."""
+    rows: int
+    """Number of independent measurements in the square."""
+
+
+def ratio_evidence(information: float, pull: float, square: float, rows: int) -> SlideEvidence:
+    """Return the evidence of motion that shows only v, along against across."""
+    return SlideEvidence(_Square(0.0, 0.0, information), 0.0, pull, square, rows)
+
+
 @dataclass(frozen=True, slots=True)
 class FoundFriction:
     """Results so far."""
@@ -79,17 +98,20 @@ class FrictionFilter:
     information there, and v, along against across.
     """
 
-    def __init__(self, file: FrictionConfig, sigma: Sequence[float]) -> None:
+    def __init__(
+        self, file: FrictionConfig, sigma: Sequence[float] = (), prior: float = PRIOR
+    ) -> None:
         """Begin at the file's friction.
 
         Args:
             file: of the world.
             sigma: three standard deviations of the model's predictions, in the unit of ``update``.
+            prior: standard deviation of the logarithms about the file's.
 
         """
         self._file = file
         self._weights = [1.0 / each**2 for each in sigma]
-        self._prior = _Square(_PRIOR**2, 0.0, _PRIOR**2)
+        self._prior = _Square(prior**2, 0.0, prior**2)
         self._u = self._v = 0.0
         self._covariance = self._prior
         self._differs = False
@@ -97,7 +119,7 @@ class FrictionFilter:
     def hypotheses(self) -> tuple[FrictionConfig, ...]:
         """The three hypotheses for the prediction of the next span: the estimate first."""
         u, v = self._u, self._v
-        return self._friction(u, v), self._friction(u + _STEP, v), self._friction(u, v + _STEP)
+        return self._friction(u, v), self._friction(u + STEP, v), self._friction(u, v + STEP)
 
     def update(self, measured: Floats, foretold: Floats, span_s: float) -> FoundFriction:
         """Process a span of motion.
@@ -109,34 +131,44 @@ class FrictionFilter:
             span_s: its length.
 
         """
+        rows = [measured.tolist(), *foretold.tolist()]
+        is_finite = all(math.isfinite(each) for row in rows for each in row)
+        return self.absorb(self._evidence(*rows) if is_finite else None, span_s)
+
+    def absorb(self, evidence: SlideEvidence | None, span_s: float) -> FoundFriction:
+        """Process the evidence of a span of motion; None: the span shows nothing."""
         kept = math.exp(-span_s / _MEMORY_S)
         before = _Square(*(kept**2 * each for each in self._covariance))
         self._covariance = before.plus(self._prior, 1.0 - kept**2)
-        rows = [measured.tolist(), *foretold.tolist()]
-        if all(math.isfinite(each) for row in rows for each in row):
-            self._correct(*rows)
+        if evidence is not None:
+            self._correct(evidence)
         self._u = min(max(kept * self._u, -_BOUND), _BOUND)
         self._v = min(max(kept * self._v, -_BOUND), _BOUND)
         away = self._covariance.inverse.about(self._u, self._v)
         self._differs = away > (_TRUST if self._differs else _DOUBT)
         return self.found
 
-    def _correct(
+    def _evidence(
         self, measured: list[float], here: list[float], by_u: list[float], by_v: list[float]
-    ) -> None:
-        """Move the estimate by the difference between motion and prediction."""
+    ) -> SlideEvidence:
+        """Return what the difference between motion and prediction shows."""
         gap = [m - h for m, h in zip(measured, here, strict=True)]
         gap[2] = math.remainder(gap[2], 2.0 * math.pi)
         slopes = [
-            ((a - h) / _STEP, (b - h) / _STEP) for a, b, h in zip(by_u, by_v, here, strict=True)
+            ((a - h) / STEP, (b - h) / STEP) for a, b, h in zip(by_u, by_v, here, strict=True)
         ]
         whole, information, pull_u, pull_v = 0.0, _Square(0.0, 0.0, 0.0), 0.0, 0.0
         for weight, g, (u, v) in zip(self._weights, gap, slopes, strict=True):
             whole += weight * g * g
             information = information.plus(_Square(u * u, u * v, v * v), weight)
             pull_u, pull_v = pull_u + weight * u * g, pull_v + weight * v * g
+        return SlideEvidence(information, pull_u, pull_v, whole, len(gap))
+
+    def _correct(self, evidence: SlideEvidence) -> None:
+        """Move the estimate by the evidence of a span."""
+        information, pull_u, pull_v, square, rows = evidence
         span, about = self._of_span(information, 1.0)
-        excess = max(1.0, (whole - about.about(pull_u, pull_v)) / len(gap))
+        excess = max(1.0, (square - about.about(pull_u, pull_v)) / rows)
         span, about = self._of_span(information, excess)  # a large deviation counts less
         u, v = about.times(pull_u / excess, pull_v / excess)
         cov, to_span = self._covariance, span.inverse

@@ -5,8 +5,9 @@ bridges it with growing uncertainty. If no pose could be used for ``max_age_s``,
 and the run holds.
 """
 
+from collections import deque
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from snakewalk.controller.pose.motion_history import Moment, MotionHistory
 from snakewalk.controller.pose.pose_filter import PoseFilter
 from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, UnusablePoseError
 from snakewalk.controller.pose.sender_clock import SenderClock
-from snakewalk.controller.pose.tracked_body import TrackedBody
+from snakewalk.controller.pose.tracked_body import HeadMeasurement, TrackedBody
 from snakewalk.drivers.types import BodyPose, JointState
 
 AGAIN_S: Final = 10.0
@@ -28,6 +29,25 @@ RESTART_S: Final = 1.0
 FROZEN: Final = 10
 FROZEN_M: Final = 0.03
 """This many equal poses in a row are stale if the head has moved so far meanwhile (ours)."""
+_MOST_KEPT: Final = 1000
+"""Measurements that are kept for ``take_measured``."""
+
+
+class TimedHead(NamedTuple):
+    """A measured pose of the head link that was used."""
+
+    time_s: float
+    """When it was measured, on the clock of the run."""
+    head: HeadMeasurement
+
+
+class MeasuredHeads(NamedTuple):
+    """The newest measurements."""
+
+    now_s: float
+    """Time of the newest joint state."""
+    heads: list[TimedHead]
+    """Poses that were used since the last call; none before the delay of the source is known."""
 
 
 class ExternalPose:
@@ -57,6 +77,7 @@ class ExternalPose:
         self._newest: ArrivedPose | None = None
         self._early: list[ArrivedPose] = []
         self._equal: tuple[int, np.ndarray, np.ndarray] = (0, np.zeros(12), np.zeros(2))
+        self._measured: deque[TimedHead] = deque(maxlen=_MOST_KEPT)
         self._now_s = self._used_s = -np.inf
         self._used: PoseSample | None = None
         self._reason = ""
@@ -90,6 +111,12 @@ class ExternalPose:
         if age_s <= self._config.max_age_s:
             return None
         return f"no usable pose for {age_s:.1f} s: {self._reason or 'nothing arrived'}"
+
+    def take_measured(self) -> MeasuredHeads:
+        """Return the measurements since the last call."""
+        heads = list(self._measured)
+        self._measured.clear()
+        return MeasuredHeads(self._now_s, heads)
 
     def facts(self) -> dict[str, float | int]:
         """Return numbers for the log and for a command's answer."""
@@ -157,6 +184,8 @@ class ExternalPose:
             )
             return
         self._filter.update(measured, then, off)
+        if self._latency.is_known:
+            self._measured.append(TimedHead(measured_s, measured))
         self.counts["used"] += 1
         self._used, self._used_s, self._reason = sample, measured_s, ""
 

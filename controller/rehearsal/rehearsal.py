@@ -1,5 +1,6 @@
 """Rehearsals of runs in simulated time: a served robot with errors, a tracker, and a judgement."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +15,7 @@ from snakewalk.controller.rehearsal.judgement import judge
 from snakewalk.controller.rehearsal.metric_errors import metric_errors
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.runlog.truth import read_truth
@@ -52,10 +53,16 @@ class RehearsalCase:
         return self.run, self.seed, self.has_errors, self.tracker.model_dump_json()
 
 
-def rehearse(case: RehearsalCase) -> dict[str, Any]:
-    """Rehearse a run; returns the case and its judgement, ready for JSON."""
+def rehearse(case: RehearsalCase, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Rehearse a run; returns the case and its judgement, ready for JSON.
+
+    Args:
+        case: to rehearse.
+        changes: of the run, as ``prepare_job`` accepts them.
+
+    """
     with TemporaryDirectory() as folder:
-        return {**described(case), **_judged(case, Path(folder))}
+        return {**described(case), **_judged(case, changes or {}, Path(folder))}
 
 
 def described(case: RehearsalCase) -> dict[str, Any]:
@@ -95,9 +102,9 @@ def errors_of(robot: RobotConfig, rng: np.random.Generator) -> Deviation:
     )
 
 
-def _judged(case: RehearsalCase, folder: Path) -> dict[str, Any]:
+def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     try:
-        prepared = prepare_job(case.run, seed=case.seed, pose="udp:9870")
+        prepared = prepare_job(case.run, seed=case.seed, pose="udp:9870", **changes)
         rng = np.random.default_rng([case.seed, 0x42])
         moved_m = START_SD_M * rng.standard_normal(2)
         turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
@@ -120,7 +127,23 @@ def _judged(case: RehearsalCase, folder: Path) -> dict[str, Any]:
     return {
         **found.facts(),
         "metrics": None if metrics is None else asdict(metrics),
+        "friction": _friction_facts(finished, deviation),
         "duration_s": round(finished.outcome.duration_s, 2),
         "missed": finished.outcome.missed,
         "latency_s": finished.pose.facts().get("pose_latency_s"),
     }
+
+
+def _friction_facts(finished: Finished, deviation: Deviation) -> dict[str, Any] | None:
+    """Return the estimated friction next to the true one; None if it was not estimated."""
+    found = finished.summary.friction_found
+    if found is None:
+        return None
+    true = {
+        "true_along": round(found.along_file * deviation.along, 4),
+        "true_across": round(found.across_file * deviation.across, 4),
+    }
+    (low, high), (least, most) = found.along_95, found.across_95
+    is_inside = low <= true["true_along"] <= high and least <= true["true_across"] <= most
+    used = any(event.kind == "friction" for event in finished.record.events)
+    return {**asdict(found), **true, "is_inside": is_inside, "was_used": used}

@@ -244,7 +244,7 @@ class _Execution:
             ExitStack() as workers,
         ):
             source = prepared.make_source(log_event)
-            friction = second_body(prepared, source, backend)
+            friction = second_body(prepared, source, backend, pose)
             if self.port is not None and pose_evidence(prepared, backend).is_measured:
                 now_s = None if self.rehearsed is None else clock.now_s
                 use_worker(prepared, source, now_s, workers)

@@ -16,6 +16,7 @@ from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.plugins import require
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.pose.dead_reckoning import DeadReckoning
+from snakewalk.controller.pose.external_pose import MeasuredHeads
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
@@ -134,6 +135,8 @@ class PoseProvider:
     """Numbers of the source itself, for example the frames of a camera."""
     health: PoseHealth | None = None
     """Whether the pose can be trusted; None of a source that is always believed."""
+    measured_heads: Callable[[], MeasuredHeads] | None = None
+    """Returns the single measurements of an external source since the last call."""
     error: PoseError | None = None
     """Set at the end of a run whose pose was estimated while the simulator knew the true one."""
 

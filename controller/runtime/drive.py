@@ -29,7 +29,7 @@ from snakewalk.controller.runlog.topics import (
 )
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.derating import Derating
-from snakewalk.controller.runtime.friction_monitor import FrictionMonitor
+from snakewalk.controller.runtime.friction_monitor import FrictionEstimator
 from snakewalk.controller.runtime.loop import Tick, ticks
 from snakewalk.controller.runtime.pose_hold import PoseHealth, PoseHold
 from snakewalk.controller.runtime.roll_monitor import RollMonitor
@@ -169,7 +169,7 @@ class Drive:
         run: RunConfig,
         gain: float,
         observer: CycleObserver | None = None,
-        friction: FrictionMonitor | None = None,
+        friction: FrictionEstimator | None = None,
         on_progress: OnProgress = lambda progress: None,
         on_event: OnEvent = lambda kind, text: None,
     ) -> None:

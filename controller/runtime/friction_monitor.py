@@ -5,6 +5,7 @@ motion under three frictions, one a cycle. The one that brings the body to its m
 the ground's. The model is a twin, or the balance of forces on a level floor.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -131,8 +132,55 @@ def _shapes(span: Span) -> tuple[Floats, Floats, Floats]:
     return headings - mean, turned, np.diff(at) * span.cycle_s
 
 
-class FrictionMonitor:
-    """Call ``update`` once a cycle."""
+class FrictionEstimator(ABC):
+    """Estimates the friction under a body; call ``update`` once a cycle."""
+
+    def __init__(self, file: FrictionConfig, use: Callable[[FrictionConfig], None]) -> None:
+        self._file, self._use = file, use
+        self._confirmed = 0
+        self._used = self._reported = file
+
+    @abstractmethod
+    def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
+        """Process the body, and the goals (J,) that were sent in the cycle before.
+
+        Returns:
+            The finding, if motion has just been judged; else None.
+
+        """
+
+    def accept(self, found: FoundFriction) -> None:
+        """Use a finding: the estimate if it contradicts the file, else the file's friction."""
+        self._confirmed = 0 if found.differs else self._confirmed + 1
+        friction = found.friction if found.differs else self._file
+        if friction != self._used:
+            self._used = friction
+            self._use(friction)
+
+    @property
+    def confirms_file(self) -> bool:
+        """Whether the newest motion that was judged agrees with the world's file."""
+        return self._confirmed > 0
+
+    def event_text(self) -> str | None:
+        """A line when the friction in use has changed notably since the last one."""
+        used, reported = self._used, self._reported
+        change = max(
+            abs(used.along / reported.along - 1.0), abs(used.across / reported.across - 1.0)
+        )
+        if change < _NOTABLE:
+            return None
+        self._reported, file = used, self._file
+        if used == file:
+            return "the friction found is that of the world's file again"
+        return (
+            f"found {used.along:.2f} along and {used.across:.2f} across the body; the world's file "
+            f"has {file.along:g} and {file.across:g}"
+        )
+
+
+class FrictionMonitor(FrictionEstimator):
+    """Replays measured motion under three frictions by a model."""
 
     def __init__(
         self,
@@ -151,22 +199,17 @@ class FrictionMonitor:
                 contradicts it.
 
         """
-        self._file, self._model, self._cycle_s, self._use = file, model, cycle_s, use
+        super().__init__(file, use)
+        self._model, self._cycle_s = model, cycle_s
         self._filter = FrictionFilter(file, model.sigma)
         self._count = max(1, round(SPAN_S / cycle_s))
         self._views: list[BodyView] = []
         self._goals_rad: list[Floats] = []
         self._replays: Iterator[FoundFriction | None] = iter(())
-        self._held, self._rests, self._since_s = 0, 0, 0.0
-        self._used = self._reported = file
+        self._rests, self._since_s = 0, 0.0
 
     def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
-        """Process the measured body, and the goals (J,) that were sent in the cycle before.
-
-        Returns:
-            The finding, if a span has just been judged; else None.
-
-        """
+        """Process a cycle, as ``FrictionEstimator``."""
         self._views.append(view)
         self._goals_rad.append(goal_rad)
         if len(self._views) == self._count + 2:
@@ -179,34 +222,9 @@ class FrictionMonitor:
             del self._views[:-2], self._goals_rad[:-2]
         found = next(self._replays, None)
         if found is not None:
-            self._held = 0 if found.differs else self._held + 1
-            self._rests = _RESTS if self._held >= _SETTLED else 0
-            friction = found.friction if found.differs else self._file
-            if friction != self._used:
-                self._used = friction
-                self._use(friction)
+            self.accept(found)
+            self._rests = _RESTS if self._confirmed >= _SETTLED else 0
         return found
-
-    @property
-    def confirms_file(self) -> bool:
-        """Whether the newest span that was judged agrees with the friction of the world's file."""
-        return self._held > 0
-
-    def event_text(self) -> str | None:
-        """A line when the friction that is reckoned with has changed notably since the last one."""
-        used, reported = self._used, self._reported
-        change = max(
-            abs(used.along / reported.along - 1.0), abs(used.across / reported.across - 1.0)
-        )
-        if change < _NOTABLE:
-            return None
-        self._reported, file = used, self._file
-        if used == file:
-            return "the friction found is that of the world's file again"
-        return (
-            f"found {used.along:.2f} along and {used.across:.2f} across the body; the world's file "
-            f"has {file.along:g} and {file.across:g}"
-        )
 
     def _judge(self, span: Span) -> Iterator[FoundFriction | None]:
         """Replay a span, a hypothesis a cycle; the result comes last."""

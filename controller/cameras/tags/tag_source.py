@@ -103,7 +103,9 @@ class TagsPose:
             )
             source = _NotedJoints(feed, pose)
             health = PoseHealth(pose.fault, config.hold_s, pose.row)
-            yield PoseProvider(source, lambda: pose.facts() | feed.facts(), health)
+            yield PoseProvider(
+                source, lambda: pose.facts() | feed.facts(), health, pose.take_measured
+            )
 
 
 class TagFeed:

@@ -107,7 +107,7 @@ class ExternalSource(ABC):
             )
             pose.keep(early)
             health = PoseHealth(pose.fault, config.hold_s, pose.row)
-            yield PoseProvider(pose, pose.facts, health)
+            yield PoseProvider(pose, pose.facts, health, pose.take_measured)
 
 
 class _Feed:

@@ -8,11 +8,14 @@ from typing import cast
 
 from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.motion.source import MotionSource
+from snakewalk.controller.pose.measured_friction import MeasuredFriction
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.external.twin_worker import ProcessTwin, RehearsedTwin, TwinTrial
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.pose_provider import PoseProvider
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runtime.friction_monitor import (
+    FrictionEstimator,
     FrictionMonitor,
     OnPaper,
     OnTwin,
@@ -55,14 +58,14 @@ def use_worker(
 
 
 def second_body(
-    prepared: PreparedRun, source: MotionSource, backend: Backend
-) -> FrictionMonitor | None:
+    prepared: PreparedRun, source: MotionSource, backend: Backend, pose: PoseProvider
+) -> FrictionEstimator | None:
     """Let a bare snake that walks ground that is known use a second body, where there is one.
 
     Returns:
         The estimator of the friction under a walk: on a level floor on paper, elsewhere on that
-            body.
-        None if the pose does not depend on it: the joints or an IMU assume the friction.
+            body. None if the pose assumes the friction (the joints, an IMU), and on hills for an
+            external pose: its noise would look like friction there.
 
     """
     run, world, robot = prepared.run, prepared.world, prepared.robot
@@ -72,16 +75,20 @@ def second_body(
     if twin is not None and _tries_pieces(prepared) and isinstance(source, UsesTwin):
         source.use_twin(TwinRollout(robot, twin, world.friction))
     finds = run.motion == "walk" and run.walk.finds_friction and isinstance(source, UsesFriction)
-    measured = run.pose == "camera" or (run.pose_is_true and backend.pose is not None)
-    if not finds or not measured or isinstance(world.ground, WaterGround):
+    if not finds or isinstance(world.ground, WaterGround):
         return None
-    if isinstance(world.ground, FlatGround) and world.obstacle is None:
+    is_level = isinstance(world.ground, FlatGround) and world.obstacle is None
+    use = cast(UsesFriction, source).use_friction
+    if pose.measured_heads is not None:
+        return MeasuredFriction(world.friction, pose.measured_heads, use) if is_level else None
+    if run.pose != "camera" and (not run.pose_is_true or backend.pose is None):
+        return None
+    if is_level:
         model: SlideModel = OnPaper()  # moves no second body in every walk
     elif twin is not None:
         model = OnTwin(robot, twin)
     else:
         return None
-    use = cast(UsesFriction, source).use_friction
     return FrictionMonitor(world.friction, model, 1.0 / run.cycle_hz, use)
 
 

@@ -18,8 +18,9 @@ from snakewalk.controller.walk.pilot import Pilot
 from snakewalk.controller.walk.twin_answers import TwinAnswer, TwinQuestion
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
-PIECE_S: Final = 0.12
-"""Time that a twin needs for a piece in a rehearsal (ours): an assumption, not measured."""
+PIECE_S: Final = 0.22
+"""Time that a twin needs for a piece in a rehearsal: median CPU time of 807 pieces on a busy
+machine; one in ten needed less than 0.16 s (docs/benchmarks/steep-rehearsal.md)."""
 LARGEST_BYTES: Final = 60_000
 """Size of a question that a pipe accepts at once; a larger one is not asked."""
 

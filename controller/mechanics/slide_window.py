@@ -1,0 +1,159 @@
+"""Friction from noisy poses of the head over a window of time, on a level floor.
+
+The joints give the shape of the body in each cycle, and the balance of friction gives how a body of
+these shapes moves. The pose of the head is measured many times in the window, each time with noise.
+The start of the body and the errors of the model are unknown as well; they are estimated together
+with the friction (generalised least squares), so that noise does not look like friction.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.mechanics.friction_filter import STEP, SlideEvidence, ratio_evidence
+from snakewalk.controller.mechanics.rigid_motion import planar_slide
+
+BIN_S: Final = 0.25
+"""Poses within this time are averaged (ours)."""
+NOISE_S: Final = 0.1
+"""Time after which the noise of a source is taken as independent (ours): averages of more poses
+count no more."""
+STRIDE: Final = 5
+"""Cycles in a step of the balance."""
+MODEL_M2_S: Final = 1e-4
+MODEL_RAD2_S: Final = 1e-3
+"""Growth of the variances of the model's place and heading (ours): 10 mm and 1.8 degrees in a
+second. With true poses the residuals of `flat-slalom` are about a quarter of that."""
+START_M: Final = 1.0
+START_RAD: Final = 0.5
+"""Standard deviations of the body's start (ours): practically unknown."""
+FEWEST: Final = 6
+"""Least number of bins that contain a pose (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeadReadings:
+    """Measured poses of the head link."""
+
+    time_s: Floats
+    """(N,)"""
+    place: Floats
+    """(N, 3) x, y (m) and heading (rad)."""
+    variance: Floats
+    """(N, 3) of these."""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True, slots=True)
+class SlideWindow:
+    """The shapes of a body in C cycles, head first, in the frame of its mean heading."""
+
+    time_s: Floats
+    """(C,)"""
+    headings_rad: Floats
+    """(C, L) of the links, about the mean heading."""
+    points_m: Floats
+    """(C, L, 2) centres of the links about the body's."""
+    start: Floats
+    """(3,) x, y and mean heading in the first cycle: a first estimate."""
+
+    @property
+    def knots(self) -> list[int]:
+        """Cycles at the ends of the bins."""
+        cycle_s = float(self.time_s[-1] - self.time_s[0]) / (len(self.time_s) - 1)
+        every = max(1, round(BIN_S / cycle_s))
+        return list(range(0, len(self.time_s), every))
+
+    def track(self, friction: FrictionConfig) -> Floats:
+        """Return centre and heading (K, 3) of the body at the knots, under a friction."""
+        knots, rows = self.knots, [self.start]
+        for begin, end in pairwise(knots):
+            at = np.array([*range(begin, end, STRIDE), end])
+            x, y, heading = planar_slide(
+                *(self.headings_rad[at], self.points_m[at], np.diff(self.time_s[at])),
+                *(float(rows[-1][2]), friction.along, friction.across),
+            )
+            rows.append(np.array([rows[-1][0] + x, rows[-1][1] + y, heading]))
+        return np.array(rows)
+
+    def heads(self, track: Floats, time_s: Floats) -> Floats:
+        """Return x, y and heading (N, 3) of the head link at times, for a track of the body."""
+        knots_s = self.time_s[self.knots]
+        x, y, heading = (np.interp(time_s, knots_s, each) for each in track.T)
+        ahead, left = (np.interp(time_s, self.time_s, self.points_m[:, 0, k]) for k in (0, 1))
+        c, s = np.cos(heading), np.sin(heading)
+        bend = np.interp(time_s, self.time_s, self.headings_rad[:, 0])
+        return np.column_stack([x + c * ahead - s * left, y + s * ahead + c * left, heading + bend])
+
+    def evidence(
+        self, readings: HeadReadings, track: Floats, by_ratio: Floats
+    ) -> SlideEvidence | None:
+        """Return what the readings show about the friction; None if they are too few.
+
+        Args:
+            readings: within the window.
+            track: of ``track``, under the friction that the filter estimates.
+            by_ratio: likewise, one step farther along the filter's second axis.
+
+        """
+        knots_s = self.time_s[self.knots]
+        bins = np.clip(np.searchsorted(knots_s, readings.time_s, "right") - 1, 0, len(knots_s) - 2)
+        counts = np.bincount(bins, minlength=len(knots_s) - 1)
+        kept = np.flatnonzero(counts)
+        if len(kept) < FEWEST or not (np.isfinite(track).all() and np.isfinite(by_ratio).all()):
+            return None
+
+        def averages(values: Floats) -> Floats:
+            sums = [np.bincount(bins, column, len(counts))[kept] for column in values.T]
+            return np.column_stack(sums) / counts[kept, None]
+
+        here = self.heads(track, readings.time_s)
+        off = readings.place - here
+        off[:, 2] = np.arctan2(np.sin(off[:, 2]), np.cos(off[:, 2]))
+        slope = (self.heads(by_ratio, readings.time_s) - here) / STEP
+        independent = np.minimum(counts[kept], BIN_S / NOISE_S)
+        noise = averages(readings.variance) / independent[:, None]
+        covariance = _model_covariance(averages(here), track[:-1], kept) + np.diag(noise.ravel())
+        gap, along = averages(off).ravel(), averages(slope).ravel()
+        solved = np.linalg.solve(covariance, np.column_stack([gap, along]))
+        return ratio_evidence(
+            float(along @ solved[:, 1]),
+            float(along @ solved[:, 0]),
+            float(gap @ solved[:, 0]),
+            len(gap) - 3,
+        )
+
+
+def _model_covariance(heads: Floats, track: Floats, kept: np.ndarray) -> Floats:
+    """Return the covariance (3 B, 3 B) of heads (B, 3) by errors of start and model.
+
+    An error of the model in a bin moves or turns the body, about its centre there, in that and all
+    later bins.
+
+    Args:
+        heads: predicted, mean of each bin that counts.
+        track: (K - 1, 3) body at the begin of each bin.
+        kept: (B,) bins that count.
+
+    """
+    effects = []
+    starts = [(-1, track[0], START_M, START_RAD)]
+    steps = [(k, row, (MODEL_M2_S * BIN_S) ** 0.5, (MODEL_RAD2_S * BIN_S) ** 0.5)
+             for k, row in enumerate(track)]  # fmt: skip
+    for begin, centre, move_m, turn_rad in starts + steps:
+        since = (kept >= begin).astype(float)
+        arm = heads[:, :2] - centre[:2]
+        turned = np.column_stack([-arm[:, 1], arm[:, 0], np.ones(len(heads))])
+        effects.append((turn_rad * since[:, None] * turned).ravel())
+        for axis in (0, 1):
+            moved = np.zeros((len(heads), 3))
+            moved[:, axis] = move_m * since
+            effects.append(moved.ravel())
+    table = np.array(effects)
+    return np.asarray(table.T @ table)
