@@ -26,7 +26,7 @@ from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 PART_FRAMES: Final = 1000
-"""Frames of a part (ours): pictures of 120 px bodies need about 100 MB."""
+"""Frames of a part (ours)."""
 _LONGEST_PART: Final = 1500
 _CALM: Final = 5  # good frames before the end of a part
 _EVIDENCE: Final = ("given", "travel", "wave", "taper")
