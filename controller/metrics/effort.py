@@ -3,7 +3,8 @@
 Energy is integrated where something adds it up in every step: in the simulation. A real servo has
 no such counter. Its Present Current is a sample at the moment of the reading, just before the next
 goal arrives. The error of position that the last goal made has mostly decayed by then, so power
-from such samples is too low (``docs/gaits.md`` has the factor, measured on the same runs).
+from such samples is too low. ``docs/benchmarks/gait-energy.md`` has the factor, measured on the
+same runs.
 """
 
 from dataclasses import dataclass
