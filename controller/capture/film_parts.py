@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from snakewalk.config.archive import read_arrays
+from snakewalk.config.archive import parse_json, read_arrays
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture, captured_from
@@ -81,7 +81,7 @@ class FilmParts:
         )
         part = replace(part, time_s=np.array(found.stated_s))
         if self.folder is not None:
-            self.folder.save(len(self.finished), part)
+            self.folder.add(len(self.finished), part)
         self.finished.append(part)
         self._found = Detections()
 
@@ -204,7 +204,7 @@ class PartFolder:
             self.clear()
             return []
         try:
-            before = json.loads((self.path / _SETTINGS).read_text(encoding="utf-8"))
+            before = parse_json((self.path / _SETTINGS).read_text(encoding="utf-8"))
         except FileNotFoundError:
             raise InputError(
                 f"{self.path}: no such folder, so there is nothing to continue; leave --resume out"
@@ -219,7 +219,7 @@ class PartFolder:
             )
         return [_read_part(file) for file in sorted(self.path.glob("*.npz"))]
 
-    def save(self, number: int, part: Capture) -> None:
+    def add(self, number: int, part: Capture) -> None:
         """Keep a finished part."""
         if number == 0:
             self.path.mkdir(exist_ok=True)

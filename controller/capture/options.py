@@ -113,7 +113,7 @@ def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool |
     held = {name: str(one) if isinstance(one, Path) else one for name, one in values.items()}
     size = 0
     if film.exists():
-        size = film.stat().st_size if film.is_file() else sum(1 for _ in film.iterdir())
+        size = sum(1 for _ in film.iterdir()) if film.is_dir() else film.stat().st_size
     return {"recording": film.name, "size": size, **held}
 
 

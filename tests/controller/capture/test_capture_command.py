@@ -196,7 +196,7 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
         ({"recording": "absent.mp4"}, "absent.mp4: no such video"),
         ({"recording": "empty.mp4"}, "is an empty file"),
         ({"recording": "bare"}, "holds no images"),
-        ({"output": "track.txt"}, "a track is an .npz"),
+        ({"output": "track.txt"}, "a track is written as one of .npz, .csv, .wcon"),
         ({"output": "no/folder/t.npz"}, "no/folder: no such folder"),
         ({"overlay": "o.gif"}, "an overlay film is one of"),
         ({"sheet": "s.doc"}, "a picture is one of"),

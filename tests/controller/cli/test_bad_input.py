@@ -227,7 +227,7 @@ ROWS = [
     ("stop nosuch --port /dev/nosuch", "stop: a run and --port exclude each other"),
     ("stop --port /dev/nosuch", "/dev/nosuch: no such port"),
     ("stop --port file.txt", "file.txt: is not a serial device; name one such as /dev/ttyUSB0"),
-    ("stop --port /dev/nosuch --baud 123", "--baud 123: servos have 9600, 57600"),
+    ("stop --port /dev/nosuch --baud 123", "--baud 123: servos have 9600, 38400, 57600"),
     ("scan --port /dev/null", "/dev/null: is not a serial device"),
     ("doctor --port file.txt", "file.txt: is not a serial device"),
     ("export nosuch.mcap", "say what to write: --csv FOLDER, --parquet FOLDER"),

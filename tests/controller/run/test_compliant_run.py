@@ -48,7 +48,7 @@ def test_lost_replies_hold_the_yield_and_the_run_goes_on(
         FaultPlayer(line, faults)  # type: ignore[arg-type]
         return DynamixelBus(line, *args, **values)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(backend, "DynamixelBus", faulty)
+    monkeypatch.setattr(backend, "servo_bus", faulty)
     found = ran(tmp_path, compliance=None)
     cycle = found.record.cycle
     assert found.outcome.tripped is None
