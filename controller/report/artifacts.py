@@ -12,6 +12,7 @@ from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Section, film_on_page, page
+from snakewalk.controller.report.trip import trip_of
 from snakewalk.controller.run.film_look import SERVOS, film_look
 from snakewalk.controller.run.finish import Artifacts
 from snakewalk.controller.run.summary_file import write_summary
@@ -114,6 +115,7 @@ def _write_page(
         drawn.sections,
         film=shown,
         events=record.events,
+        trip=trip_of(record),
         config=config,
         curves=drawn.curves,
         links=[name for name in (LOG, SUMMARY, FILM) if (out_dir / name).exists()],

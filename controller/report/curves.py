@@ -15,6 +15,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import AMBER, BLUE, COLOURS, GREEN, INK, RED, rgb
 from snakewalk.controller.figures.style import thin
 from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
+from snakewalk.controller.report.trip import trip_of
 from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import panel_curves
 from snakewalk.controller.runlog.record import RunRecord
@@ -30,13 +31,20 @@ Curve = tuple[str, str, Floats, Floats]
 
 
 def curves_html(record: RunRecord) -> str:
-    """HTML of the section, the library in it; empty where the log has nothing to draw."""
+    """HTML of the section with its library; empty if the log has nothing to draw.
+
+    The panels of one joint begin with the tripped joint, or with the first one.
+    """
     if len(record.cycle.time_s) < 2:
         return ""
     panels, constant = _panels(record)
-    spec = json.dumps(_figure(record, panels))
+    trip = trip_of(record)
+    shown = 0 if trip is None or trip.joint is None else trip.joint
+    figure = _figure(record, panels, shown) | {"mark_s": 0.0 if trip is None else trip.time_s}
+    spec = json.dumps(figure)
     joints = "".join(
-        f"<option value='{k}'>{escape(record.header.robot.joint_label(k))}</option>"
+        f"<option value='{k}'{' selected' if k == shown else ''}>"
+        f"{escape(record.header.robot.joint_label(k))}</option>"
         for k in range(record.cycle.asked_rad.shape[1])
     )
     step = _step(len(record.cycle.time_s))
@@ -47,8 +55,9 @@ def curves_html(record: RunRecord) -> str:
         "<div id='plot'><noscript>Curves need scripts. The pictures below do not.</noscript></div>"
         "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. A "
         "pale band reaches from least to largest. "
-        "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is the "
-        f"film's time.{which}{constant}</figcaption></figure>"
+        "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is "
+        f"the time of the film or trip.{which}{constant}"
+        "</figcaption></figure>"
         f"<script id='plotly' type='text/plain'>{_library()}</script>"
         f"<script id='curves-data' type='text/plain'>{_zipped(spec)}</script></section>"
     )
@@ -77,8 +86,10 @@ def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
     return panels, words
 
 
-def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dict[str, Any]:
-    """Traces, layout, and the values that the two panels of each joint show, for Plotly."""
+def _figure(
+    record: RunRecord, panels: Sequence[tuple[str, list[Curve]]], shown: int
+) -> dict[str, Any]:
+    """Traces, layout, and values of every joint's two panels for Plotly; joint ``shown`` first."""
     joint = [(each, panel_curves(record, each)) for each in Panel if each.is_of_one_joint]
     traces = [
         trace
@@ -88,7 +99,7 @@ def _figure(record: RunRecord, panels: Sequence[tuple[str, list[Curve]]]) -> dic
     ]
     first = len(traces)
     traces += [
-        _trace(each.curve.name, COLOURS[each.curve.colour], row, each.time_s, each.values[:, 0])
+        _trace(each.curve.name, COLOURS[each.curve.colour], row, each.time_s, each.values[:, shown])
         for row, (_, curves) in enumerate(joint, start=len(panels) + 1)
         for each in curves
     ]

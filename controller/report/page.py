@@ -16,6 +16,7 @@ from urllib.parse import quote
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.shared_text import shared, without_folders
 from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.report.trip import Trip
 from snakewalk.controller.runlog.record import Event
 
 _EVENTS_SHOWN = 300
@@ -54,6 +55,7 @@ def page(
     *,
     film: Film | None,
     events: Sequence[Event],
+    trip: Trip | None = None,
     config: Mapping[str, Any],
     curves: str = "",
     links: Sequence[str] = (),
@@ -67,6 +69,7 @@ def page(
         sections: its figures.
         film: shown first, if there is one.
         events: of the log.
+        trip: shown above the headline numbers, if there is one.
         config: run, robot and world.
         curves: HTML made by ``curves_html``, or empty.
         links: names of files in the same folder as the page.
@@ -81,6 +84,7 @@ def page(
         }
         numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
         events = [replace(event, text=without_folders(event.text)) for event in events]
+        trip = None if trip is None else replace(trip, reason=without_folders(trip.reason))
     every = numbers.to_dict() if folders else shared(numbers.to_dict())
     return str(
         _template().render(
@@ -90,6 +94,7 @@ def page(
             facts=_facts(numbers),
             tiles=_tiles(numbers),
             film=film,
+            trip=trip,
             curves=curves,
             sections=sections,
             events=events[:_EVENTS_SHOWN],

@@ -170,9 +170,11 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
     if number in (errno.EACCES, errno.EPERM):
         return f"{name}: no permission; join the group that owns it (often 'dialout')"
     if number in (errno.EBUSY, errno.EAGAIN):
-        holders = ", ".join(_holders(name))
-        remedy = f"stop it by: snakewalk stop --port {name}" if _OWN in holders else "close it"
-        return f"{name}: another program has it open{holders and ': '}{holders}; {remedy}"
+        holders = _holders(name)
+        is_own = any(each.startswith(f"{_OWN} ") for each in holders)
+        remedy = f"stop it by: snakewalk stop --port {name}" if is_own else "close it"
+        text = ", ".join(holders)
+        return f"{name}: another program has it open{text and ': '}{text}; {remedy}"
     if isinstance(error, ValueError):
         return f"{name}: {baud} bit/s is not possible here: {error}"
     if _is_no_terminal(name):
@@ -194,7 +196,7 @@ def _is_no_terminal(device: str) -> bool:
 def _holders(device: str) -> list[str]:
     """Programs that have a device open, ``name (process 123)``; those of other users are hidden.
 
-    A process of snakewalk is named with its command and run.
+    A process of snakewalk is named with its command and run, and Python with its script or module.
     """
     path = os.path.realpath(device)
     found = []
@@ -207,14 +209,30 @@ def _holders(device: str) -> list[str]:
 
 
 def _program(process: str) -> str:
-    """Name of a process, or the words of a command of snakewalk."""
+    """Name of a process, with the script of an interpreter; a command of snakewalk as typed."""
     with open(f"/proc/{process}/cmdline", encoding="utf-8", errors="replace") as file:
         words = file.read().rstrip("\0").split("\0")
     names = [os.path.basename(word) for word in words[:2]]
     if _OWN in names:
         return " ".join([_OWN, *words[names.index(_OWN) + 1 :]])
     with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
-        return file.read().strip()
+        name = file.read().strip()
+    return " ".join([name, *_script(words[1:])]) if name.startswith("python") else name
+
+
+def _script(words: list[str]) -> list[str]:
+    """Script or module among the words after an interpreter; empty if it has neither."""
+    rest = iter(words)
+    for word in rest:
+        if word == "-m":
+            return [word, *list(rest)[:1]]
+        if not word.startswith("-"):
+            return [os.path.basename(word)]
+        if word == "-c":
+            break
+        if word in ("-W", "-X"):  # the next word is its value
+            next(rest, None)
+    return []
 
 
 def _leads_to(link: str, path: str) -> bool:

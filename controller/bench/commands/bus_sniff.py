@@ -50,12 +50,16 @@ def sniff(
     else:
         pieces = receive(str(source), baud, for_s)
     size, packets = 0, 0
+    waiting: list[str] = []  # a recording without any packet is rejected before it is shown
     try:
         for time_s, data in pieces:
             size += len(data)
             for line in decoder.feed(time_s, data):
                 packets += line.kind != "noise"
-                print(json.dumps(line.to_dict()) if as_json else line.text(), flush=live)
+                waiting.append(json.dumps(line.to_dict()) if as_json else line.text())
+                if live or packets:
+                    print("\n".join(waiting), flush=live)
+                    waiting.clear()
     except KeyboardInterrupt:
         print(file=sys.stderr)
     if not live and packets == 0:

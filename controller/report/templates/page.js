@@ -22,7 +22,7 @@ document.querySelectorAll("button[data-time]").forEach(b => b.addEventListener("
   document.head.append(library);
   const spec = JSON.parse(await unpacked("curves-data"));
   const shapes = spec.layout.shapes;
-  const now = { type: "line", x0: 0, x1: 0, yref: "paper", y0: 0, y1: 1,
+  const now = { type: "line", x0: spec.mark_s, x1: spec.mark_s, yref: "paper", y0: 0, y1: 1,
     line: { color: "#22303c", width: 1.2 } };
   spec.layout.height = spec.height;
   spec.layout.shapes = [...shapes, now];

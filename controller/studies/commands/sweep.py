@@ -90,9 +90,9 @@ def sweep(
 
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds, keys=keys)
+    table = Sweep(out)
     for line in () if as_json else planned.left_out:
         console.print(f"left out: {line}", style="dim")
-    table = Sweep(out)
     refused: Counter[str] = Counter()
     missing = table.missing(planned.points)
     with table:

@@ -195,6 +195,16 @@ ROWS = [
     ("tune rolling --for beauty", "'--for': 'beauty' is not one of 'speed', 'efficiency'"),
     ("tune trot --robot yaw16", "gait trot needs two pairs of legs"),
     ("sweep rolling --seconds inf", "'--seconds': Input should be less"),
+    (
+        "sweep lateral-undulation rolling --robot yaw16 --points 1 -o one.csv",
+        "one.csv: is not a table of `snakewalk sweep`",
+    ),
+    ("run flat-square --motion nosuch", "motion nosuch: unknown; valid: walk, "),
+    ("run flat-square --port /dev/nosuch", "/dev/nosuch: no such port"),
+    ("gait run rolling --param nosuch=1", "nosuch: unknown key"),
+    ("play worm-like --set run.nosuch=1", "run worm-like: nosuch: unknown key"),
+    ("plan flat-square --set world.nosuch=2", "world flat: nosuch: unknown key"),
+    ("capture nosuch.mp4", "nosuch.mp4: no such video or folder of images"),
     ("camera board -o b.pdf --square nan", "a board's square of nan m: must be 0.001 to 1 m"),
     ("camera markers -o m.pdf --side 1e9", "--side 1e+09: must be 10 to 1000 mm"),
     ("robot export yaw16 --urdf a.urdf --mjcf a.urdf", "two results have the same name"),
@@ -388,8 +398,10 @@ def test_bad_input_is_told_and_nothing_is_written(
     monkeypatch.setattr("sys.argv", ["snakewalk", *words.split()])
     with pytest.raises(SystemExit) as end:
         main()
-    told = [line for line in capsys.readouterr().err.splitlines() if "snakewalk:" in line]
+    shown = capsys.readouterr()
+    told = [line for line in shown.err.splitlines() if "snakewalk:" in line]
     assert end.value.code == 2
+    assert not shown.out, "a result before its rejection"
     assert told
     assert any(said in line for line in told), told
     assert sorted(tmp_path.rglob("*")) == before

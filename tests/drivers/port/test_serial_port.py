@@ -9,6 +9,7 @@ import sys
 import termios
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -260,7 +261,34 @@ def test_who_has_the_port_open_is_named(pair: tuple[int, SerialPort]) -> None:
     with pytest.raises(PortError) as caught:
         SerialPort(name, 57_600)
     assert str(caught.value).startswith(f"{name}: another program has it open: ")
-    assert f"{own} (process {os.getpid()})" in str(caught.value)
+    assert own in str(caught.value)
+    assert f" (process {os.getpid()})" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("before", "shown"),
+    [(["-X", "utf8", "-u"], "snakewalk_probe.py"), (["-m"], "-m snakewalk_probe")],
+)
+def test_a_python_program_that_has_the_port_open_is_named_with_its_script(
+    pair: tuple[int, SerialPort], tmp_path: Path, before: list[str], shown: str
+) -> None:
+    name = pair[1].name
+    script = tmp_path / "snakewalk_probe.py"
+    script.write_text(
+        "import os, sys, time\n"
+        "os.open(sys.argv[-1], os.O_RDWR)\nprint(flush=True)\ntime.sleep(99)\n"
+    )
+    target = script.stem if "-m" in before else str(script)
+    words = [sys.executable, *before, target, name]
+    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            text = open_fault(name, 57_600, OSError(errno.EBUSY, "busy"))
+        finally:
+            process.kill()
+    assert f"{shown} (process {process.pid})" in text
+    assert text.endswith("; close it"), "it is no command of snakewalk"
 
 
 def test_a_command_of_snakewalk_that_has_the_port_open_is_named_with_its_run(
