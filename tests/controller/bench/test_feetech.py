@@ -36,7 +36,12 @@ def doctor(line: FeetechLine) -> Sequence[Finding]:
     return examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
 
 
-@pytest.mark.parametrize("model", ["STS3215", "SCS0009", "HLS3606"])
+SLOW = pytest.mark.slow  # a scan of all rates needs 5 s
+
+
+@pytest.mark.parametrize(
+    "model", ["STS3215", pytest.param("SCS0009", marks=SLOW), pytest.param("HLS3606", marks=SLOW)]
+)
 def test_a_scan_finds_feetech_servos_at_their_rate(model: str) -> None:
     found = scan(a_line(f"1,2,250:{model}", 500_000)).servos
     assert [(each.servo_id, each.model, each.baud) for each in found] == [
