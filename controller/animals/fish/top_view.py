@@ -2,7 +2,7 @@
 
 The last step moves all parameters at once, by least squares on shaded areas. A coordinate search
 stops on a ridge: two spine angles that change against each other hardly move the outline. So from a
-start five degrees off it leaves the angles where they are (measured: docs/fish.md). The difference
+start five degrees off it leaves the angles where they are. The difference
 of areas is a sum over pixels, so its derivative is cheap.
 """
 
