@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import cv2
 import numba
@@ -21,8 +22,15 @@ COLUMNS, ROWS = 1300, 600
 FAR_M = 14.0
 SKY = (196.0, 214.0, 232.0)
 
+F = TypeVar("F")
 
-@numba.njit(cache=True)
+
+def _compiled(function: F) -> F:
+    made: F = numba.njit(cache=True)(function)
+    return made
+
+
+@_compiled
 def _hash(i: int, j: int, k: int) -> float:
     n = (i * 374761393 + j * 668265263 + k * 2147483647) & 0xFFFFFFFF
     n = ((n ^ (n >> 13)) * 1274126177) & 0xFFFFFFFF
@@ -30,7 +38,7 @@ def _hash(i: int, j: int, k: int) -> float:
     return ((n ^ (n >> 15)) & 0xFFFFFF) / 16777215.0
 
 
-@numba.njit(cache=True)
+@_compiled
 def _noise(x: float, y: float, z: float) -> float:
     """Value noise from 0 to 1 with a period of one unit."""
     i, j, k = math.floor(x), math.floor(y), math.floor(z)
@@ -46,7 +54,7 @@ def _noise(x: float, y: float, z: float) -> float:
     return total
 
 
-@numba.njit(cache=True)
+@_compiled
 def _heights(z: Array) -> None:
     for row in range(z.shape[0]):
         for column in range(z.shape[1]):
@@ -61,17 +69,17 @@ def _heights(z: Array) -> None:
             z[row, column] = wall * (0.9 + 0.9 * ledge + 0.35 * rough) + 0.09 * rough
 
 
-@numba.njit(cache=True)
+@_compiled
 def _height(z: Array, x: float, y: float) -> float:
     u, v = (x - X0_M) / CELL_M, (y - Y0_M) / CELL_M
     u, v = min(max(u, 0.0), z.shape[1] - 1.001), min(max(v, 0.0), z.shape[0] - 1.001)
     i, j = int(u), int(v)
     fu, fv = u - i, v - j
     low = (1 - fu) * z[j, i] + fu * z[j, i + 1]
-    return (1 - fv) * low + fv * ((1 - fu) * z[j + 1, i] + fu * z[j + 1, i + 1])
+    return float((1 - fv) * low + fv * ((1 - fu) * z[j + 1, i] + fu * z[j + 1, i + 1]))
 
 
-@numba.njit(cache=True)
+@_compiled
 def _reach(z: Array, at: Array, ray: Array) -> float:
     """Distance along the ray to the ground; NaN if it meets none."""
     near, far = 0.02, 0.02
@@ -91,7 +99,7 @@ def _reach(z: Array, at: Array, ray: Array) -> float:
     return math.nan
 
 
-@numba.njit(cache=True)
+@_compiled
 def _colour(z: Array, x: float, y: float, up: float, out: Array) -> None:
     grain = 0.0
     weight = 0.0
@@ -113,7 +121,7 @@ def _colour(z: Array, x: float, y: float, up: float, out: Array) -> None:
     out[2] += 255.0 * level * ((1 - green) * 0.62 + green * 0.35)
 
 
-@numba.njit(cache=True)
+@_compiled
 def _cast(
     z: Array, at: Array, axes: Array, lens: Array, fine: int, picture: Array, depth: Array
 ) -> None:
