@@ -3,34 +3,32 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Indices
-from snakewalk.config.errors import InputError
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.drivers.protocol.protocol1 import MAX_ID, Error1
 from snakewalk.sim.ax12.alarms import Ax12Alarms
 from snakewalk.sim.ax12.table import MODEL, end_of, initial_value
 from snakewalk.sim.plant import Plant
-from snakewalk.sim.servo.blocked_shaft import BlockedShaft
-from snakewalk.sim.servo.constant_readings import ConstantReadings
-from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MotorModel, make_drive
 from snakewalk.sim.servo.profile import Trajectory
+from snakewalk.sim.servo.simulated_servos import SimulatedServos, check_ids
 
-SLICE_S = 2e-3
 WHEEL_GAIN = 1e-9
 CLOCKWISE = 0x400
 """Bit 10: the direction of speeds and loads."""
 TURN_RAD = 2.0 * np.pi
 
 
-class Ax12Servos:
+class Ax12Servos(SimulatedServos):
     """S servos of one model on the shafts of ``plant``.
 
     Raises:
         InputError: an ID is out of 0 to 253 or used twice, or the model cannot be simulated.
 
     """
+
+    protection: Ax12Alarms
 
     def __init__(
         self,
@@ -43,36 +41,18 @@ class Ax12Servos:
         self.facts = facts = servo_model(MODEL) if facts is None else facts
         motor = MotorModel.of(facts)
         supply_v = motor.nominal_v if supply_v is None else supply_v
-        wrong = [
-            f"ID {each}: an {facts.model} has 0 to {MAX_ID}"
-            for each in ids
-            if not 0 <= each <= MAX_ID
-        ]
-        if len(set(ids)) != len(ids):
-            wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
-        if wrong:
-            raise InputError(wrong)
+        check_ids(ids, facts.model, MAX_ID)
         servos = len(ids)
-        self.plant = plant
+        super().__init__(plant, make_drive([motor] * servos, supply_v))
         self._per_rad, self._centre = facts.positions_per_rad, facts.units.zero_position
         self._starts = {row.address: name for name, row in facts.registers.items()}
         self.table = np.zeros((servos, end_of(facts.registers)), np.uint8)
-        self.drive = make_drive([motor] * servos, supply_v)
         self._views = {name: self._view(cell) for name, cell in facts.registers.items()}
-        self.blocked_shaft = BlockedShaft(self.drive)
         self.protection = Ax12Alarms(
             self._views.__getitem__, self.drive, motor, self.blocked_shaft, supply_v
         )
-        self.events = EventQueue()
-        """Events that happen to the servos at a time of their own, such as faults."""
-        self.powered = np.ones(servos, bool)
-        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
-        self._no_output = np.zeros(servos, bool)
-        self._readings = ConstantReadings(self._views.__getitem__)
         self._trajectory = Trajectory(servos, facts.rad_s_per_velocity, np.nan)
         self._turn_rad = np.zeros(servos)
-        self._registered: dict[int, tuple[int, bytes]] = {}
-        self._time_s = plant.time_s
         for row, servo_id in enumerate(ids):
             self.reset(row)
             self["ID"][row] = servo_id
@@ -80,9 +60,6 @@ class Ax12Servos:
     def __getitem__(self, name: str) -> NDArray[np.unsignedinteger]:
         """(S,) live view of a register of all servos."""
         return self._views[name]
-
-    def __len__(self) -> int:
-        return len(self.table)
 
     # instructions
 
@@ -142,8 +119,6 @@ class Ax12Servos:
             self[name][row] = initial_value(self.facts, name)
         self.reboot(row)
 
-    # power, blocked shafts, time
-
     def reboot(self, row: int) -> None:
         """Restart: initial RAM, Torque Limit(34) = Max Torque(14), goal = present position."""
         for name, cell in self.facts.registers.items():
@@ -154,51 +129,6 @@ class Ax12Servos:
         self.protection.reset(row)
         self.refresh()
         self["Goal Position"][row] = self["Present Position"][row]
-
-    def cut_power(self, rows: Indices) -> None:
-        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
-        self.powered[rows] = False
-
-    def restore_power(self, rows: Indices) -> None:
-        """Give the supply back."""
-        self.powered[rows] = True
-        for row in rows:
-            self.reboot(int(row))
-
-    def block_shafts(self, rows: Indices) -> None:
-        """Block shafts where they are."""
-        for row in rows:
-            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
-
-    def free_shafts(self, rows: Indices) -> None:
-        """Free blocked shafts."""
-        for row in rows:
-            self.blocked_shaft.free(int(row))
-
-    def cut_output(self, rows: Indices, on: bool) -> None:
-        """Cut the output stages of servos off their motors, or connect them again."""
-        self._no_output[rows] = on
-
-    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
-        """Let servos report a constant value in a register; None: the present one."""
-        self.refresh()
-        self._readings.set(rows, name, value)
-
-    def clear_reading(self, rows: Indices, name: str) -> None:
-        """Let servos report measured values in a register again."""
-        self._readings.clear(rows, name)
-
-    def advance(self, until_s: float) -> None:
-        """Step physics, trajectories and alarms to ``until_s``."""
-        while self._time_s < until_s:
-            stop_s = min(until_s, self._time_s + SLICE_S, self.events.next_s)
-            if stop_s > self._time_s:
-                self._update_drive(stop_s - self._time_s)
-                self.plant.advance(stop_s, self.drive)
-                self.protection.check(stop_s - self._time_s, self.plant.velocity_rad_s)
-                self._time_s = stop_s
-            if stop_s >= self.events.next_s:
-                self.events.run_due(stop_s)
 
     # registers and shafts
 

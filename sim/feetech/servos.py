@@ -6,20 +6,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Indices
-from snakewalk.config.errors import InputError
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.protocol.feetech import CALIBRATE_MIDDLE, MAX_ID, TORQUE_DAMPING
 from snakewalk.sim.feetech.alarms import FeetechAlarms
 from snakewalk.sim.feetech.registers import FeetechRegisters
 from snakewalk.sim.plant import Mounting, Plant
-from snakewalk.sim.servo.blocked_shaft import BlockedShaft
-from snakewalk.sim.servo.constant_readings import ConstantReadings
-from snakewalk.sim.servo.event_queue import EventQueue
 from snakewalk.sim.servo.motor import MotorColumns, MotorModel, make_drive
 from snakewalk.sim.servo.profile import Trajectory
+from snakewalk.sim.servo.simulated_servos import SimulatedServos, check_ids
 
-SLICE_S: Final = 2e-3
 POSITION, VELOCITY, PUSH, STEP = range(4)
 """Operating Mode(33); PUSH is open-loop PWM on STS servos, and current on HLS servos. STEP is
 open-loop PWM on HLS servos."""
@@ -31,8 +27,10 @@ _FULL = 1000.0
 """Goal PWM, PWM Limit, Present Load and open-loop PWM of full output."""
 
 
-class FeetechServos:
+class FeetechServos(SimulatedServos):
     """S servos of one model on the shafts of ``plant``."""
+
+    protection: FeetechAlarms
 
     def __init__(
         self,
@@ -49,36 +47,23 @@ class FeetechServos:
             InputError: an ID is out of 0 to 253 or used twice.
 
         """
-        wrong = [f"ID {each}: an {facts.model} has 0 to {MAX_ID}" for each in ids if each > MAX_ID]
-        if len(set(ids)) != len(ids):
-            wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
-        if wrong:
-            raise InputError(wrong)
+        check_ids(ids, facts.model, MAX_ID)
         servos = len(ids)
-        self.facts, self.plant = facts, plant
         model = MotorModel.of(facts)
+        volts = model.nominal_v if supply_v is None else supply_v
+        super().__init__(plant, make_drive(motors or [model] * servos, volts))
+        self.facts = facts
         self._motor = MotorColumns(motors or [model] * servos)
         self._mounting = mounting or Mounting(np.ones(servos), np.zeros(servos))
-        volts = model.nominal_v if supply_v is None else supply_v
         self.registers = registers = FeetechRegisters(facts, servos)
-        self.drive = make_drive(motors or [model] * servos, volts)
-        self.blocked_shaft = BlockedShaft(self.drive)
         self.protection = FeetechAlarms(
             registers.__getitem__, facts.alarms, self.drive, model, self.blocked_shaft, volts
         )
-        self.events = EventQueue()
-        """Events that happen to the servos at a time of their own, such as faults."""
-        self.powered = np.ones(servos, bool)
-        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
-        self._no_output = np.zeros(servos, bool)
-        self._readings = ConstantReadings(registers.__getitem__)
         self._trajectory = Trajectory(servos, facts.rad_s_per_velocity, ACCELERATION_RAD_S2)
         self._turns = np.zeros(servos)
         self._step_goal = np.full(servos, np.nan)
         """(S,) goals of servos in step mode, positions of all turns; NaN before the first step."""
         self._was_on = np.zeros(servos, bool)
-        self._registered: dict[int, tuple[int, bytes]] = {}
-        self._time_s = plant.time_s
         for row, servo_id in enumerate(ids):
             registers.put(row, "Lock", 0)
             registers.put(row, "ID", servo_id)
@@ -87,9 +72,6 @@ class FeetechServos:
     def __getitem__(self, name: str) -> NDArray[np.int64]:
         """(S,) live view of a register of all servos."""
         return self.registers[name]
-
-    def __len__(self) -> int:
-        return len(self.powered)
 
     # instructions
 
@@ -154,59 +136,12 @@ class FeetechServos:
         self.refresh()
         self["Goal Position"][row] = self["Present Position"][row]
 
-    # power, blocked shafts, time
-
     def hold_position(self) -> None:
         """Give every servo its present position as goal, at rest: its shaft was put elsewhere."""
         self._turns = self._turn()
         self.refresh()
         self["Goal Position"][:] = self["Present Position"]
         self._trajectory.restart(np.ones(len(self), bool), self._servo_rad())
-
-    def cut_power(self, rows: Indices) -> None:
-        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
-        self.powered[rows] = False
-
-    def restore_power(self, rows: Indices) -> None:
-        """Give the supply back."""
-        self.powered[rows] = True
-        for row in rows:
-            self.reboot(int(row))
-
-    def block_shafts(self, rows: Indices) -> None:
-        """Block shafts where they are."""
-        for row in rows:
-            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
-
-    def free_shafts(self, rows: Indices) -> None:
-        """Free blocked shafts."""
-        for row in rows:
-            self.blocked_shaft.free(int(row))
-
-    def cut_output(self, rows: Indices, on: bool) -> None:
-        """Cut the output stages of servos off their motors, or connect them again."""
-        self._no_output[rows] = on
-
-    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
-        """Let servos report a constant value in a register; None: the present one."""
-        self.refresh()
-        self._readings.set(rows, name, value)
-
-    def clear_reading(self, rows: Indices, name: str) -> None:
-        """Let servos report measured values in a register again."""
-        self._readings.clear(rows, name)
-
-    def advance(self, until_s: float) -> None:
-        """Step physics, trajectories and alarms to ``until_s``."""
-        while self._time_s < until_s:
-            stop_s = min(until_s, self._time_s + SLICE_S, self.events.next_s)
-            if stop_s > self._time_s:
-                self._update_drive(stop_s - self._time_s)
-                self.plant.advance(stop_s, self.drive)
-                self.protection.check(stop_s - self._time_s, self.plant.velocity_rad_s)
-                self._time_s = stop_s
-            if stop_s >= self.events.next_s:
-                self.events.run_due(stop_s)
 
     # registers and shafts
 

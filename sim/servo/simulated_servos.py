@@ -1,0 +1,123 @@
+"""Base of simulated servos on one plant: supply, blocked shafts, constant readings, time."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Indices
+from snakewalk.config.errors import InputError
+from snakewalk.sim.plant import Plant, ServoDrive
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
+from snakewalk.sim.servo.constant_readings import ConstantReadings
+from snakewalk.sim.servo.event_queue import EventQueue
+
+SLICE_S: Final = 2e-3
+"""Longest step between two updates of drives and alarms (ours)."""
+
+
+class ServoAlarms(Protocol):
+    """Heat and alarms of the servos."""
+
+    def check(self, seconds: float, velocity_rad_s: Floats) -> None:
+        """Update heat and alarms after ``seconds``."""
+
+
+def check_ids(ids: Sequence[int], model: str, most: int) -> None:
+    """Check the IDs of new servos.
+
+    Raises:
+        InputError: an ID is out of 0 to ``most`` or used twice.
+
+    """
+    wrong = [f"ID {each}: an {model} has 0 to {most}" for each in ids if not 0 <= each <= most]
+    if len(set(ids)) != len(ids):
+        wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
+    if wrong:
+        raise InputError(wrong)
+
+
+class SimulatedServos(ABC):
+    """S servos whose registers drive the shafts of a plant."""
+
+    protection: ServoAlarms
+
+    def __init__(self, plant: Plant, drive: ServoDrive) -> None:
+        """Set up the servos' supply and time; the registers are the subclass's."""
+        servos = len(drive.torque_on)
+        self.plant, self.drive = plant, drive
+        self.blocked_shaft = BlockedShaft(drive)
+        self.events = EventQueue()
+        """Events that happen to the servos at a time of their own, such as faults."""
+        self.powered = np.ones(servos, bool)
+        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
+        self._no_output = np.zeros(servos, bool)
+        self._readings = ConstantReadings(self.__getitem__)
+        self._registered: dict[int, tuple[int, bytes]] = {}
+        self._time_s = plant.time_s
+
+    @abstractmethod
+    def __getitem__(self, name: str) -> NDArray[np.integer[Any]]:
+        """(S,) live view of a register of all servos."""
+
+    @abstractmethod
+    def reboot(self, row: int) -> None:
+        """Restart one servo."""
+
+    @abstractmethod
+    def refresh(self) -> None:
+        """Write all present values into the registers."""
+
+    @abstractmethod
+    def _update_drive(self, seconds: float) -> None:
+        """Let the registers drive the motors for ``seconds``."""
+
+    def __len__(self) -> int:
+        return len(self.powered)
+
+    def cut_power(self, rows: Indices) -> None:
+        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
+        self.powered[rows] = False
+
+    def restore_power(self, rows: Indices) -> None:
+        """Give the supply back."""
+        self.powered[rows] = True
+        for row in rows:
+            self.reboot(int(row))
+
+    def block_shafts(self, rows: Indices) -> None:
+        """Block shafts where they are."""
+        for row in rows:
+            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
+
+    def free_shafts(self, rows: Indices) -> None:
+        """Free blocked shafts."""
+        for row in rows:
+            self.blocked_shaft.free(int(row))
+
+    def cut_output(self, rows: Indices, on: bool) -> None:
+        """Cut the output stages of servos off their motors, or connect them again."""
+        self._no_output[rows] = on
+
+    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
+        """Let servos report a constant value in a register; None: the present one."""
+        self.refresh()
+        self._readings.set(rows, name, value)
+
+    def clear_reading(self, rows: Indices, name: str) -> None:
+        """Let servos report measured values in a register again."""
+        self._readings.clear(rows, name)
+
+    def advance(self, until_s: float) -> None:
+        """Step physics, trajectories and alarms to ``until_s``."""
+        while self._time_s < until_s:
+            stop_s = min(until_s, self._time_s + SLICE_S, self.events.next_s)
+            if stop_s > self._time_s:
+                self._update_drive(stop_s - self._time_s)
+                self.plant.advance(stop_s, self.drive)
+                self.protection.check(stop_s - self._time_s, self.plant.velocity_rad_s)
+                self._time_s = stop_s
+            if stop_s >= self.events.next_s:
+                self.events.run_due(stop_s)
