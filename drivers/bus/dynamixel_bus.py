@@ -41,7 +41,7 @@ from snakewalk.drivers.protocol.packet import (
 )
 
 T = TypeVar("T")
-_PROBES = 5
+PROBES = 5
 _PING_BYTES = 3
 """Model number and firmware."""
 _GAP_BYTES = 64
@@ -166,7 +166,7 @@ class DynamixelBus:
         """
         table = self.table_of(servo_id)
         ends = None if block is None else (table[block[0]], table[block[1]])
-        return probe(self.port, servo_id, _PROBES, self.latency_s, ends)
+        return probe(self.port, servo_id, PROBES, self.latency_s, ends)
 
     def read(self, servo_id: int, name: str) -> int:
         """Value of a register by its name.

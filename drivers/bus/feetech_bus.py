@@ -11,7 +11,7 @@ import numpy as np
 
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.bus.control_cycle import ControlCycle
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
+from snakewalk.drivers.bus.dynamixel_bus import PROBES, DynamixelBus, PingReply
 from snakewalk.drivers.bus.feetech_cycle import (
     Convert,
     FeetechCycle,
@@ -20,7 +20,7 @@ from snakewalk.drivers.bus.feetech_cycle import (
     state_convert,
     supply_convert,
 )
-from snakewalk.drivers.bus.probe import Probe
+from snakewalk.drivers.bus.probe import Probe, probe_with
 from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import Model, Register
@@ -39,7 +39,6 @@ from snakewalk.drivers.protocol.registers import bauds_of
 _REPLY_S = 0.005
 """Time for servo and adapter besides the wire and ``latency_s`` (ours); the longest return delay is
 0.508 ms."""
-_PROBES = 5
 
 
 class FeetechBus(DynamixelBus):
@@ -117,26 +116,9 @@ class FeetechBus(DynamixelBus):
             first, last = (self.table_of(servo_id)[name] for name in block)
             code, length = FeetechInstruction.READ, last.address + last.size - first.address
             params = bytes((first.address, length))
-        packet, port = frame(servo_id, code, params), self.port
-        byte_s, reply_bytes = BITS_PER_BYTE / port.getBaudRate(), STATUS_BYTES + length
-        answered = total = damaged = 0
-        late_s: list[float] = []
-        for _ in range(_PROBES):
-            port.clearPort()
-            sent_s = port.clock.now_s()
-            port.write(packet)
-            wire_s = (len(packet) + 2 * reply_bytes) * byte_s
-            reader, replies = FeetechParser(), 0
-            while data := port.read_until(reply_bytes, sent_s + wire_s + _REPLY_S + self.latency_s):
-                replies += sum(each.servo_id == servo_id for each in reader.feed(data))
-                if replies == 1 and len(late_s) == answered:
-                    least_s = (len(packet) + reply_bytes) * byte_s
-                    late_s.append(port.clock.now_s() - sent_s - least_s)
-            answered += replies > 0
-            total += replies
-            damaged += reader.dropped_bytes + reader.pending > 0
-        doubled = max(0, total - _PROBES)
-        return Probe(servo_id, _PROBES, answered, doubled, damaged, tuple(late_s))
+        packet, wait_s = frame(servo_id, code, params), _REPLY_S + self.latency_s
+        reply_bytes = STATUS_BYTES + length
+        return probe_with(self.port, servo_id, PROBES, packet, reply_bytes, wait_s, FeetechParser)
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
         """Write a register by its name; in the EEPROM area, until power-off while Lock is 1.

@@ -4,7 +4,9 @@ Servos with the same ID reply at the same time. Their bytes collide, or both rep
 return delays or clocks differ. Another master's packets come unasked.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from snakewalk.drivers.bus.budget import STATUS_BYTES
 from snakewalk.drivers.port.byte_port import BytePort
@@ -76,7 +78,47 @@ def probe(
         data_bytes = block[1].address + block[1].size - address
         span = address.to_bytes(2, "little") + data_bytes.to_bytes(2, "little")
     packet = encode_instruction(InstructionPacket(servo_id, kind, span))
-    reply_bytes = STATUS_BYTES + data_bytes
+    reply_bytes, wait_s = STATUS_BYTES + data_bytes, _SETTLE_S + latency_s
+    return probe_with(port, servo_id, requests, packet, reply_bytes, wait_s, PacketParser)
+
+
+class ReplyParser(Protocol):
+    """Packets out of received bytes."""
+
+    dropped_bytes: int
+
+    @property
+    def pending(self) -> int:
+        """Bytes of a packet that is not complete."""
+
+    def feed(self, data: bytes, /) -> Sequence[object]:
+        """Packets that are complete with these bytes."""
+
+
+def probe_with(
+    port: BytePort,
+    servo_id: int,
+    requests: int,
+    packet: bytes,
+    reply_bytes: int,
+    wait_s: float,
+    new_parser: Callable[[], ReplyParser],
+) -> Probe:
+    """Send a request several times, each time until the line is quiet, in any protocol.
+
+    Args:
+        port: the line.
+        servo_id: ID of the servo.
+        requests: how often.
+        packet: the request.
+        reply_bytes: length of one reply.
+        wait_s: time for servo, adapter and driver besides the wire.
+        new_parser: makes a parser of replies.
+
+    Raises:
+        PortError: the port is gone.
+
+    """
     byte_s = BITS_PER_BYTE / port.getBaudRate()
     answered = total = damaged = 0
     late_s: list[float] = []
@@ -85,8 +127,8 @@ def probe(
         port.clearPort()
         sent_s = port.clock.now_s()
         port.write(packet)
-        deadline_s = sent_s + (len(packet) + 2 * reply_bytes) * byte_s + _SETTLE_S + latency_s
-        reader = PacketParser()
+        deadline_s = sent_s + (len(packet) + 2 * reply_bytes) * byte_s + wait_s
+        reader = new_parser()
         replies = 0
         waited = False
         while True:
