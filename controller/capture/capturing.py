@@ -4,7 +4,7 @@ A track that was captured before is corrected by the file that the user has save
 page.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
@@ -19,11 +19,12 @@ from snakewalk.controller.capture.capture import (
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, PartFolder
+from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
-from snakewalk.controller.capture.plots.capture import contact_sheet, overlay_film, step_picture
+from snakewalk.controller.capture.plots.capture import contact_sheet, step_picture
 from snakewalk.controller.capture.results import write_captures
-from snakewalk.controller.capture.review import picture_scale, review_page
+from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 from snakewalk.controller.capture.verification.film_check import REJECTED
 from snakewalk.controller.console.messages import LOGGER, stderr_console
@@ -154,13 +155,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     parts = _parts(options, film, folder, finished)
     with ProgressBar("frames", footage.count, transient=True, remaining=True) as bar:
         captured = _captured(parts, film, detector, bar)
-        time_s, rate_hz = film.times(options.rate_hz, captured.time_s)
-        captured = replace(
-            captured,
-            points_px=film.region.moved(captured.points_px),
-            time_s=time_s,
-            rate_hz=rate_hz,
-        )
+        captured = in_whole_film(options, film, captured)
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
         held = CaptureFile(
@@ -252,21 +247,7 @@ def _write_pictures(
         image = film.cut(shot)
         line = captured.points_px[number] - np.array(region.origin_px)
         step_picture(options.steps, image, detector, line)
-    if options.overlay is not None:
-        bar.update(0, footage.count, description="overlay film")
-        overlay_film(options.overlay, footage.read(), [captured], bar.advance)
-    if options.review is not None:
-        bar.update(0, footage.count, description="review page")
-        text = review_page(
-            [held],
-            map(region.cut, footage.read()),
-            scale=scale,
-            tracks=[options.output],
-            origin_px=region.origin_px,
-            on_progress=bar.advance,
-        )
-        with atomic_write(options.review) as part:
-            part.write_text(text, encoding="utf-8")
+    write_overlay_and_review(options, film, [held], [options.output], bar, scale)
 
 
 def facts_of(

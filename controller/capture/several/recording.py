@@ -1,18 +1,18 @@
 """A film of several animals captured: identities, one track each, one page, one film for all."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import CaptureFile
 from snakewalk.controller.capture.capturing import CaptureFacts, facts_of, marker_scale
+from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import AUTO, CaptureOptions, check_options, track_files
-from snakewalk.controller.capture.plots.capture import overlay_film
 from snakewalk.controller.capture.results import write_captures
-from snakewalk.controller.capture.review import picture_scale, review_page
+from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.scale import scale_of_length
 from snakewalk.controller.capture.several.animal_films import (
     AnimalsFound,
@@ -23,7 +23,7 @@ from snakewalk.controller.capture.several.animal_films import (
 from snakewalk.controller.capture.several.blobs import detector_of_several
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import refuse_to_overwrite
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -129,12 +129,9 @@ def _files(
         if one.captured is None:
             out.append(None)
             continue
-        time_s, rate_hz = film.times(options.rate_hz, one.captured.time_s)
-        moved = film.region.moved(one.captured.points_px)
-        captured = replace(one.captured, points_px=moved, time_s=time_s, rate_hz=rate_hz)
         out.append(
             CaptureFile(
-                captured,
+                in_whole_film(options, film, one.captured),
                 name=f"{options.recording.stem}-{number}",
                 m_per_px=m_per_px,
                 rate_assumed=film.footage.rate_assumed,
@@ -157,28 +154,10 @@ def _write(
     if options.output.suffix.lower() != ".npz":
         write_captures(options.output, good, wide=options.wide)
     else:
-        for file, one in zip(files, held, strict=True):
-            if one is not None:
-                write_captures(file, [one])
-    count = film.footage.count
-    if options.overlay is not None:
-        bar.update(0, count, description="overlay film")
-        overlay_film(
-            options.overlay, film.footage.read(), [one.captured for one in good], bar.advance
-        )
-    if options.review is not None:
-        bar.update(0, count, description="review page")
-        named = [(one, file) for one, file in zip(held, files, strict=True) if one is not None]
-        text = review_page(
-            [one for one, _ in named],
-            map(film.region.cut, film.footage.read()),
-            scale=scale,
-            tracks=[file for _, file in named],
-            origin_px=film.region.origin_px,
-            on_progress=bar.advance,
-        )
-        with atomic_write(options.review) as part:
-            part.write_text(text, encoding="utf-8")
+        files = [file for file, one in zip(files, held, strict=True) if one is not None]
+        for file, one in zip(files, good, strict=True):
+            write_captures(file, [one])
+    write_overlay_and_review(options, film, good, files, bar, scale)
 
 
 def _facts(

@@ -1,0 +1,58 @@
+"""Results of a captured film that do not depend on the number of its animals."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from snakewalk.controller.capture.capture import Capture, CaptureFile
+from snakewalk.controller.capture.opened_film import OpenedFilm
+from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.plots.capture import overlay_film
+from snakewalk.controller.capture.review import review_page
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.console.result_files import atomic_write
+
+
+def in_whole_film(options: CaptureOptions, film: OpenedFilm, captured: Capture) -> Capture:
+    """Return a capture with points in the whole images, and the times that the film states."""
+    time_s, rate_hz = film.times(options.rate_hz, captured.time_s)
+    points_px = film.region.moved(captured.points_px)
+    return replace(captured, points_px=points_px, time_s=time_s, rate_hz=rate_hz)
+
+
+def write_overlay_and_review(
+    options: CaptureOptions,
+    film: OpenedFilm,
+    animals: Sequence[CaptureFile],
+    tracks: Sequence[Path],
+    bar: ProgressBar,
+    scale: float,
+) -> None:
+    """Write the overlay film and the review page if the options name them.
+
+    Args:
+        options: of the command.
+        film: is read once for each.
+        animals: those with a track.
+        tracks: their files, which the page names.
+        bar: shows the progress.
+        scale: of the page's pictures: ``picture_scale``.
+
+    """
+    footage, region = film.footage, film.region
+    if options.overlay is not None:
+        bar.update(0, footage.count, description="overlay film")
+        captures = [one.captured for one in animals]
+        overlay_film(options.overlay, footage.read(), captures, bar.advance)
+    if options.review is not None:
+        bar.update(0, footage.count, description="review page")
+        text = review_page(
+            animals,
+            map(region.cut, footage.read()),
+            scale=scale,
+            tracks=tracks,
+            origin_px=region.origin_px,
+            on_progress=bar.advance,
+        )
+        with atomic_write(options.review) as part:
+            part.write_text(text, encoding="utf-8")
