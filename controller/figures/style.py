@@ -86,11 +86,13 @@ def trace(axes: Axes, time_s: Floats, values: Floats, colour: str, label: str) -
     axes.plot(t, mean, color=colour, linewidth=1.3, label=label)
 
 
-def thin(time_s: Floats, values: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def thin(
+    time_s: Floats, values: Floats, points: int = _POINTS
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Time, least, mean and largest of every few samples; short series (n,) as they are."""
     known = np.isfinite(values)
     time_s, values = time_s[known], values[known]
-    size = -(-len(time_s) // _POINTS)
+    size = -(-len(time_s) // points)
     if size < 3:
         return time_s, values, values, values
     first = np.arange(0, len(time_s), size)

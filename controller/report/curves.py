@@ -22,8 +22,11 @@ from snakewalk.controller.runlog.record import RunRecord
 
 _ROWS: Final = 4000
 """Most rows of a curve: of a longer run every second, third ... row is on the page (ours)."""
-_BLOCK: Final = 2700
-"""Cycles from which a curve that jumps in most of them would be drawn as a block (ours)."""
+_BLOCK: Final = 400
+"""Crossings of the middle of a curve from which a panel would show a block (ours): about one for
+two pixels."""
+_BAND_POINTS: Final = 100
+"""Places of the band that is drawn instead."""
 _PANEL_PX: Final = 160
 _GAP: Final = 0.06
 Curve = tuple[str, str, Floats, Floats]
@@ -113,7 +116,7 @@ def _figure(
         "layout": _layout(record, titles),
         "joints": every,
         "first": first,
-        "height": _PANEL_PX * len(titles) + 60,
+        "height": _PANEL_PX * len(titles) + 88,
     }
 
 
@@ -122,7 +125,7 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
     reached = "solid" if record.header.pose_evidence.is_measured else "dash"
     tall = (1.0 - _GAP * (count - 1)) / count
     layout: dict[str, Any] = {
-        "margin": {"l": 46, "r": 8, "t": 22, "b": 36},
+        "margin": {"l": 46, "r": 8, "t": 50, "b": 36},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
         "hovermode": "x",
         "showlegend": True,
@@ -175,11 +178,11 @@ def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
 def _traces(
     name: str, colour: str, row: int, time_s: Floats, values: Floats
 ) -> list[dict[str, Any]]:
-    """Return the trace of a curve; of one that jumps in most cycles, the mean in a pale band."""
-    steps = np.abs(np.diff(values[np.isfinite(values)]))
-    if len(steps) < _BLOCK or np.median(steps) < 0.1 * float(np.ptp(values[np.isfinite(values)])):
+    """Return the trace of a curve; of one that jumps all the time, the mean in a pale band."""
+    known = values[np.isfinite(values)]
+    if len(known) < _BLOCK or _crossings(known) < _BLOCK:
         return [_trace(name, colour, row, time_s, values)]
-    at_s, low, mean, high = thin(time_s, values)
+    at_s, low, mean, high = thin(time_s, values, _BAND_POINTS)
     edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
     return [
         _trace(name, colour, row, at_s, low) | edge,
@@ -188,6 +191,12 @@ def _traces(
         | {"fill": "tonexty", "fillcolor": _pale(colour)},
         _trace(f"{name}, mean", colour, row, at_s, mean),
     ]
+
+
+def _crossings(values: Floats) -> int:
+    """Return how often a curve crosses the middle between its least and its largest value."""
+    above = values > (values.min() + values.max()) / 2
+    return int(np.count_nonzero(above[1:] != above[:-1]))
 
 
 def _pale(colour: str) -> str:
