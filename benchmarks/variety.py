@@ -1,0 +1,109 @@
+"""How varied the motion of a walk is on slopes: effective frequencies of the joint goals.
+
+The spectrum of each yaw joint's goals is averaged over windows of 20 s that overlap by half (Welch
+1967, Hann window). Its effective number of frequencies is the exponential of the entropy of the
+power between 0.05 and 4 Hz, in bins of 0.05 Hz; the mean over the joints is printed. A serpenoid
+has one frequency, which the window spreads over 2.4 bins.
+
+python -m benchmarks.variety --slopes 0.2 12 --seeds 4 --first-seed 10 -o variety.jsonl
+
+The command continues its file.
+"""
+
+import argparse
+import json
+import math
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.signal
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.factory import prepare_walk
+
+RUN = "ramp-10-up"
+WINDOW_S = 20.0
+BAND_HZ = (0.05, 4.0)
+STILL_RAD = 0.05
+"""Standard deviation under which a joint does not take part."""
+
+
+def effective_frequencies(goals_rad: Floats, period_s: float) -> float:
+    """Effective number of frequencies of goals (n, joints), mean over the joints that move."""
+    moving = goals_rad[:, goals_rad.std(axis=0) > STILL_RAD]
+    frequency_hz, power = scipy.signal.welch(
+        moving, 1.0 / period_s, "hann", round(WINDOW_S / period_s), axis=0
+    )
+    least_hz, most_hz = BAND_HZ
+    inside = (frequency_hz > least_hz - 1e-9) & (frequency_hz < most_hz)
+    share = power[inside] / power[inside].sum(axis=0)
+    entropy = -(share * np.log(share + 1e-300)).sum(axis=0)
+    return float(np.exp(entropy).mean())
+
+
+def measured(slope_deg: float, motion: str, seed: int) -> dict[str, Any]:
+    """Walk up a plane, and return a row of the file."""
+    keys = {"world.ground.slope_rad": math.radians(slope_deg)}
+    prepared = prepare_walk(RUN, seed=seed, motion=motion, keys=keys)
+    with tempfile.TemporaryDirectory() as folder:
+        finished = execute(prepared, Path(folder) / "run", stoppable=False)
+    cycle, summary = finished.record.cycle, finished.summary
+    goals_rad = cycle.sent_rad[np.isfinite(cycle.sent_rad).all(axis=1)]
+    return {
+        "slope_deg": slope_deg,
+        "motion": motion,
+        "seed": seed,
+        "has_arrived": summary.waypoints_reached == summary.waypoints,
+        "duration_s": summary.duration_s,
+        "frequencies": effective_frequencies(goals_rad, finished.record.period_s),
+    }
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the rows as a table, one line for a slope and a motion."""
+    lines = [
+        "| slope, degrees | motion | runs | arrived | duration, s | effective frequencies |",
+        "| ---: | --- | ---: | ---: | ---: | ---: |",
+    ]
+    for slope_deg, motion in sorted({(row["slope_deg"], row["motion"]) for row in rows}):
+        of = [row for row in rows if (row["slope_deg"], row["motion"]) == (slope_deg, motion)]
+        number, time_s = (
+            np.array([row[key] for row in of]) for key in ("frequencies", "duration_s")
+        )
+        lines.append(
+            f"| {slope_deg:g} | {motion} | {len(of)} | {sum(row['has_arrived'] for row in of)} "
+            f"| {time_s.min():.0f} to {time_s.max():.0f} "
+            f"| {np.median(number):.1f} ({number.min():.1f} to {number.max():.1f}) |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure what the file does not have, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--slopes", type=float, nargs="+", default=[0.2, 12.0])
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("-o", "--out", type=Path, required=True)
+    asked = parser.parse_args()
+    rows = []
+    if asked.out.exists():
+        rows = [json.loads(line) for line in asked.out.read_text(encoding="utf-8").splitlines()]
+    done = {(row["slope_deg"], row["motion"], row["seed"]) for row in rows}
+    for seed in range(asked.first_seed, asked.first_seed + asked.seeds):
+        for slope_deg in asked.slopes:
+            for motion in ("walk", "serpenoid"):
+                if (slope_deg, motion, seed) in done:
+                    continue
+                rows.append(measured(slope_deg, motion, seed))
+                with asked.out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(rows[-1]) + "\n")
+    print(table(rows))
+
+
+if __name__ == "__main__":
+    main()
