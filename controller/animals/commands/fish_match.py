@@ -7,6 +7,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.commands.fish_options import Build, Picture, check_npz
+from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.fish.accuracy import compare
 from snakewalk.controller.animals.fish.fish_matching import MIDLINES, match_footage, read_midlines
 from snakewalk.controller.animals.fish.postures import load_postures, save_postures
@@ -88,9 +89,7 @@ def match(
     with atomic_write(output) as part:
         save_postures(part, matched.postures)
     if picture is not None:
-        from snakewalk.controller.animals.plots.fish import draw_match  # noqa: PLC0415  --picture: an extra
-
-        draw_match(picture, matched.postures, known, matched.film, footage)
+        pictures()[0].draw_match(picture, matched.postures, known, matched.film, footage)
     facts = matched.facts.to_dict()
     if accuracy is not None:
         facts |= accuracy.to_dict()

@@ -8,6 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
+from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.fish.fish_synthesis import SynthesisOptions, synthesise_motion
 from snakewalk.controller.animals.fish.postures import load_postures
 from snakewalk.controller.console import completion
@@ -92,9 +93,7 @@ def synthesise(
     with atomic_write(output) as part:
         made.save(part)
     if picture is not None:
-        from snakewalk.controller.animals.plots.fish_path import draw_synthesis  # noqa: PLC0415  --picture: an extra
-
-        draw_synthesis(picture, made, options)
+        pictures()[1].draw_synthesis(picture, made, options)
     show(made.facts.to_dict() | {"track": str(output)}, as_json)
 
 

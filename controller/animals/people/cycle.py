@@ -1,0 +1,296 @@
+"""A walk and a run of a person: poses by sines and cosines, legs from the feet ([GC] 2.2.2).
+
+The feet are the handles: Eq. 9 and 10 place them, and inverse kinematics gives hips, knees and
+ankles. The pelvis keeps the height at which both legs reach their feet. Turns of pelvis, chest and
+arms are sines of the cycle; their amplitudes, and the pitch of the feet, are ours.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.legged.leg import knees_m
+from snakewalk.controller.animals.people.feet import Feet, FeetLaw, FootParameters, feet
+from snakewalk.controller.animals.people.skeleton import (
+    ABDUCTION_RAD,
+    BALL,
+    HEEL,
+    INDEX,
+    PersonSkeleton,
+)
+from snakewalk.controller.gaits.wave import TURN
+from snakewalk.controller.track.bone_motion import BoneMotion
+
+REACH: Final = 0.998
+"""Largest extension of a leg over its length (ours)."""
+FRAMES: Final = 24
+"""Poses of a cycle ([GC] 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PersonGait:
+    """A cyclic motion of a person; lengths in shares of the stature, angles in degrees."""
+
+    name: str
+    cycle_s: float
+    height: float
+    """H of Eq. 10."""
+    length: float
+    """L of Eq. 10."""
+    duty: float
+    middle: float
+    """Middle of the steps, ahead of the hips."""
+    side: float
+    """Distance of the feet from the middle plane."""
+    bob: float
+    """Rise of the pelvis over its mean, highest while both feet are farthest apart if above 0."""
+    lean: float
+    """Pitch of the trunk, forward."""
+    turn: float
+    """Yaw of the pelvis to either side; the chest turns against it."""
+    drop: float
+    """Roll of the pelvis towards the foot in the air."""
+    arm: tuple[float, float]
+    """Mean of the upper arms, back above 0, and their swing to either side."""
+    elbow: tuple[float, float]
+    """Mean bend of the elbows, and its swing."""
+    spread: float
+    """Angle of the arms from the trunk."""
+    pitch: tuple[tuple[float, float], ...]
+    """Share of the cycle since a foot came down, and its pitch; above 0 the toes are up."""
+
+
+WALK: Final = PersonGait(
+    name="walk", cycle_s=1.08, height=0.022, length=0.228, duty=0.62, middle=-0.024, side=0.036,
+    bob=-0.011, lean=2.0, turn=6.0, drop=3.5, arm=(4.0, 19.0), elbow=(17.0, 9.0), spread=8.0,
+    pitch=((0.0, 18.0), (0.09, 0.0), (0.33, 0.0), (0.50, -22.0), (0.62, -52.0), (0.72, -45.0),
+           (0.86, 2.0), (0.94, 17.0)),
+)  # fmt: skip
+"""A walk at 1.2 m/s. A foot is on the ground for 62 % of a cycle (Perry, Gait Analysis)."""
+RUN: Final = PersonGait(
+    name="run", cycle_s=0.72, height=0.060, length=0.215, duty=0.35, middle=-0.050, side=0.022,
+    bob=0.020, lean=9.0, turn=8.0, drop=3.0, arm=(12.0, 34.0), elbow=(108.0, 14.0), spread=14.0,
+    pitch=((0.0, 6.0), (0.05, 0.0), (0.16, 0.0), (0.26, -28.0), (0.35, -58.0), (0.50, -98.0),
+           (0.66, -70.0), (0.82, -12.0), (0.93, 6.0)),
+)  # fmt: skip
+"""A run at 3 m/s: 35 % of a cycle on the ground, so that both feet are in the air twice."""
+GAITS: Final = {one.name: one for one in (WALK, RUN)}
+
+
+@dataclass(frozen=True, slots=True)
+class PersonMotion:
+    """Bones of a person over T moments, and the feet from which they follow."""
+
+    bones: BoneMotion
+    feet: Feet
+    ankle_m: Floats
+    """(T, 2, 3) the handles of the legs: left, right."""
+    speed_m_s: float
+    cycle_s: float
+
+
+def animate(
+    skeleton: PersonSkeleton,
+    gait: PersonGait,
+    law: FeetLaw = FeetLaw.PLANTED,
+    *,
+    cycles: int = 1,
+    frames: int = FRAMES,
+    in_place: bool = False,
+    parameters: FootParameters | None = None,
+) -> PersonMotion:
+    """Return whole cycles of a gait; the last pose is the first one again, farther ahead.
+
+    Args:
+        skeleton: of the person.
+        gait: walk or run.
+        law: equations of the feet.
+        cycles: how many.
+        frames: poses of a cycle.
+        in_place: whether the person walks on the spot, as on a treadmill.
+        parameters: of Eq. 10; default: those of the gait.
+
+    Raises:
+        InputError: fewer than one cycle, or fewer than four poses in it.
+
+    """
+    if cycles < 1 or frames < 4:
+        raise InputError("people: a motion needs one cycle or more, of four poses or more")
+    size = skeleton.stature_m
+    given = parameters or FootParameters(size * gait.height, size * gait.length, gait.duty)
+    phase = np.arange(cycles * frames + 1) / frames
+    ways = feet(law, given, phase)
+    speed_m_s = 2.0 * given.length_m / ways.duty / gait.cycle_s
+    time_s = phase * gait.cycle_s
+    travel_m = np.zeros_like(time_s) if in_place else speed_m_s * time_s
+    pitch, toes = _foot_pitch(gait, ways)
+    ankle_m = _ankles(skeleton, gait, ways, pitch)
+    pelvis, chest = _trunk_turns(gait, phase)
+    hips = _hips(skeleton, pelvis)
+    pelvis_m = _pelvis(skeleton, gait, phase, ankle_m, hips)
+    shift = travel_m[:, None] * [1.0, 0.0, 0.0]
+    pelvis_m += shift
+    ankle_m += shift[:, None]
+    turn = _turns(skeleton, gait, phase, (pelvis, chest), (pitch, toes))
+    front = _joints(skeleton, pelvis_m, turn, ankle_m)
+    bones = BoneMotion(time_s, front, turn, skeleton.length_m)
+    return PersonMotion(bones, ways, ankle_m, speed_m_s, gait.cycle_s)
+
+
+def scaled(
+    gait: PersonGait, height: float, length: float, cycle_s: float | None = None
+) -> PersonGait:
+    """Return a gait with other steps: factors on H and L, and another duration of the cycle."""
+    return replace(
+        gait,
+        height=height * gait.height,
+        length=length * gait.length,
+        cycle_s=gait.cycle_s if cycle_s is None else cycle_s,
+    )
+
+
+def _foot_pitch(gait: PersonGait, ways: Feet) -> tuple[Floats, Floats]:
+    """(T, 2) pitch of feet and of toes, radians, toes up above 0."""
+    at, angle = np.array(gait.pitch).T
+    # the keys belong to the gait's duty; they stretch to that of the law
+    at = np.where(
+        at <= gait.duty,
+        at / gait.duty * ways.duty,
+        1.0 - (1.0 - at) / (1.0 - gait.duty) * (1.0 - ways.duty),
+    )
+    around = PchipInterpolator(
+        np.concatenate([at - 1.0, at, at + 1.0]), np.radians(np.tile(angle, 3))
+    )
+    pitch = np.asarray(around(ways.at))
+    air = np.clip((ways.at - ways.duty) / (1.0 - ways.duty), 0.0, 1.0)
+    straight = np.clip(air / 0.45, 0.0, 1.0)
+    straight = straight**2 * (3.0 - 2.0 * straight)
+    return pitch, np.maximum(pitch, 0.0) + straight * np.minimum(pitch, 0.0)
+
+
+def _ankles(skeleton: PersonSkeleton, gait: PersonGait, ways: Feet, pitch: Floats) -> Floats:
+    """(T, 2, 3) ankles: the foot rolls over heel and ball, which stay where Eq. 10 places them."""
+    size = skeleton.stature_m
+    high = float(skeleton.joint_m[INDEX["left foot"], 2])
+    pivot = size * np.where(pitch > 0.0, HEEL, BALL)
+    back, up = -pivot, np.full_like(pivot, high)
+    x = ways.ahead_m + size * gait.middle + pivot + back * np.cos(pitch) - up * np.sin(pitch)
+    z = ways.height_m + back * np.sin(pitch) + up * np.cos(pitch)
+    y = np.broadcast_to(size * gait.side * np.array([1.0, -1.0]), x.shape)
+    return np.stack([x, y, z], axis=-1)
+
+
+def _trunk_turns(gait: PersonGait, phase: Floats) -> tuple[Floats, Floats]:
+    """(T, 3, 3) turns of pelvis and chest; the left foot comes down at phase 0."""
+    wave, quarter = np.cos(TURN * phase), np.sin(TURN * phase)
+    yaw, roll = -gait.turn * wave, gait.drop * quarter
+    lean = np.full_like(phase, gait.lean)
+    pelvis = Rotation.from_euler("ZYX", np.stack([yaw, 0.5 * lean, roll], -1), degrees=True)
+    chest = Rotation.from_euler("ZYX", np.stack([-yaw, lean, -0.3 * roll], -1), degrees=True)
+    return pelvis.as_matrix(), chest.as_matrix()
+
+
+def _hips(skeleton: PersonSkeleton, pelvis: Floats) -> Floats:
+    """(T, 2, 3) hips, from the pelvis."""
+    rest = skeleton.joint_m
+    local = rest[[INDEX["left thigh"], INDEX["right thigh"]]] - rest[INDEX["pelvis"]]
+    return np.einsum("tij,kj->tki", pelvis, local)
+
+
+def _pelvis(
+    skeleton: PersonSkeleton, gait: PersonGait, phase: Floats, ankle_m: Floats, hips: Floats
+) -> Floats:
+    """(T, 3) the pelvis: as high as both legs reach, with two rises and one sway in a cycle."""
+    size = skeleton.stature_m
+    sway = 0.012 * size * np.sin(TURN * phase)
+    flat = hips + np.stack([np.zeros_like(sway), sway, np.zeros_like(sway)], -1)[:, None]
+    leg_m = REACH * float(
+        skeleton.length_m[INDEX["left thigh"]] + skeleton.length_m[INDEX["left shank"]]
+    )
+    away = ankle_m - flat
+    up = np.sqrt(np.maximum(leg_m**2 - (away[..., :2] ** 2).sum(axis=-1), 0.0))
+    bob = gait.bob * size * np.cos(2.0 * TURN * (phase - 0.5 * (1.0 - gait.duty) * (gait.bob > 0)))
+    most = (away[..., 2] + up).min(axis=1) - bob
+    return np.stack([np.zeros_like(bob), sway, most.min() + bob], axis=-1)
+
+
+def _turns(
+    skeleton: PersonSkeleton,
+    gait: PersonGait,
+    phase: Floats,
+    trunk: tuple[Floats, Floats],
+    feet_rad: tuple[Floats, Floats],
+) -> Floats:
+    """(T, K, 3, 3) turns of the bones, without the legs: ``_joints`` adds them."""
+    (pelvis, chest), (pitch, toes) = trunk, feet_rad
+    frames = len(phase)
+    turn = np.tile(np.eye(3), (frames, len(skeleton.parent), 1, 1))
+    turn[:, 0] = pelvis
+    pair = Rotation.from_matrix(np.stack([pelvis, chest], axis=1).reshape(-1, 3, 3))
+    vectors = pair.as_rotvec().reshape(frames, 2, 3).mean(axis=1)
+    turn[:, INDEX["waist"]] = Rotation.from_rotvec(vectors).as_matrix()
+    turn[:, INDEX["chest"]] = chest
+    half = Rotation.from_matrix(chest).as_rotvec() * 0.4
+    turn[:, INDEX["neck"]] = Rotation.from_rotvec(half).as_matrix()
+    for k, side in enumerate(("left", "right")):
+        turn[:, INDEX[f"{side} foot"]] = _pitched(pitch[:, k])
+        turn[:, INDEX[f"{side} toes"]] = _pitched(toes[:, k])
+        for name, one in zip(("upper arm", "forearm", "hand"), _arm(gait, phase, k), strict=True):
+            turn[:, INDEX[f"{side} {name}"]] = chest @ one
+    return turn
+
+
+def _joints(skeleton: PersonSkeleton, pelvis_m: Floats, turn: Floats, ankle_m: Floats) -> Floats:
+    """(T, K, 3) joints; writes the turns of thighs and shanks by inverse kinematics."""
+    rest, parent, frames = skeleton.joint_m, skeleton.parent, len(pelvis_m)
+    front = np.empty((frames, len(rest), 3))
+    front[:, 0] = pelvis_m
+    legs = {INDEX[f"{side} {part}"] for side in ("left", "right") for part in ("shank", "foot")}
+    for k in range(1, len(rest)):
+        if k in legs:
+            continue
+        offset = rest[k] - rest[parent[k]]
+        front[:, k] = front[:, parent[k]] + turn[:, parent[k]] @ offset
+        if k in (INDEX["left thigh"], INDEX["right thigh"]):
+            side = 0 if k == INDEX["left thigh"] else 1
+            knee, ankle = knees_m(
+                front[:, k], ankle_m[:, side],
+                np.full(frames, skeleton.length_m[k]), np.full(frames, skeleton.length_m[k + 1]),
+                np.broadcast_to([1.0, 0.0, 0.0], (frames, 3)),
+            )  # fmt: skip
+            front[:, k + 1], front[:, k + 2] = knee, ankle
+            turn[:, k] = _hanging(knee - front[:, k])
+            turn[:, k + 1] = _hanging(ankle - knee)
+    return front
+
+
+def _arm(gait: PersonGait, phase: Floats, side: int) -> tuple[Floats, Floats, Floats]:
+    """(T, 3, 3) turns of upper arm, forearm and hand in the chest; side 0 is the left."""
+    sign = 1.0 - 2.0 * side
+    # an arm swings back with the leg of its side ahead
+    wave = sign * np.cos(TURN * phase)
+    hang = np.full_like(wave, sign * (gait.spread - np.degrees(ABDUCTION_RAD)))
+    bend = gait.elbow[1] * wave - gait.elbow[0]
+    swing = np.stack([gait.arm[0] + gait.arm[1] * wave, hang], axis=-1)
+    upper = Rotation.from_euler("YX", swing, degrees=True)
+    fore = upper * Rotation.from_euler("Y", bend[:, None], degrees=True)
+    hand = fore * Rotation.from_euler("Y", -10.0, degrees=True)
+    return upper.as_matrix(), fore.as_matrix(), hand.as_matrix()
+
+
+def _pitched(angle: Floats) -> Floats:
+    """(T, 3, 3) turns about the left axis; above 0 the front rises."""
+    return np.asarray(Rotation.from_euler("Y", -angle[:, None]).as_matrix())
+
+
+def _hanging(down: Floats) -> Floats:
+    """(T, 3, 3) turns of a bone that hangs along -z at rest, with its front ahead."""
+    z = -down / np.linalg.norm(down, axis=1, keepdims=True)
+    y = np.cross(z, np.broadcast_to([1.0, 0.0, 0.0], z.shape))
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([np.cross(y, z), y, z], axis=-1)

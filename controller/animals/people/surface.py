@@ -1,0 +1,157 @@
+"""The skin of a person: PDE surfaces through curves that the bones carry ([GC] 2.1, 2.2.1).
+
+``Person.solved_m`` moves the curves and solves for the surface again, as in the paper.
+``Person.rig`` gives each corner the bones of the curves next to it, which a glTF can play.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image, Ints
+from snakewalk.controller.animals.mesh.mesh import vertex_normals
+from snakewalk.controller.animals.mesh.patches import Tube
+from snakewalk.controller.animals.mesh.pde_surface import TURN
+from snakewalk.controller.animals.mesh.rig import Rig
+from snakewalk.controller.animals.mesh.skin import Weights
+from snakewalk.controller.animals.people.body_curves import (
+    ARM,
+    AROUND,
+    LEG,
+    TRUNK,
+    BodyPart,
+    body_parts,
+)
+from snakewalk.controller.animals.people.skeleton import PersonSkeleton
+from snakewalk.controller.images.mesh import Mesh
+
+_ROWS = 3
+"""Rows of the mesh from one curve to the next."""
+_BANDS = {"trunk": (0.0, 0.4), "arm": (0.4, 0.6), "leg": (0.6, 0.8), "shoe": (0.8, 1.0)}
+"""Where the parts lie in the texture, along u."""
+_SKIN, _HAIR, _SHIRT, _TROUSERS, _SHOE, _DARK, _LIPS = (
+    (222, 178, 148), (70, 46, 32), (52, 104, 150), (62, 66, 82), (44, 38, 36), (40, 30, 28),
+    (186, 110, 100),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A body: skeleton, curves and the mesh of its surfaces at rest."""
+
+    skeleton: PersonSkeleton
+    parts: tuple[BodyPart, ...]
+    rig: Rig
+    texture: Image
+
+    @classmethod
+    def of(cls, stature_m: float = 1.75, girth: float = 1.0) -> "Person":
+        """Make the body of a stature; ``girth`` is a factor on all widths."""
+        skeleton = PersonSkeleton.of(stature_m)
+        parts = body_parts(skeleton, girth)
+        return cls(skeleton, parts, _rig(skeleton, parts), texture())
+
+    def solved_m(self, front_m: Floats, rotation: Floats) -> Floats:
+        """(V, 3) corners in a pose, the surfaces solved for the curves that the bones moved.
+
+        Args:
+            front_m: (K, 3) joints.
+            rotation: (K, 3, 3) turns of the bones from rest.
+
+        """
+        rest_m = self.skeleton.joint_m
+        return np.concatenate(
+            [_corners(p, p.moved_m(front_m, rotation, rest_m)) for p in self.parts]
+        )
+
+
+def _corners(part: BodyPart, curves_m: Floats) -> Floats:
+    """(V, 3) rows of a part's surface through its curves."""
+    tube = Tube.through(curves_m, part.stations)
+    return tube.points_m(tube.rows(_ROWS), np.arange(AROUND) * TURN / AROUND).reshape(-1, 3)
+
+
+def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
+    """Join the parts, and share their corners out among the bones of the next curves."""
+    corners, uv, faces, bones, shares = [], [], [], [], []
+    start = 0
+    for part in parts:
+        points = _corners(part, part.curves_m)
+        rows = len(points) // AROUND
+        corners.append(points)
+        low, high = _BANDS[part.name]
+        at = np.linspace(0.0, 1.0, rows)
+        u = low + (0.005 + 0.99 * at) * (high - low)
+        across = 0.5 + 0.49 * np.cos(np.arange(AROUND) * TURN / AROUND)
+        uv.append(np.stack([np.repeat(u, AROUND), np.tile(across, rows)], axis=-1))
+        faces.append(_outwards(_band_faces(rows), points) + start)
+        row_bones, row_shares = _row_weights(part, rows)
+        bones.append(np.repeat(row_bones, AROUND, axis=0))
+        shares.append(np.repeat(row_shares, AROUND, axis=0))
+        start += len(points)
+    vertices, triangles = np.concatenate(corners), np.concatenate(faces)
+    mesh = Mesh(vertices, vertex_normals(vertices, triangles), np.concatenate(uv), triangles)
+    held = Weights(np.concatenate(bones), np.concatenate(shares))
+    return Rig(mesh, held, skeleton.joint_m, skeleton.parent)
+
+
+def _row_weights(part: BodyPart, rows: int) -> tuple[Ints, Floats]:
+    """(R, 3) bones and shares of the rows: those of the curves, smooth between two of them."""
+    count = int(part.bones.max()) + 1
+    dense = np.zeros((len(part.bones), count))
+    for k in range(3):
+        np.add.at(dense, (np.arange(len(dense)), part.bones[:, k]), part.shares[:, k])
+    place = np.linspace(0.0, len(dense) - 1.0, rows)
+    before = np.minimum(place.astype(int), len(dense) - 2)
+    x = (place - before)[:, None]
+    blend = x * x * (3.0 - 2.0 * x)
+    between = (1.0 - blend) * dense[before] + blend * dense[before + 1]
+    kept = np.argsort(-between, axis=1, kind="stable")[:, :3]
+    share = np.take_along_axis(between, kept, axis=1)
+    return kept.astype(np.int64), share / share.sum(axis=1, keepdims=True)
+
+
+def _band_faces(rows: int) -> Ints:
+    """Two triangles for each side between two rows; a row at a tip gives one flat one."""
+    k = np.arange(AROUND)
+    after = (k + 1) % AROUND
+    here = np.arange(rows - 1)[:, None] * AROUND
+    a, b, c, d = here + k, here + after, here + AROUND + k, here + AROUND + after
+    sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)])
+    return sides.reshape(-1, 3).astype(np.int64)
+
+
+def _outwards(faces: Ints, points: Floats) -> Ints:
+    """Turn the faces so that their normals point away from the inside."""
+    a, b, c = (points[faces[:, k]] - points.mean(axis=0) for k in range(3))
+    return faces if float(np.einsum("fi,fi->", a, np.cross(b, c))) > 0.0 else faces[:, ::-1]
+
+
+def texture() -> Image:
+    """(H, W, 3) skin, hair, shirt, trousers and shoes; the first row, v = 1, faces forward."""
+    high, wide = 128, 1280
+    picture = np.empty((high, wide, 3), np.uint8)
+    u = (np.arange(wide) + 0.5) / wide
+    v = 1.0 - (np.arange(high) + 0.5) / high
+    part = {name: (u >= low) & (u < up) for name, (low, up) in _BANDS.items()}
+    picture[:, part["arm"]] = _SKIN
+    picture[:, part["leg"]] = _TROUSERS
+    picture[:, part["shoe"]] = _SHOE
+    heights = np.array([one[0] for one in TRUNK])
+    place = np.clip((u / 0.4 - 0.005) / 0.99, 0.0, 1.0) * (len(heights) - 1)
+    up, front = np.meshgrid(np.interp(place, np.arange(len(heights)), heights), v)
+    trunk = np.empty((high, wide, 3))
+    trunk[:] = _SKIN
+    hair = (up > 0.958) | ((front < 0.70) & (up > 0.925)) | ((front < 0.42) & (up > 0.868))
+    trunk[hair] = _HAIR
+    trunk[up < 0.828 - 0.012 * front**4] = _SHIRT
+    trunk[up < 0.595] = _TROUSERS
+    trunk[((up - 0.926) / 0.0045) ** 2 + ((front - 0.925) / 0.028) ** 2 < 1.0] = _DARK
+    trunk[(np.abs(up - 0.939) < 0.0022) & (np.abs(front - 0.92) < 0.045)] = _HAIR
+    trunk[(np.abs(up - 0.887) < 0.0028) & (front > 0.945)] = _LIPS
+    picture[:, part["trunk"]] = trunk[:, part["trunk"]]
+    arm = (u - 0.4) / 0.2 * len(ARM)
+    picture[:, part["arm"] & (arm < 3.6)] = _SHIRT
+    leg = (u - 0.6) / 0.2 * len(LEG)
+    picture[:, part["leg"] & (leg > len(LEG) - 0.6)] = _SHOE
+    return picture

@@ -1,0 +1,94 @@
+"""Pictures of a mesh that moves on level ground, with its shadow: people, from any side."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.sim.rendering.looks import SkinLook, dressed_model
+from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.shade import LIFT_M, SUN_DIRECTION
+from snakewalk.sim.rendering.soft_shadow import SHAPE_RGBA, soft_shadow
+
+
+@dataclass(frozen=True, slots=True)
+class OrbitCamera:
+    """A camera that looks at a point; below the horizon the elevation is negative."""
+
+    lookat_m: tuple[float, float, float]
+    distance_m: float
+    azimuth_deg: float
+    elevation_deg: float
+
+
+class FigureView:
+    """Draws a mesh whose corners are given in each frame; ``close`` it.
+
+    Raises:
+        OffscreenError: nothing here draws without a screen.
+
+    """
+
+    def __init__(
+        self, look: SkinLook, robot: RobotConfig, world: WorldConfig, size_px: tuple[int, int]
+    ) -> None:
+        """Prepare the view.
+
+        Args:
+            look: faces and texture; its bones float freely and are not used.
+            robot: any; the look replaces it.
+            world: level ground.
+            size_px: width and height.
+
+        """
+        self._model = dressed_model(robot, world, None, look=look, fine=True)
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        self._faces = look.faces
+        self._skin = int(self._model.skin_matid[0]), self._model.skin_rgba[0].copy()
+        room = self._model.ngeom + self._model.nbody + 11
+        self._scene = mujoco.MjvScene(self._model, maxgeom=room)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._camera, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
+        self._screen = Offscreen(self._model, *size_px)
+
+    def draw(self, corners_m: Floats, camera: OrbitCamera, caption: str = "") -> Image:
+        """Draw the mesh with corners (V, 3), (height, width, 3); a new array each time."""
+        shadow_m = corners_m - corners_m[:, 2:] / SUN_DIRECTION[2] * SUN_DIRECTION
+        shadow_m[:, 2] = LIFT_M
+        below = corners_m - [0.0, 0.0, 1e3]
+        empty = self._pass(below, camera, "", shape=True)
+        shape = self._pass(shadow_m, camera, "", shape=True)
+        return soft_shadow(empty, shape, self._pass(corners_m, camera, caption, shape=False))
+
+    def close(self) -> None:
+        """Free the frame buffer; safe to call twice."""
+        self._screen.close()
+
+    def _pass(self, corners_m: Floats, camera: OrbitCamera, caption: str, *, shape: bool) -> Image:
+        model, view, scene = self._model, self._camera, self._scene
+        material, rgba = (-1, SHAPE_RGBA) if shape else self._skin
+        model.skin_matid[0], model.skin_rgba[0] = material, rgba
+        view.lookat[:], view.distance = camera.lookat_m, camera.distance_m
+        view.azimuth, view.elevation = camera.azimuth_deg, camera.elevation_deg
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, self._data, self._option, None, view, every, scene)
+        scene.skinvert[:] = corners_m.ravel()
+        scene.skinnormal[:] = _normals(corners_m, self._faces).ravel()
+        return self._screen.draw(scene, caption).copy()
+
+
+def _normals(corners_m: Floats, faces: Floats) -> Floats:
+    """(V, 3) means of the faces around each corner, by area."""
+    a, b, c = (corners_m[faces[:, k]] for k in range(3))
+    face = np.cross(b - a, c - a)
+    total = np.zeros_like(corners_m)
+    for axis in range(3):
+        for k in range(3):
+            total[:, axis] += np.bincount(faces[:, k], face[:, axis], len(corners_m))
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
