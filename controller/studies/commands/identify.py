@@ -58,6 +58,15 @@ class _RobotFile(NamedTuple):
     out: Path
 
 
+class _Search(NamedTuple):
+    """Constants to begin with, and which of them to fit."""
+
+    start: Path | None
+    seed: int
+    fit: bool
+    backlash: bool
+
+
 class _Outs(NamedTuple):
     """Files for the results from logs of runs: ground and robot."""
 
@@ -71,6 +80,7 @@ class _Outs(NamedTuple):
     examples=(
         "identify kp200.json kp800.json -o xl330.json",
         "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
+        "identify kp400.json kp800.json --backlash --robot xl330-16 --robot-out mine.toml",
         "identify kp400.json --start xl330.json --no-fit --json",
         "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
         "identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
@@ -94,6 +104,9 @@ def identify(
         bool, typer.Option("--fit/--no-fit", help="fit, or only judge the constants of --start")
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
+    backlash: Annotated[
+        bool, typer.Option("--backlash", help="estimate the backlash of the gears, too")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -130,9 +143,10 @@ def identify(
                 "logs of runs (.mcap) and recordings of a pendulum cannot be combined; give "
                 "one kind"
             )
-        if start is not None or not fit:
+        if start is not None or not fit or backlash:
             raise InputError(
-                "--start and --no-fit: are for pendulums; for the log of a run use --world"
+                "--start, --no-fit and --backlash: are for pendulums; for the log of a run use "
+                "--world"
             )
         if robot is not None:
             raise InputError(
@@ -144,7 +158,10 @@ def identify(
     if world is not None:
         raise InputError("--world is the ground of a run's log (.mcap); a pendulum has none")
     robot_file = _robot_file(robot, robot_out)
-    _servo(logs, judge, start, out, robot_file, fit=fit, seed=seed, force=force, as_json=as_json)
+    if backlash and not fit:
+        raise InputError("--backlash: needs a fit; remove --no-fit")
+    search = _Search(start, seed, fit=fit, backlash=backlash)
+    _servo(logs, judge, search, out, robot_file, force=force, as_json=as_json)
 
 
 def _is_run(path: Path) -> bool:
@@ -315,16 +332,14 @@ def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path
 def _servo(
     logs: list[Path],
     judge: list[Path],
-    start: Path | None,
+    search: _Search,
     out: Path | None,
     robot_file: _RobotFile | None,
     *,
-    fit: bool,
-    seed: int,
     force: bool,
     as_json: bool,
 ) -> None:
-
+    start, fit = search.start, search.fit
     if not fit and start is None:
         raise InputError("--no-fit judges constants: give them with --start FILE")
     refuse_to_overwrite([out, robot_file and robot_file.out], force)
@@ -338,7 +353,12 @@ def _servo(
         check_servo(robot_file.before, fitted[0].actuator if found is None else found.actuator)
     if fit or found is None:
         with ProgressBar("fits", transient=True) as bar:
-            found = fit_pendulum(fitted, found, seed=seed, on_progress=bar.update)
+            found = fit_pendulum(
+                *(fitted, found),
+                seed=search.seed,
+                backlash=search.backlash,
+                on_progress=bar.update,
+            )
     if out is not None:
         with atomic_write(out) as part:
             part.write_text(bam_text(found), encoding="utf-8")
