@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -30,7 +31,7 @@ from snakewalk.controller.studies.identification.pendulum_fit import (
     fit_pendulum,
     robot_error_deg,
 )
-from snakewalk.controller.studies.identification.pendulum_log import read_pendulum_log
+from snakewalk.controller.studies.identification.pendulum_log import PendulumLog, read_pendulum_log
 from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
     bam_text,
@@ -329,6 +330,12 @@ def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path
         part.write_text(robot_toml(after, comment), encoding="utf-8")
 
 
+def _check_one_servo(logs: Sequence[PendulumLog]) -> None:
+    if len({log.actuator for log in logs}) > 1:
+        names = ", ".join(sorted({log.actuator or "?" for log in logs}))
+        raise InputError(f"the recordings are of several servos: {names}; give those of one")
+
+
 def _servo(
     logs: list[Path],
     judge: list[Path],
@@ -346,9 +353,7 @@ def _servo(
     fitted = [read_pendulum_log(path) for path in logs]
     judged = [read_pendulum_log(path) for path in judge]
     found = None if start is None else read_bam(start)
-    if len({log.actuator for log in (*fitted, *judged)}) > 1:
-        names = ", ".join(sorted({log.actuator or "?" for log in (*fitted, *judged)}))
-        raise InputError(f"the recordings are of several servos: {names}; give those of one")
+    _check_one_servo((*fitted, *judged))
     if robot_file is not None:  # before a minute of fits, whether the servo is the robot's
         check_servo(robot_file.before, fitted[0].actuator if found is None else found.actuator)
     if fit or found is None:
