@@ -51,3 +51,9 @@ class MotorConfig(Strict):
     by_load_square: float = Field(
         0.0, ge=0.0, le=10.0, description="a N m: of its square, while the motor is the stronger"
     )
+    backlash_rad: float = Field(
+        0.0,
+        ge=0.0,
+        le=0.2,
+        description="play of the shaft from end to end while the motor rests",
+    )

@@ -1,5 +1,6 @@
 """A robot for other programs: URDF and MJCF text with the masses and the kinematics of ours."""
 
+import math
 from collections.abc import Mapping
 from typing import Final, Literal
 from xml.etree import ElementTree as ET
@@ -7,9 +8,12 @@ from xml.etree import ElementTree as ET
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.sim.servo.motor import gears_of, motors_of, p_gain_per_rad
 
 Ros2Control = Literal["topic", "dynamixel"]
 """Hardware that ros2_control drives: our ROS node, or the servos themselves."""
+Actuators = Literal["dcmotor"]
+"""MuJoCo's actuators that stand for the servos."""
 _DEVICE: Final = "/dev/ttyUSB0"
 _POSITION_MODE: Final = 3
 
@@ -157,12 +161,59 @@ def _add_params(parent: ET.Element, values: Mapping[str, str]) -> None:
         ET.SubElement(parent, "param", name=name).text = value
 
 
-def mjcf_text(robot: RobotConfig) -> str:
+def mjcf_text(robot: RobotConfig, actuators: Actuators | None = None) -> str:
     """MuJoCo model of a robot on a level floor, as the simulator builds it.
 
     Its contacts have no friction: the simulator adds its own, which knows a direction along the
-    body.
+    body. With ``actuators`` each joint has one, whose control is the goal position in rad.
+
+    Raises:
+        InputError: the installed MuJoCo does not have these actuators, or a servo has no motor
+            constants.
+
     """
     from snakewalk.sim.physics import body, plant  # noqa: PLC0415  an extra
 
-    return body.mjcf(robot, WorldConfig(name="floor"), None, plant.FLOOR_STEP_S) + "\n"
+    text = body.mjcf(robot, WorldConfig(name="floor"), None, plant.FLOOR_STEP_S)
+    if actuators is None:
+        return text + "\n"
+    root = ET.fromstring(text)  # our own text
+    _add_dc_motors(root, robot)
+    ET.indent(root)
+    text = ET.tostring(root, encoding="unicode") + "\n"
+    fault = body.load_fault(text)
+    if fault is not None:
+        raise InputError(
+            f"--actuators dcmotor: {fault}; install mujoco 3.17 or newer, or remove the option"
+        )
+    return text
+
+
+def _add_dc_motors(root: ET.Element, robot: RobotConfig) -> None:
+    """Add a ``dcmotor`` for each joint: the law of ``sim.plant.ServoDrive`` in MuJoCo's terms.
+
+    MuJoCo has one constant K for torque and back-EMF, and a controller in N m/rad that compensates
+    the back-EMF. With K = sqrt(k_t k_e), voltages times k_t / K and a derivative gain of
+    k_t k_e / R, its torque is that of a servo whose volts are proportional to the error.
+    """
+    hinges = {joint.get("name"): joint for joint in root.iter("joint")}
+    parent = ET.SubElement(root, "actuator")
+    rows = zip(
+        *(robot.joint_names, motors_of(robot), gears_of(robot)),
+        *(robot.position_p_gains, robot.current_limits_a),
+        strict=True,
+    )
+    for name, motor, gear, gain, limit_a in rows:
+        k_t, k_e, ohm = motor.torque_constant_n_m_a, motor.back_emf_v_s, motor.resistance_ohm
+        constant = math.sqrt(k_t * k_e)
+        most_v = robot.servo.supply_v * k_t / constant
+        stiff = float(p_gain_per_rad(gain, motor)) * robot.servo.supply_v * k_t / ohm
+        each = ET.SubElement(parent, "dcmotor", name=name, joint=name, input="pos")
+        each.set("motorconst", f"{constant!r} {constant!r}")
+        each.set("resistance", repr(ohm))
+        each.set("controller", f"{stiff!r} 0 {k_t * k_e / ohm!r} 0 0 {most_v!r}")
+        if math.isfinite(limit_a):
+            each.set("saturation", f"{k_t * limit_a!r} 0 0")
+        hinges[name].set("damping", repr(float(gear.viscous_n_m_s)))
+        if gear.dry_n_m:
+            hinges[name].set("frictionloss", repr(float(gear.dry_n_m)))

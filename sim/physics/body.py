@@ -125,6 +125,15 @@ def overlapping_links(robot: RobotConfig) -> list[tuple[int, int]]:
     return pairs
 
 
+def load_fault(text: str) -> str | None:
+    """Return why the installed MuJoCo cannot load a model; None if it can."""
+    try:
+        mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        return f"MuJoCo {mujoco.__version__} cannot load it ({str(error).splitlines()[0]})"
+    return None
+
+
 def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
     """Fill in the elevations, which the text leaves out, and make all links equally soft.
 

@@ -12,6 +12,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.physics.tangent_planes import TangentPlanes
 from snakewalk.sim.physics.water import water_constants
+from snakewalk.sim.servo.backlash import BACKLASH, WHEEL_SHARE
 from snakewalk.sim.servo.motor import Gearbox, gears_of
 
 LEAST_DEPTH_M = 1e-9
@@ -44,7 +45,7 @@ class Mechanics:
     radius_m: float
     """Radius of the body."""
     gears: Floats
-    """(12, J) friction of each gearbox, powered or not, as ``sim.servo.motor.friction_n_m`` has it.
+    """(13, J) friction of each gearbox, powered or not, as ``sim.servo.motor.friction_n_m`` has it.
     The inertia of the rotors is MuJoCo's."""
     planes: TangentPlanes
     """Planes that support the body on a height field."""
@@ -56,6 +57,8 @@ class Mechanics:
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats
     """(L, 7) ``sim.physics.water.water_constants``."""
+    rotor: Floats
+    """(5, J) state of the backlash, as ``sim.servo.backlash`` has it."""
     totals: Floats = field(default_factory=lambda: np.zeros(3))
     """Energy lost to ground friction and water, J; mean distance slipped across the links, m;
     energy lost to the friction of the gears, J."""
@@ -82,8 +85,9 @@ class Mechanics:
         role[planes.planes] = GROUND
         role[foot_geoms(model, robot)] = FOOT
         gears = Gearbox.columns(gears_of(robot)).rows()
+        rotor = np.zeros((5, robot.joint_count))
         about = robot.link_count, mass, robot.body_radius_m, gears
-        return cls(model, data, grip, *about, planes, role, load, before, water)
+        return cls(model, data, grip, *about, planes, role, load, before, water, rotor)
 
     @property
     def joint_count(self) -> int:
@@ -98,6 +102,9 @@ class Mechanics:
     def start_at_rest(self) -> None:
         """Set up the memory for a state that was set, not stepped to, after ``mj_forward``."""
         self.model.dof_frictionloss[:] = 0.0  # it grows with torques, which are still zero
+        self.rotor[:] = 0.0
+        loose = np.flatnonzero(self.gears[BACKLASH] > 0.0)
+        self.model.dof_armature[6 + loose] = WHEEL_SHARE * self.gears[0, loose]
         self.before_m[:] = self.data.xipos[1:] - self.step_s * velocities(self.model, self.data)[0]
         self.measure_loads()
 

@@ -49,7 +49,8 @@ class PublicSteps:
         )
         self._geoms = Geoms(model.geom_bodyid, mechanics.contact_role)
         self._gears = Gears(
-            *(mechanics.gears, model.dof_frictionloss, data.qfrc_bias, data.qfrc_constraint)
+            *(mechanics.gears, model.dof_frictionloss, data.qfrc_bias, data.qfrc_constraint),
+            *(mechanics.rotor, model.dof_armature),
         )
         self._rubs = has_friction(mechanics.gears)
         self._work = np.zeros((2, links - 1))

@@ -35,6 +35,17 @@ from snakewalk.sim.physics.mechanics import FOOT, GROUND, LEAST_DEPTH_M
 from snakewalk.sim.physics.step_state import Body, Contacts, Lanes, Shafts
 from snakewalk.sim.physics.water import add_water, immersed
 from snakewalk.sim.plant import shaft_torque
+from snakewalk.sim.servo.backlash import (
+    BACKLASH,
+    GAP,
+    KICK,
+    KICKED,
+    LEAST_ROTOR_KG_M2,
+    SIDE,
+    SPEED,
+    WHEEL_SHARE,
+    free_rotor,
+)
 from snakewalk.sim.servo.motor import friction_n_m
 
 LEAST_FRICTION_N_M = 1e-9
@@ -159,12 +170,14 @@ def apply_forces(body: Body, shafts: Shafts, contacts: Contacts, lanes: Lanes) -
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = shafts.motors[:9]
     current, torque, pwm = shafts.motors[9:12]
     gear, speed, ground_n_m = shafts.gears.terms, shafts.work[0], shafts.work[1]
+    rotor = shafts.gears.rotor
     qfrc[:] = 0.0
     for j in range(len(speed)):
-        speed[j] = qvel[6 + j]
+        has_play = gear[BACKLASH, j] > 0.0
+        speed[j] = rotor[SPEED, j] if has_play and rotor[SIDE, j] == 0.0 else qvel[6 + j]
         pwm[j], current[j], torque[j] = shaft_torque(
             qpos[7 + j],
-            qvel[6 + j],
+            speed[j],
             on[j],
             goal[j],
             gain[j],
@@ -176,10 +189,56 @@ def apply_forces(body: Body, shafts: Shafts, contacts: Contacts, lanes: Lanes) -
             current_limit[j],
         )
         qfrc[6 + j] = torque[j] - gear[2, j] * qvel[6 + j]
+        if has_play:
+            qfrc[6 + j] = _through_teeth(shafts, j, qfrc[6 + j], body.law.step_s)
         ground_n_m[j] = -qfrc[6 + j]
     _add_friction(body, contacts, lanes)
     for j in range(len(speed)):
         ground_n_m[j] += qfrc[6 + j]
+
+
+def _through_teeth(shafts: Shafts, j: int, pressed_n_m: float, step_s: float) -> float:
+    """Torque on a joint with backlash, of ``pressed_n_m`` while a tooth touches.
+
+    The rotor in the gap is stepped here. Its momentum reaches the joint in the step after the gap
+    has closed, when MuJoCo already counts its inertia.
+    """
+    gear, rotor = shafts.gears.terms[:, j], shafts.gears.rotor[:, j]
+    inertia = (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
+    if rotor[SIDE] != 0.0:
+        kick_n_m = inertia * rotor[KICK] / step_s
+        rotor[KICK] = 0.0
+        return pressed_n_m + kick_n_m
+    motors = shafts.motors
+    damping = motors.on[j] * motors.k_t[j] * motors.k_e[j] / motors.ohm[j]
+    push = motors.torque[j] + damping * rotor[SPEED]
+    rotor[SPEED] = free_rotor(gear, step_s, inertia, rotor[SPEED], push, damping + gear[2])
+    return 0.0
+
+
+def _settle_teeth(shafts: Shafts, j: int, rate: float, step_s: float, friction_n_m: float) -> None:
+    """Open or close the gap of a joint after a step, at its new ``rate``, rad/s.
+
+    ``friction_n_m`` is the torque of the gears' friction on the joint in the step.
+    """
+    gear, rotor = shafts.gears.terms[:, j], shafts.gears.rotor[:, j]
+    half, inertia = 0.5 * gear[BACKLASH], (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
+    before = shafts.work[0, j]
+    if rotor[SIDE] != 0.0:
+        tooth_n_m = shafts.motors.torque[j] - gear[2] * before + friction_n_m
+        tooth_n_m -= inertia * (rate - before - rotor[KICKED]) / step_s
+        rotor[SPEED], rotor[KICKED] = rate, 0.0
+        if rotor[SIDE] * tooth_n_m >= 0.0:
+            return
+        rotor[SIDE] = 0.0
+    else:
+        rotor[GAP] += step_s * (rotor[SPEED] - rate)
+        if abs(rotor[GAP]) < half:
+            return
+        rotor[SIDE] = 1.0 if rotor[GAP] > 0.0 else -1.0
+        rotor[GAP] = rotor[SIDE] * half
+        rotor[KICK] = rotor[KICKED] = rotor[SPEED] - rate
+    shafts.gears.armature[6 + j] = gear[0] if rotor[SIDE] != 0.0 else WHEEL_SHARE * gear[0]
 
 
 def has_friction(gear: Floats) -> bool:
@@ -206,10 +265,13 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
     ohm, k_e = shafts.motors.ohm, shafts.motors.k_e
     current, torque, _, drawn_j, returned_j, heat_j, work_j = shafts.motors[9:]
     qvel, speed, ground_n_m = body.state.qvel, shafts.work[0], shafts.work[1]
-    gear, friction, bias, constraint = shafts.gears
+    gear, friction, bias, constraint, rotor, _ = shafts.gears
     for j in range(len(speed)):
+        has_play = gear[BACKLASH, j] > 0.0
+        free = has_play and rotor[SIDE, j] == 0.0
+        rate = rotor[SPEED, j] if free else qvel[6 + j]
         # a force does its work at the mean of the speeds before and after Euler's step
-        middle = 0.5 * (speed[j] + qvel[6 + j])
+        middle = 0.5 * (speed[j] + rate)
         heat_w = ohm[j] * current[j] * current[j]
         input_w = heat_w + k_e[j] * speed[j] * current[j]
         drawn_j[j] += max(input_w, 0.0) * step_s
@@ -217,14 +279,18 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
         heat_j[j] += heat_w * step_s
         work_j[j] += torque[j] * middle * step_s
         totals[2] += gear[2, j] * speed[j] * middle * step_s
+        held_n_m = 0.0
         if rubs:
-            held_n_m = 0.0
             if friction[6 + j] > 0.0:  # MuJoCo's first constraints are these, in their order
                 held_n_m = force_n[j]
                 totals[2] -= held_n_m * middle * step_s
             outside_n_m = ground_n_m[j] - bias[6 + j] + constraint[6 + j] - held_n_m
             most_n_m = friction_n_m(gear[:, j], qvel[6 + j], torque[j], outside_n_m)
             friction[6 + j] = max(most_n_m, LEAST_FRICTION_N_M)
+        if has_play:
+            _settle_teeth(shafts, j, qvel[6 + j], step_s, held_n_m)
+            if rubs and rotor[SIDE, j] == 0.0:
+                friction[6 + j] = LEAST_FRICTION_N_M  # the gears hold the rotor alone
     _weigh(body, contacts, force_n)
 
 
@@ -263,6 +329,10 @@ register_jitable(error_model="numpy")(_add_friction)
 register_jitable(error_model="numpy", inline="always")(_weigh)
 
 register_jitable(error_model="numpy")(has_friction)
+
+register_jitable(error_model="numpy")(_through_teeth)
+
+register_jitable(error_model="numpy")(_settle_teeth)
 
 register_jitable(error_model="numpy", inline="always")(apply_forces)
 

@@ -49,7 +49,10 @@ STATE = ("qpos", "qvel", "qfrc_applied", "xipos", "xmat", "xanchor", "xaxis")
 LINKS = ("velocity", "spin", "wrench", "depth", "before", "load", "mass_kg", "water")
 MODEL = ("body_parentid", "geom_bodyid", "contact_role", "geom_pos", "geom_quat")
 GROUND = ("geom_xpos", "geom_xmat", "ball_geoms", "ball_m", "z_m", "planes")
-GEARS = ("gears", "dof_frictionloss", "qfrc_bias", "qfrc_constraint")
+GEARS = (
+    *("gears", "dof_frictionloss", "qfrc_bias", "qfrc_constraint"),
+    *("rotor", "dof_armature"),
+)
 BELLIES = (
     "belly_words",
     "belly_geoms",
@@ -163,10 +166,12 @@ def shafts_at(m: Any) -> Shafts:
     """Return the arrays of motors and gears (compiled code only)."""
     joints, freedoms = m.count_joints, m.count_joints + 6
     gears = Gears(
-        reals_at(m.gears_at, (12, joints)),
+        reals_at(m.gears_at, (13, joints)),
         reals_at(m.dof_frictionloss_at, (freedoms,)),
         reals_at(m.qfrc_bias_at, (freedoms,)),
         reals_at(m.qfrc_constraint_at, (freedoms,)),
+        reals_at(m.rotor_at, (5, joints)),
+        reals_at(m.dof_armature_at, (freedoms,)),
     )
     return Shafts(_motors(m), gears, reals_at(m.work_at, (2, joints)))
 

@@ -83,12 +83,16 @@ class Motors(NamedTuple):
 
 
 class Gears(NamedTuple):
-    """Friction of the gears: terms (12, J), and MuJoCo's arrays (6 + J,)."""
+    """Friction of the gears: terms (13, J), and MuJoCo's arrays (6 + J,)."""
 
     terms: Floats
     friction: Floats
     bias: Floats
     constraint: Floats
+    rotor: Floats
+    """(5, J) state of the backlash."""
+    armature: Floats
+    """(6 + J,) MuJoCo's."""
 
 
 class Law(NamedTuple):

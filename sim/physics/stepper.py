@@ -200,6 +200,7 @@ class CompiledSteps:
             **{"before": mechanics.before_m, "load": mechanics.load_n},
             **{"mass_kg": mechanics.link_mass_kg, "water": mechanics.water},
             **{"contact_role": mechanics.contact_role, "gears": mechanics.gears},
+            **{"rotor": mechanics.rotor, "dof_armature": m.dof_armature},
             **{"totals": mechanics.totals, "work": np.zeros((2, links - 1))},
             **{"ball_geoms": planes.balls, "ball_m": planes.radius_m},
             **{"z_m": planes.z_m, "planes": planes.planes},

@@ -8,6 +8,12 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.sim.plant import ServoDrive
+from snakewalk.sim.servo.backlash import (
+    BACKLASH,
+    LEAST_ROTOR_KG_M2,
+    SPEED,
+    turn_with_backlash,
+)
 from snakewalk.sim.servo.motor import Gearbox, friction_n_m
 
 _READ = readonly_array(layout="C")
@@ -39,7 +45,9 @@ class BenchPlant:
         bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0, 0.0)
         gears = [gear] * joints if isinstance(gear, Gearbox) or gear is None else list(gear)
         self._gear = Gearbox.columns([each or bare for each in gears]).rows()
+        self._shaft_kg_m2 = inertia_kg_m2
         self._gear[0] += inertia_kg_m2
+        self._play = np.zeros((3, joints))
         self._constant_load = np.zeros(joints)
         self._load = load_n_m
         self._position = np.full(joints, start_rad, dtype=np.float64)
@@ -71,8 +79,8 @@ class BenchPlant:
             steps, load_n_m = last - self._steps, self._constant_load
             if self._load is not None:  # it may change with every step
                 steps, load_n_m = 1, np.asarray(self._load(self._position), dtype=np.float64)
-            shafts = (load_n_m, self._gear, self._position, self._velocity)
-            _step(steps, self._step_s, *shafts, *drive.columns())
+            shafts = (load_n_m, self._gear, self._play, self._position, self._velocity)
+            _step(steps, self._step_s, self._shaft_kg_m2, *shafts, *drive.columns())
             self._steps += steps
 
 
@@ -82,14 +90,17 @@ def _within(value: float, limit: float) -> float:
 
 
 @compiled(
-    f"void(int64, float64, {_READ}, {readonly_array(dimensions=2, layout='C')}, float64[::1],"
-    f" float64[::1], {', '.join([_READ] * 9)}, {', '.join(['float64[::1]'] * 7)})"
+    f"void(int64, float64, float64, {_READ}, {readonly_array(dimensions=2, layout='C')},"
+    " float64[:, ::1], float64[::1], float64[::1],"
+    f" {', '.join([_READ] * 9)}, {', '.join(['float64[::1]'] * 7)})"
 )
 def _step(
     steps: int,
     h: float,
+    shaft_kg_m2: float,
     load_n_m: Floats,
     gear: Floats,
+    play: Floats,
     position: Floats,
     velocity: Floats,
     torque_on: Floats,
@@ -111,16 +122,20 @@ def _step(
 ) -> None:
     """Make ``steps`` steps of ``h`` under a constant load; the columns of a drive in their order.
 
-    ``gear`` (12, J): the fields of ``Gearbox``, the shaft's own inertia added to the rotor's.
+    ``gear`` (13, J): the fields of ``Gearbox``, the shaft's own inertia, ``shaft_kg_m2``, added to
+    the rotor's. ``play`` (3, J): state of the backlash.
     """
     for k in range(len(position)):
         inertia, viscous = gear[0, k], gear[2, k]
         on, ohm, load = torque_on[k], resistance_ohm[k], load_n_m[k]
         stiff = on * torque_constant_n_m_a[k] / ohm
+        rotor_kg_m2 = max(inertia - shaft_kg_m2, LEAST_ROTOR_KG_M2)
+        has_play = gear[BACKLASH, k] > 0.0
         for _ in range(steps):
             q, w = position[k], velocity[k]
+            motor_rad_s = play[SPEED, k] if has_play else w
             share = _within(p_gain_per_rad[k] * (goal_rad[k] - q), pwm_limit[k]) * on
-            amps = (share * supply_v[k] - back_emf_v_s[k] * w) / ohm * on
+            amps = (share * supply_v[k] - back_emf_v_s[k] * motor_rad_s) / ohm * on
             if abs(amps) > current_limit_a[k]:
                 push = _within(amps, current_limit_a[k]) * torque_constant_n_m_a[k]
                 damping = viscous
@@ -131,16 +146,23 @@ def _step(
             motor = push - (damping - viscous) * w
             friction = friction_n_m(gear[:, k], w, motor, load)
             brake = h * friction / (inertia + h * damping)
-            w = np.sign(free) * max(abs(free) - brake, 0.0)
+            before, w, more = w, np.sign(free) * max(abs(free) - brake, 0.0), 0.0
+            turned = w
+            if has_play:
+                w, more = turn_with_backlash(
+                    *(gear[:, k], play[:, k], h, shaft_kg_m2, rotor_kg_m2),
+                    *(before, w, push, damping, load),
+                )
+                turned = play[SPEED, k]
             velocity[k] = w
-            position[k] = q + h * w
-            amps = (share * supply_v[k] - back_emf_v_s[k] * w) / ohm * on
+            position[k] = q + h * (w + more) if has_play else q + h * w
+            amps = (share * supply_v[k] - back_emf_v_s[k] * turned) / ohm * on
             amps = _within(amps, current_limit_a[k])
             pwm[k], current_a[k] = share, amps
             torque_n_m[k] = amps * torque_constant_n_m_a[k]
             lost_j = h * ohm * amps**2
-            input_j = lost_j + h * back_emf_v_s[k] * w * amps
+            input_j = lost_j + h * back_emf_v_s[k] * turned * amps
             drawn_j[k] += max(input_j, 0.0)
             returned_j[k] -= min(input_j, 0.0)
             heat_j[k] += lost_j
-            work_j[k] += h * torque_n_m[k] * w
+            work_j[k] += h * torque_n_m[k] * turned

@@ -224,6 +224,8 @@ class Gearbox:
     by_motor_square: Floats | float = 0.0
     by_load_square: Floats | float = 0.0
     """In 1/(N m)."""
+    backlash_rad: Floats | float = 0.0
+    """Play of the shaft from end to end while the rotor rests (``sim.servo.backlash``)."""
 
     @staticmethod
     def columns(gears: "Sequence[Gearbox]") -> "Gearbox":
@@ -232,7 +234,7 @@ class Gearbox:
         return Gearbox(*(np.array([getattr(gear, name) for gear in gears]) for name in names))
 
     def rows(self) -> Floats:
-        """(12, J) its fields in their order, for ``friction_n_m``."""
+        """(13, J) its fields in their order, for ``friction_n_m``."""
         return np.array([np.atleast_1d(getattr(self, each.name)) for each in fields(self)], float)
 
 
@@ -240,7 +242,7 @@ class Gearbox:
 def friction_n_m(gear: Floats, speed_rad_s: float, motor_n_m: float, load_n_m: float) -> float:
     """Greatest friction torque but for the viscous part, which grows with the speed.
 
-    ``gear`` (12,) holds the fields of a ``Gearbox`` in their order.
+    ``gear`` (13,) holds the fields of a ``Gearbox`` in their order.
     """
     friction = gear[1] + abs(gear[6] * load_n_m - gear[5] * motor_n_m)
     slow = gear[3] + abs(gear[7] * load_n_m - gear[8] * motor_n_m)
@@ -278,6 +280,7 @@ def gears_of(robot: RobotConfig) -> list[Gearbox]:
             *(0.0, own.dry_n_m, 0.0, own.stribeck_n_m, own.stribeck_rad_s),
             *(own.by_motor, own.by_load, own.by_load_slow, own.by_motor_slow),
             *(own.stribeck_exponent, own.by_motor_square, own.by_load_square),
+            own.backlash_rad,
         )
         for own in robot.motors
     ]

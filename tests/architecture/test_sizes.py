@@ -29,6 +29,7 @@ KERNELS: Final[dict[str, str]] = {
     "controller/mechanics/ground_step.py:_place": "a numba signature knows no records",
     "controller/mechanics/rollout_kernel.py:roll_pieces": "its arrays are the state of all pieces",
     "controller/repertoire/crowd.py:_step": "a slice per body costs more than its arithmetic",
+    "controller/studies/identification/pendulum_swing.py:_swing": "a signature of numba",
     "drivers/safety/vet.py:_quick_check": "runs in each cycle on plain arrays",
     "sim/servo/bench.py:_step": "a numba signature knows no records",
     "sim/servo/control_loops.py:_run_position": "a numba signature knows no records",

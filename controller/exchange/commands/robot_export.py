@@ -16,7 +16,10 @@ from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 
 @command(
     "robot export",
-    examples=("robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",),
+    examples=(
+        "robot export yaw16 --urdf yaw16.urdf --mjcf yaw16.xml",
+        "robot export yaw16 --mjcf yaw16.xml --actuators dcmotor",
+    ),
     results=("urdf", "mjcf"),
 )
 def export_robot(
@@ -24,6 +27,13 @@ def export_robot(
     urdf: Annotated[Path | None, typer.Option(help="write a URDF here")] = None,
     mjcf: Annotated[
         Path | None, typer.Option(help="write a MuJoCo model here, on a level floor")
+    ] = None,
+    actuators: Annotated[
+        Literal["dcmotor"] | None,
+        typer.Option(
+            help="add the servos to the MuJoCo model, as its DC motors with position control",
+            show_default=False,
+        ),
     ] = None,
     ros2_control: Annotated[
         Literal["topic", "dynamixel"] | None,
@@ -41,13 +51,15 @@ def export_robot(
         raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
     if ros2_control is not None and urdf is None:
         raise InputError(f"--ros2-control {ros2_control}: is a part of a URDF: give --urdf FILE")
+    if actuators is not None and mjcf is None:
+        raise InputError(f"--actuators {actuators}: is a part of a MuJoCo model: give --mjcf FILE")
     robot = load_robot(name)
     texts = {}
     if urdf is not None:
         texts[urdf] = urdf_text(robot, ros2_control)
     if mjcf is not None:
         require_extra("MuJoCo models need", "mujoco")
-        texts[mjcf] = mjcf_text(robot)
+        texts[mjcf] = mjcf_text(robot, actuators)
     for path, text in texts.items():
         with atomic_write(path) as part:
             part.write_text(text, encoding="utf-8")

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -30,7 +31,7 @@ from snakewalk.controller.studies.identification.pendulum_fit import (
     fit_pendulum,
     robot_error_deg,
 )
-from snakewalk.controller.studies.identification.pendulum_log import read_pendulum_log
+from snakewalk.controller.studies.identification.pendulum_log import PendulumLog, read_pendulum_log
 from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
     bam_text,
@@ -58,6 +59,15 @@ class _RobotFile(NamedTuple):
     out: Path
 
 
+class _Search(NamedTuple):
+    """Constants to begin with, and which of them to fit."""
+
+    start: Path | None
+    seed: int
+    fit: bool
+    backlash: bool
+
+
 class _Outs(NamedTuple):
     """Files for the results from logs of runs: ground and robot."""
 
@@ -71,6 +81,7 @@ class _Outs(NamedTuple):
     examples=(
         "identify kp200.json kp800.json -o xl330.json",
         "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
+        "identify kp400.json kp800.json --backlash --robot xl330-16 --robot-out mine.toml",
         "identify kp400.json --start xl330.json --no-fit --json",
         "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
         "identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
@@ -94,6 +105,9 @@ def identify(
         bool, typer.Option("--fit/--no-fit", help="fit, or only judge the constants of --start")
     ] = True,
     seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
+    backlash: Annotated[
+        bool, typer.Option("--backlash", help="estimate the backlash of the gears, too")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -130,9 +144,10 @@ def identify(
                 "logs of runs (.mcap) and recordings of a pendulum cannot be combined; give "
                 "one kind"
             )
-        if start is not None or not fit:
+        if start is not None or not fit or backlash:
             raise InputError(
-                "--start and --no-fit: are for pendulums; for the log of a run use --world"
+                "--start, --no-fit and --backlash: are for pendulums; for the log of a run use "
+                "--world"
             )
         if robot is not None:
             raise InputError(
@@ -144,7 +159,10 @@ def identify(
     if world is not None:
         raise InputError("--world is the ground of a run's log (.mcap); a pendulum has none")
     robot_file = _robot_file(robot, robot_out)
-    _servo(logs, judge, start, out, robot_file, fit=fit, seed=seed, force=force, as_json=as_json)
+    if backlash and not fit:
+        raise InputError("--backlash: needs a fit; remove --no-fit")
+    search = _Search(start, seed, fit=fit, backlash=backlash)
+    _servo(logs, judge, search, out, robot_file, force=force, as_json=as_json)
 
 
 def _is_run(path: Path) -> bool:
@@ -312,33 +330,40 @@ def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path
         part.write_text(robot_toml(after, comment), encoding="utf-8")
 
 
+def _check_one_servo(logs: Sequence[PendulumLog]) -> None:
+    if len({log.actuator for log in logs}) > 1:
+        names = ", ".join(sorted({log.actuator or "?" for log in logs}))
+        raise InputError(f"the recordings are of several servos: {names}; give those of one")
+
+
 def _servo(
     logs: list[Path],
     judge: list[Path],
-    start: Path | None,
+    search: _Search,
     out: Path | None,
     robot_file: _RobotFile | None,
     *,
-    fit: bool,
-    seed: int,
     force: bool,
     as_json: bool,
 ) -> None:
-
+    start, fit = search.start, search.fit
     if not fit and start is None:
         raise InputError("--no-fit judges constants: give them with --start FILE")
     refuse_to_overwrite([out, robot_file and robot_file.out], force)
     fitted = [read_pendulum_log(path) for path in logs]
     judged = [read_pendulum_log(path) for path in judge]
     found = None if start is None else read_bam(start)
-    if len({log.actuator for log in (*fitted, *judged)}) > 1:
-        names = ", ".join(sorted({log.actuator or "?" for log in (*fitted, *judged)}))
-        raise InputError(f"the recordings are of several servos: {names}; give those of one")
+    _check_one_servo((*fitted, *judged))
     if robot_file is not None:  # before a minute of fits, whether the servo is the robot's
         check_servo(robot_file.before, fitted[0].actuator if found is None else found.actuator)
     if fit or found is None:
         with ProgressBar("fits", transient=True) as bar:
-            found = fit_pendulum(fitted, found, seed=seed, on_progress=bar.update)
+            found = fit_pendulum(
+                *(fitted, found),
+                seed=search.seed,
+                backlash=search.backlash,
+                on_progress=bar.update,
+            )
     if out is not None:
         with atomic_write(out) as part:
             part.write_text(bam_text(found), encoding="utf-8")

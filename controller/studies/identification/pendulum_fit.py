@@ -30,8 +30,8 @@ from snakewalk.controller.studies.identification.servo_constants import (
     ServoConstants,
 )
 
-_LOW: Final = LOW[:FITTED]
-_HIGH: Final = HIGH[:FITTED]
+BACKLASHES_RAD: Final = (0.003, 0.008, 0.017, 0.035)
+"""Where the search for a backlash starts: 0.2 to 2 degrees (ours)."""
 STARTS: Final = 24
 HOPS: Final = 60
 _COARSE_S: Final = 2e-3
@@ -45,6 +45,8 @@ _OUTLIER_RAD: Final = 0.02
 """Errors above this count linearly, as in a mean absolute error."""
 _TURN: Final = 1e-3
 """Share of a constant's range: step of the search's derivatives."""
+_BACKLASH_TURN: Final = 0.02
+"""Share of the backlash: a smaller step is lost in the moments at which teeth touch (ours)."""
 _FINE_TURN: Final = 1e-4
 """Share of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
 constants trade against each other exactly, a long step's error would pass for knowledge."""
@@ -59,6 +61,7 @@ _CHI_SQUARE: Final = 3.84
 """Threshold of one constant: less likely than 5 %."""
 _TORQUE_CONSTANT: Final = NAMES.index("torque_constant_n_m_a")
 _RESISTANCE: Final = NAMES.index("resistance_ohm")
+_BACKLASH: Final = NAMES.index("backlash_rad")
 _P_UNIT: Final = NAMES.index("p_unit_per_rad")
 _SLOW_TERMS: Final = ("stribeck_n_m", "by_motor_slow", "by_load_slow")
 
@@ -80,9 +83,13 @@ def fit_pendulum(
     seed: int = 0,
     starts: int = STARTS,
     hops: int = HOPS,
+    backlash: bool = False,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> ServoConstants:
     """Fit the constants to all logs; the squares of M6 stay as ``start`` has them.
+
+    The backlash stays, too, unless it is to be estimated: then it is 0 where the logs do not show
+    one, and the interval ends at the smallest one that they would have shown.
 
     Args:
         logs: of one servo.
@@ -90,13 +97,14 @@ def fit_pendulum(
         seed: of the starts and steps.
         starts: fits from constants drawn around the start.
         hops: fits from constants drawn around the best ones.
+        backlash: estimate the backlash.
         on_progress: called with the number of fits done, and of all.
 
     """
     rng = np.random.default_rng(seed)
     given = np.array([c.start for c in CONSTANTS]) if start is None else start.values
     first, squares = given[:FITTED], given[FITTED:]
-    width, total = _HIGH - _LOW, starts + hops + 1
+    width, total = (HIGH - LOW)[:FITTED], starts + hops + 1 + backlash * len(BACKLASHES_RAD)
     pool: list[OptimizeResult] = []
     for k in range(starts):
         factor, shift = np.exp(rng.normal(0.0, _SPREAD, len(first))), rng.normal(size=len(first))
@@ -113,7 +121,12 @@ def fit_pendulum(
         pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
         pool.sort(key=lambda fit: float(fit.cost))
         on_progress(starts + k + 1, total)
-    values = np.asarray(_fit(logs, pool[0].x, squares, FINE_S, _FINE_TURNS).x)
+    best, most_rad = pool[0].x, 0.0
+    if backlash:
+        best, squares, most_rad = _with_backlash(
+            logs, pool[0], squares, lambda done: on_progress(starts + hops + done, total)
+        )
+    values = np.asarray(_fit(logs, best, squares, FINE_S, _FINE_TURNS).x)
     on_progress(total, total)
     least, most = _alike(logs, values, squares)
     chosen = float(np.clip(first[_P_UNIT] / values[_P_UNIT], least, most))
@@ -123,7 +136,52 @@ def fit_pendulum(
     unknown = np.full(len(squares), np.nan)
     low = np.append(np.minimum(low, smallest), unknown)
     high = np.append(np.maximum(high, greatest), unknown)
+    if most_rad > 0.0:
+        low[_BACKLASH], high[_BACKLASH] = 0.0, most_rad
     return ServoConstants(np.append(values, squares), low, high, logs[0].actuator)
+
+
+def _with_backlash(
+    logs: Sequence[PendulumLog],
+    rigid: OptimizeResult,
+    kept: Floats,
+    on_progress: Callable[[int], None],
+) -> tuple[Floats, Floats, float]:
+    """Constants with a backlash, those that stay, and the end of the interval of a backlash of 0.
+
+    A backlash is accepted if the errors fall by more than chance explains.
+    """
+    pool = []
+    for done, backlash_rad in enumerate(BACKLASHES_RAD, 1):
+        first = np.append(rigid.x, backlash_rad)
+        pool.append(_fit(logs, first, kept[1:], _COARSE_S, _COARSE_TURNS))
+        on_progress(done)
+    best = min(pool, key=lambda fit: float(fit.cost))
+    limit = float(rigid.cost) / (1.0 + _CHI_SQUARE / _blocks(logs))
+    if best.cost < limit:
+        return np.asarray(best.x), kept[1:], 0.0
+    none = np.append(0.0, kept[1:])
+    most_rad = next(
+        (
+            backlash_rad
+            for backlash_rad in BACKLASHES_RAD
+            if _cost(rigid.x, logs, np.append(backlash_rad, kept[1:]))
+            > _cost(rigid.x, logs, none) * (1.0 + _CHI_SQUARE / _blocks(logs))
+        ),
+        float(HIGH[_BACKLASH]),
+    )
+    return np.asarray(rigid.x), none, most_rad
+
+
+def _blocks(logs: Sequence[PendulumLog]) -> int:
+    """Number of errors that count as independent."""
+    return sum(math.ceil(log.time_s[-1] / _BLOCK_S) for log in logs)
+
+
+def _cost(values: Floats, logs: Sequence[PendulumLog], kept: Floats) -> float:
+    """Sum of the errors, as a fit minimises it."""
+    errors = _errors(values, logs, kept, FINE_S) / _OUTLIER_RAD
+    return float((np.sqrt(1.0 + errors**2) - 1.0).sum())
 
 
 def _errors(values: Floats, logs: Sequence[PendulumLog], squares: Floats, step_s: float) -> Floats:
@@ -135,15 +193,17 @@ def _errors(values: Floats, logs: Sequence[PendulumLog], squares: Floats, step_s
 def _fit(
     logs: Sequence[PendulumLog], values: Floats, squares: Floats, step_s: float, turns: int
 ) -> OptimizeResult:
-    width = _HIGH - _LOW
-    inside = np.clip(values, _LOW + 1e-6 * width, _HIGH - 1e-6 * width)
+    low, high = LOW[: len(values)], HIGH[: len(values)]
+    width = high - low
+    inside = np.clip(values, low + 1e-6 * width, high - 1e-6 * width)
+    turn = [_TURN] if len(values) == FITTED else [*[_TURN] * FITTED, _BACKLASH_TURN]
     return least_squares(
         _errors,
         inside,
-        bounds=(_LOW, _HIGH),
+        bounds=(low, high),
         args=(logs, squares, step_s),
         x_scale=width,
-        diff_step=[_TURN],
+        diff_step=turn,
         loss="soft_l1",
         f_scale=_OUTLIER_RAD,
         max_nfev=turns,
@@ -164,20 +224,15 @@ def _scaled(values: Floats, factor: float) -> Floats:
 
 def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
     """Least and greatest factor of ``_scaled`` that the recordings do not separate from 1."""
-
-    def cost(of: Floats) -> float:
-        errors = _errors(of, logs, squares, FINE_S) / _OUTLIER_RAD
-        return float((np.sqrt(1.0 + errors**2) - 1.0).sum())
-
-    blocks = sum(math.ceil(log.time_s[-1] / _BLOCK_S) for log in logs)
-    limit = cost(values) * (1.0 + _CHI_SQUARE / blocks)
+    lowest, highest = LOW[: len(values)], HIGH[: len(values)]
+    limit = _cost(values, logs, squares) * (1.0 + _CHI_SQUARE / _blocks(logs))
     ends = []
     for step in (1.0 / _FACTOR, _FACTOR):
         factor = 1.0
         while True:
             further = _scaled(values, factor * step)
-            inside = (further >= _LOW).all() and (further <= _HIGH).all()
-            if not inside or cost(further) > limit:
+            inside = (further >= lowest).all() and (further <= highest).all()
+            if not inside or _cost(further, logs, squares) > limit:
                 break
             factor *= step
         ends.append(factor)
@@ -193,8 +248,10 @@ def _intervals(
     intervals grow with the blocks' sums, not shrink with the number of samples. Values that the
     logs do not determine have an interval as wide as their range.
     """
-    width = _HIGH - _LOW
+    lowest, highest = LOW[: len(values)], HIGH[: len(values)]
+    width = highest - lowest
     steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
+    steps[FITTED:] = _BACKLASH_TURN * values[FITTED:]
     jacobian = (
         width
         / (2.0 * steps)
@@ -227,9 +284,9 @@ def _intervals(
     spread = np.sqrt(np.diag(bread @ meat @ bread)) * width
     reach = float(student.ppf(0.5 + 0.5 * _COVERAGE, degrees)) * spread
     reach = np.maximum(reach, _LEAST_SHARE * np.abs(values))
-    low, high = np.maximum(values - reach, _LOW), np.minimum(values + reach, _HIGH)
+    low, high = np.maximum(values - reach, lowest), np.minimum(values + reach, highest)
     if not low[[NAMES.index(name) for name in _SLOW_TERMS]].any():
         # whether friction grows when the shaft is slow is open, so how slow is open, too
         shape = [NAMES.index(name) for name in ("stribeck_rad_s", "stribeck_exponent")]
-        low[shape], high[shape] = _LOW[shape], _HIGH[shape]
+        low[shape], high[shape] = LOW[shape], HIGH[shape]
     return low, high

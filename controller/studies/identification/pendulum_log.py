@@ -1,5 +1,6 @@
 """Recordings of a servo that swings a weight, as BAM's raw logs hold them."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +13,8 @@ from snakewalk.controller.studies.identification.servo_constants import read_jso
 
 _COLUMNS: Final = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
 _ABOUT: Final = ("mass", "length", "kp")
+_LIMIT: Final = "goal_current_a"
+"""Our addition to BAM's logs: Goal Current of a servo in current-based position mode."""
 _LEAST_ROWS: Final = 20
 
 
@@ -35,6 +38,8 @@ class PendulumLog:
     """(N,)"""
     torque_on: Floats
     """(N,) 1 or 0"""
+    current_limit_a: float = math.inf
+    """Goal Current of current-based position mode; infinite in other modes."""
 
 
 def read_pendulum_log(path: Path) -> PendulumLog:
@@ -51,6 +56,7 @@ def read_pendulum_log(path: Path) -> PendulumLog:
         raise InputError(faults)
     try:
         mass_kg, arm_m, p_gain = (_number(data[key]) for key in _ABOUT)
+        limit_a = math.inf if _LIMIT not in data else _number(data[_LIMIT])
         rows: Any = entries
         time_s, goal, position, volts, torque = (
             np.array([_number(row[key]) for row in rows]) for key in _COLUMNS
@@ -63,10 +69,14 @@ def read_pendulum_log(path: Path) -> PendulumLog:
         raise InputError(f"{path}: expected at least {_LEAST_ROWS} entries in the order of time")
     if not (mass_kg > 0.0 and arm_m > 0.0 and p_gain >= 0.0):
         raise InputError(f"{path}: mass and length are positive, kp is not negative")
+    if not limit_a > 0.0:
+        raise InputError(
+            f"{path}: {_LIMIT} is {limit_a:g}; give the Goal Current of mode 5 in A, or omit it"
+        )
     actuator = str(data.get("motor", ""))
     return PendulumLog(
         *(path, actuator, mass_kg, arm_m, p_gain, time_s - time_s[0]),
-        *(goal, position, volts, (torque > 0.0).astype(float)),
+        *(goal, position, volts, (torque > 0.0).astype(float), limit_a),
     )
 
 

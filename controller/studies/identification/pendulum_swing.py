@@ -15,6 +15,12 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.studies.identification.pendulum_log import PendulumLog
 from snakewalk.controller.studies.identification.servo_constants import NAMES, ServoConstants
 from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.sim.servo.backlash import (
+    BACKLASH,
+    LEAST_ROTOR_KG_M2,
+    SPEED,
+    turn_with_backlash,
+)
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.motor import (
     Gearbox,
@@ -55,6 +61,7 @@ def robot_swing_rad(
     )
     drive = make_drive([motor], log.supply_v[0])
     drive.p_gain_per_rad[:] = p_gain_per_rad(round(log.p_gain), motor)
+    drive.current_limit_a[:] = log.current_limit_a
     drive.goal_rad[:] = log.goal_rad[0]
     out, heard, last = np.empty_like(log.time_s), 0, len(log.time_s) - 1
     heard_s = log.time_s + bench["delay_s"]
@@ -84,14 +91,15 @@ def swing_rad(values: Floats, log: PendulumLog, step_s: float = FINE_S) -> Float
         values,
         values[_GEAR],
         *(log.time_s, log.goal_rad, log.supply_v, log.torque_on),
-        *(log.position_rad[0], log.mass_kg, log.arm_m, log.p_gain, step_s),
+        *(log.position_rad[0], log.mass_kg, log.arm_m, log.p_gain, log.current_limit_a, step_s),
         out,
     )
     return out
 
 
 @compiled(
-    f"void({', '.join([_ROW] * 6)}, float64, float64, float64, float64, float64, float64[::1])"
+    f"void({', '.join([_ROW] * 6)}, float64, float64, float64, float64, float64, float64,"
+    " float64[::1])"
 )
 def _swing(
     values: Floats,
@@ -104,15 +112,19 @@ def _swing(
     mass_kg: float,
     arm_m: float,
     p_gain: float,
+    current_limit_a: float,
     step_s: float,
     out: Floats,
 ) -> None:
     """Forces in the middle of a step; friction would stop the shaft in it, up to its greatest."""
     kt, resistance, armature, offset = values[0], values[1], values[2], values[3]
     viscous, p_unit, delay_s = values[12], values[13], values[14]
-    inertia = mass_kg * arm_m * arm_m + armature
+    shaft_kg_m2 = mass_kg * arm_m * arm_m
+    inertia = shaft_kg_m2 + armature
     weight_n_m = mass_kg * GRAVITY_M_S2 * arm_m
-    q, w, heard = start_rad, 0.0, 0
+    has_play, play = gear[BACKLASH] > 0.0, np.zeros(3)
+    rotor_kg_m2 = max(armature, LEAST_ROTOR_KG_M2)
+    q, w, more, heard = start_rad, 0.0, 0.0, 0
     out[0] = q
     for k in range(1, len(time_s)):
         span_s = time_s[k] - time_s[k - 1]
@@ -132,11 +144,20 @@ def _swing(
             if torque_on[k - 1] > 0.0:
                 duty = min(max(p_gain * p_unit * (goal - q), -1.0), 1.0)
                 push, damping = kt / resistance * duty * supply_v[k - 1], kt * kt / resistance
+                amps = (push - damping * (play[SPEED] if has_play else w)) / kt
+                if abs(amps) > current_limit_a:
+                    push, damping = math.copysign(kt * current_limit_a, amps), 0.0
             motor = push - damping * w
             friction = friction_n_m(gear, w, motor, load) + viscous * abs(w)
             half = 0.5 * h * damping / inertia
             free = ((1.0 - half) * w + h * (push + load) / inertia) / (1.0 + half)
             rest = abs(free) - h * friction / (inertia * (1.0 + half))
-            w = math.copysign(rest, free) if rest > 0.0 else 0.0
+            before, w = w, math.copysign(rest, free) if rest > 0.0 else 0.0
+            if has_play:
+                w, more = turn_with_backlash(
+                    *(gear, play, h, shaft_kg_m2, rotor_kg_m2, before, w),
+                    *(push, damping + viscous, load),
+                )
+                q += 0.5 * h * more
             q += 0.5 * h * w
         out[k] = q

@@ -61,6 +61,7 @@ CONSTANTS: Final = (
     Constant("viscous_n_m_s", "friction_viscous", 0.0, 0.5, 0.02, math.nan),
     Constant("p_unit_per_rad", "error_gain", 5e-4, 2e-2, 3e-3, _XL330_P_UNIT),
     Constant("delay_s", "command_delay", 0.0, 0.04, 0.004, 0.0),
+    Constant("backlash_rad", "backlash", 0.0, 0.1, 0.0, 0.0),
     Constant("by_motor_square", "load_friction_motor_quad", 0.0, 1.0, 0.0, 0.0),
     Constant("by_load_square", "load_friction_external_quad", 0.0, 1.0, 0.0, 0.0),
 )
@@ -71,9 +72,9 @@ NAMES: Final = tuple(constant.name for constant in CONSTANTS)
 LOW: Final = np.array([constant.low for constant in CONSTANTS])
 HIGH: Final = np.array([constant.high for constant in CONSTANTS])
 _SQUARES: Final = ("by_motor_square", "by_load_square")
-FITTED: Final = len(CONSTANTS) - len(_SQUARES)
-"""Number of constants that a fit estimates, the first; squares stay as given (``docs/identify.md``
-states the reason)."""
+FITTED: Final = NAMES.index("backlash_rad")
+"""Number of constants that every fit estimates, the first. The next one, the backlash, is estimated
+on request; squares stay as given (``docs/identify.md`` states the reason)."""
 _FORMS: Final = ("m1", "m2", "m3", "m4", "m5", "m6")
 _BOTH_SIDES: Final = {
     "load_friction_base": ("load_friction_motor", "load_friction_external"),
@@ -90,10 +91,10 @@ class ServoConstants:
     """Values of ``CONSTANTS``, and how far they may be off."""
 
     values: Floats
-    """(17,) in the order of ``CONSTANTS``."""
+    """(18,) in the order of ``CONSTANTS``."""
     low: Floats
     high: Floats
-    """(17,) ends of the 95 % intervals; NaN where nobody has worked them out."""
+    """(18,) ends of the 95 % intervals; NaN where nobody has worked them out."""
     actuator: str
     """BAM's name of the servo: ``xl330``, ``mx64``, ..."""
 
@@ -112,6 +113,8 @@ def bam_text(constants: ServoConstants) -> str:
         data |= {"model": "m5", "actuator": constants.actuator}
     else:
         data |= {"model": "m6", "actuator": constants.actuator}
+    if not constants["backlash_rad"]:
+        del data["backlash"]
     intervals = {
         c.bam: [float(low), float(high)]
         for c, low, high in zip(CONSTANTS, constants.low, constants.high, strict=True)

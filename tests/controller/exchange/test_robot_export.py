@@ -11,14 +11,16 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot, shipped
+from snakewalk.config.loader import load_robot, load_world, shipped
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.drivers.types import BodyPose
+from snakewalk.sim.physics.plant import MujocoPlant
 from tests.helpers.uneven import UNEVEN
+from tests.sim.physics.test_gear_friction import drive_of
 
 ROBOTS = [load_robot(name) for name in shipped("robots")]
 CHAINS = [*(robot for robot in ROBOTS if not robot.limbs), UNEVEN]
@@ -195,3 +197,45 @@ def test_ros2_control_is_a_part_of_a_urdf(tmp_path: Path) -> None:
     file = tmp_path / "a.urdf"
     assert CliRunner().invoke(app, [*words, "--urdf", str(file)]).exit_code == 0
     assert "/robot_joint_command" in file.read_text()
+
+
+HAS_DC_MOTORS = hasattr(mujoco.MjsActuator, "set_to_dcmotor")
+
+
+@pytest.mark.skipif(not HAS_DC_MOTORS, reason="this MuJoCo has no dcmotor")
+@pytest.mark.parametrize(("name", "most_rad"), [("yaw16", 5e-4), ("alternating16", 4e-3)])
+def test_dc_motors_answer_a_step_as_our_servos_do(name: str, most_rad: float) -> None:
+    """Half a radian, with full output, the back-EMF and, of pitch joints, the current limit."""
+    robot = load_robot(name)
+    plant = MujocoPlant(robot, load_world("flat"))
+    plant.mechanics.mu = (0.0, 0.0, 0.0)  # a model for others has no friction of the ground
+    model = mujoco.MjModel.from_xml_string(mjcf_text(robot, "dcmotor"))
+    data, drive = mujoco.MjData(model), drive_of(robot)
+    data.qpos[:] = plant.qpos
+    drive.current_limit_a[:] = robot.current_limits_a
+    drive.goal_rad[:] = data.ctrl[:] = 0.5 * np.sin(np.arange(robot.joint_count) / 2.0)
+    apart, moved = [], []
+    for k in range(400):
+        plant.advance(plant.step_s * (k + 1), drive)
+        mujoco.mj_step(model, data)
+        apart.append(np.abs(plant.position_rad - data.qpos[7:]).max())
+        moved.append(np.abs(plant.position_rad).max())
+    assert max(moved) > 0.45
+    assert max(apart) < most_rad
+
+
+def test_a_mujoco_without_dc_motors_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def old(text: str) -> None:
+        raise ValueError("XML Error: Schema violation: unrecognized element\nElement 'dcmotor'")
+
+    monkeypatch.setattr(mujoco.MjModel, "from_xml_string", old)
+    out = tmp_path / "yaw16.xml"
+    words = ["robot", "export", "yaw16", "--mjcf", str(out), "--actuators", "dcmotor"]
+    done = CliRunner().invoke(app, words)
+    assert isinstance(done.exception, InputError)
+    assert "cannot load it (XML Error: Schema violation" in str(done.exception)
+    assert not out.exists()
+    urdf = ["robot", "export", "yaw16", "--urdf", str(out), "--actuators", "dcmotor"]
+    assert "give --mjcf FILE" in str(CliRunner().invoke(app, urdf).exception)

@@ -29,12 +29,25 @@ MASS_KG, ARM_M, DELAY_S, TICK_RAD = 0.45, 0.12, 0.003, np.pi / 2048
 Goal = Callable[[np.ndarray], np.ndarray]
 
 
-def swing(p_gain: int, goal: Goal, off_s: float, weaker: float = 1.0) -> PendulumLog:
-    """Four seconds at 200 Hz by the servo bench of the simulator; torque off from ``off_s`` on."""
+def swing(
+    p_gain: int,
+    goal: Goal,
+    off_s: float,
+    weaker: float = 1.0,
+    *,
+    backlash_rad: float = 0.0,
+    limit_a: float = np.inf,
+    noise: np.random.Generator | None = None,
+) -> PendulumLog:
+    """Four seconds at 200 Hz by the servo bench of the simulator; torque off from ``off_s`` on.
+
+    ``noise``: of the encoder, half a tick (s.d.) before it is rounded.
+    """
     has = PLANTED
     gear = Gearbox(
         *(has["armature_kg_m2"], has["dry_n_m"], has["viscous_n_m_s"], has["stribeck_n_m"]),
         *(has["stribeck_rad_s"], 0.0, 0.0, 0.0),
+        backlash_rad=backlash_rad,
     )
     time_s = np.arange(0.0, 4.0, 0.005)
     goals = goal(time_s)
@@ -56,7 +69,7 @@ def swing(p_gain: int, goal: Goal, off_s: float, weaker: float = 1.0) -> Pendulu
         resistance_ohm=np.array([has["resistance_ohm"]]),
         torque_constant_n_m_a=np.array([kt]),
         back_emf_v_s=np.array([kt]),
-        current_limit_a=np.full(1, np.inf),
+        current_limit_a=np.full(1, limit_a),
     )
     on = (time_s < off_s).astype(float)
     measured = np.empty_like(time_s)
@@ -66,10 +79,12 @@ def swing(p_gain: int, goal: Goal, off_s: float, weaker: float = 1.0) -> Pendulu
         plant.advance(min(time_s[k] + DELAY_S, until_s), drive)
         drive.goal_rad[:] = goals[k]
         plant.advance(until_s, drive)
+    if noise is not None:
+        measured += noise.normal(0.0, 0.5 * TICK_RAD, len(measured))
     counts = np.round(measured / TICK_RAD) * TICK_RAD  # as the encoder tells it
     volts = np.full_like(time_s, 7.4)
     about = (Path("planted.json"), "xl330", MASS_KG, ARM_M, float(p_gain))
-    return PendulumLog(*about, time_s, goals, counts, volts, on)
+    return PendulumLog(*about, time_s, goals, counts, volts, on, limit_a)
 
 
 @pytest.fixture(scope="session")
@@ -88,6 +103,8 @@ def write(log: PendulumLog, path: Path) -> PendulumLog:
     names = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
     rows = [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
     about = {"mass": log.mass_kg, "length": log.arm_m, "kp": log.p_gain, "motor": log.actuator}
+    if np.isfinite(log.current_limit_a):
+        about["goal_current_a"] = log.current_limit_a
     path.write_text(json.dumps(about | {"entries": rows}))
     return replace(log, path=path)
 

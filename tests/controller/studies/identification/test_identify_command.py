@@ -16,7 +16,7 @@ from snakewalk.controller.studies.identification.servo_constants import (
     robot_with,
 )
 from snakewalk.sim.servo.motor import gears_of, motors_of, p_gain_per_rad
-from tests.controller.studies.identification.conftest import PLANTED
+from tests.controller.studies.identification.conftest import PLANTED, swing, write
 
 BAM = {
     "kt": PLANTED["torque_constant_n_m_a"],
@@ -62,6 +62,25 @@ def test_constants_are_judged_and_written(files: list[Path], tmp_path: Path) -> 
     again = json.loads(run(*files, "--start", out, "--no-fit", "--json"))
     assert again["constants"] == told["constants"]
     assert "out.json: exists; --force" in refused(*words)
+
+
+def test_backlash_and_goal_current_are_read_and_written(tmp_path: Path) -> None:
+    start, out, robot = tmp_path / "bam.json", tmp_path / "out.json", tmp_path / "mine.toml"
+    start.write_text(json.dumps(BAM | {"backlash": 0.0175}))
+    loose = swing(400, lambda t: 1.4 * np.sin(5.1 * t), 3.0, backlash_rad=0.0175, limit_a=1.2)
+    path = write(loose, tmp_path / "loose.json").path
+    words = (path, "--start", start, "--no-fit", "--robot", "xl330-16", "--robot-out", robot)
+    told = json.loads(run(*words, "-o", out, "--json"))
+    assert told["constants"]["backlash_rad"] == 0.0175
+    assert told["mean_error_deg"] < 0.1
+    assert told["robot_errors_deg"][str(path)][1] < 0.1
+    assert json.loads(out.read_text())["backlash"] == 0.0175
+    assert load_robot(str(robot)).motors[0].backlash_rad == 0.0175
+    bad = json.loads(path.read_text()) | {"goal_current_a": 0.0}
+    path.write_text(json.dumps(bad))
+    assert "goal_current_a is 0; give the Goal Current" in refused(path)
+    assert "--backlash: needs a fit" in refused(path, "--backlash", "--no-fit", "--start", start)
+    assert "--backlash: are for pendulums" in refused("a.mcap", "--backlash")
 
 
 def test_models_that_do_not_ask_for_the_side(files: list[Path], tmp_path: Path) -> None:

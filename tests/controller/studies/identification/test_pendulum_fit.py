@@ -1,6 +1,7 @@
 """Constants that were planted in another simulation come back inside their intervals."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,7 +16,12 @@ from snakewalk.controller.studies.identification.servo_constants import (
     NAMES,
     ServoConstants,
 )
-from tests.controller.studies.identification.conftest import PLANTED, TICK_RAD
+from tests.controller.studies.identification.conftest import (
+    DELAY_S,
+    PLANTED,
+    TICK_RAD,
+    swing,
+)
 
 
 @pytest.fixture(scope="module")
@@ -110,5 +116,46 @@ def test_a_free_pendulum_swings_at_its_frequency(logs: list[PendulumLog]) -> Non
     np.testing.assert_allclose(angle, expected, atol=1e-4)
     out = np.empty(50)
     rows = (free.time_s[:50], free.goal_rad[:50], free.supply_v[:50], free.torque_on[:50])
-    _swing.py_func(values, values[_GEAR], *rows, 0.01, 0.5, 0.1, 400.0, 1e-3, out)
+    _swing.py_func(values, values[_GEAR], *rows, 0.01, 0.5, 0.1, 400.0, np.inf, 1e-3, out)
     np.testing.assert_allclose(out, angle[:50], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("seed", "limit_a"), [(0, np.inf), (1, np.inf), (2, 1.2)])
+def test_a_planted_backlash_comes_back(seed: int, limit_a: float) -> None:
+    """One degree, within 0.2 degrees, with the noise of an encoder; in mode 5, too."""
+    found = with_backlash(loose_logs(1.0, seed, limit_a), seed)
+    k = NAMES.index("backlash_rad")
+    assert np.degrees(found.values[k]) == pytest.approx(1.0, abs=0.2)
+    assert found.low[k] <= np.radians(1.0) <= found.high[k]
+
+
+def test_a_servo_without_backlash_gets_none(found: ServoConstants) -> None:
+    assert np.isnan(found.high[NAMES.index("backlash_rad")])  # not asked for
+    found = with_backlash(loose_logs(0.0, 3), 3)
+    k = NAMES.index("backlash_rad")
+    assert (found.values[k], found.low[k]) == (0.0, 0.0)
+    assert np.degrees(found.high[k]) < 0.2
+
+
+def with_backlash(logs: list[PendulumLog], seed: int) -> ServoConstants:
+    """Fit from constants that are a tenth off."""
+    rng, values = np.random.default_rng(seed), np.array([c.absent for c in CONSTANTS])
+    planted = PLANTED | {"delay_s": DELAY_S}
+    for name, value in planted.items():
+        values[NAMES.index(name)] = value * rng.uniform(0.9, 1.1)
+    unknown = np.full(len(values), np.nan)
+    start = ServoConstants(values, unknown, unknown, "xl330")
+    return fit_pendulum(logs, start, starts=1, hops=0, seed=seed, backlash=True)
+
+
+def loose_logs(degrees: float, seed: int, limit_a: float = np.inf) -> list[PendulumLog]:
+    loose = partial(
+        swing,
+        backlash_rad=float(np.radians(degrees)),
+        limit_a=limit_a,
+        noise=np.random.default_rng(seed),
+    )
+    return [
+        loose(400, lambda t: 1.4 * np.sin(2.0 * t) * np.sin(5.1 * t), 9.0),
+        loose(800, lambda t: 0.8 * np.sin(9.0 * t), 2.5),
+    ]
