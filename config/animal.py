@@ -9,6 +9,7 @@ from snakewalk.config.base import Strict
 Point = tuple[float, float, float]
 Cycles = Annotated[float, Field(ge=0.0, lt=1.0)]
 Place = Annotated[float, Field(ge=0.0, le=1.0)]
+Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
 Channel = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -68,26 +69,80 @@ class SkinConfig(Strict):
 
 
 class LegPairConfig(Strict):
-    """A left and a right leg at one girdle; lengths over the body's."""
+    """A left and a right leg at one girdle; lengths over the body's.
+
+    A leg hangs from its root: the hip, or the pivot of the shoulder blade. From there follow the
+    blade, the upper and the lower segment, the cannon (metacarpus or metatarsus) and the foot.
+    Parts of length 0 are missing. Angles of segments are in the plane of the leg.
+    """
 
     at: Place = Field(description="place of the girdle along the body, 0 the head's tip")
-    hip_side: float = Field(gt=0.0, le=0.3, description="of a hip from the middle of the body")
-    hip_drop: float = Field(0.0, ge=-0.2, le=0.5, description="of the hips below the body's axis")
+    hip_side: float = Field(gt=0.0, le=0.3, description="of a leg's root from the body's middle")
+    hip_drop: float = Field(
+        0.0, ge=-0.2, le=0.5, description="of the legs' roots below the body's axis"
+    )
     foot_side: float = Field(gt=0.0, le=0.5, description="of a foot from the line of travel")
     foot_ahead: float = Field(
         0.0, ge=-0.5, le=0.5, description="middle of a step, ahead of the hips"
     )
-    upper: float = Field(gt=0.0, le=0.5, description="length from hip to knee")
-    lower: float = Field(gt=0.0, le=0.5, description="length from knee to foot")
-    thick: float = Field(gt=0.0, le=0.1, description="radius at the hip; the foot has half of it")
-    knee: Literal["out", "ahead", "behind"] = Field(description="where the knee points")
+    blade: float = Field(
+        0.0, ge=0.0, le=0.5, description="length of the shoulder blade, from its pivot; 0: none"
+    )
+    blade_deg: Degrees = Field(
+        0.0, description="angle of the blade to the lower segment; its lower end ahead"
+    )
+    upper: float = Field(gt=0.0, le=0.5, description="length from hip or shoulder to knee or elbow")
+    lower: float = Field(gt=0.0, le=0.5, description="length from there to the next joint or foot")
+    cannon: float = Field(
+        0.0, ge=0.0, le=0.5, description="length of metacarpus or metatarsus; 0: none"
+    )
+    cannon_deg: Degrees = Field(
+        0.0,
+        description="angle of the cannon on the ground, its lower end ahead: to the lower segment "
+        "of a leg with a blade, else to the upper segment",
+    )
+    cannon_fold_deg: Degrees = Field(
+        0.0, description="bend of the cannon in the middle of the air, its lower end behind"
+    )
+    foot: float = Field(
+        0.0, ge=0.0, le=0.5, description="length of pastern and hoof, or of the sole; 0: none"
+    )
+    foot_deg: Degrees = Field(
+        0.0, description="angle of the foot on the ground from the vertical, its toe ahead"
+    )
+    foot_out_deg: Degrees = Field(0.0, description="turn of the toe to the side")
+    foot_fold_deg: Degrees = Field(
+        0.0, description="bend of the foot in the middle of the air, its toe behind"
+    )
+    sole: Literal["round", "hoof", "toes"] = Field("round", description="end of the leg")
+    toe: float = Field(0.0, ge=0.0, le=0.3, description="length of the longest toe, or of a hoof")
+    thick: float = Field(gt=0.0, le=0.1, description="half of the width at hip or shoulder")
+    deep: float = Field(
+        1.0, gt=0.2, le=5.0, description="depth of hip or shoulder along the body over its width"
+    )
+    thin: float | None = Field(
+        None, gt=0.0, le=0.1, description="half of the width above the foot; default: thick / 2"
+    )
+    knee: Literal["out", "ahead", "behind"] = Field(description="where knee or elbow points")
     duty: float = Field(gt=0.1, lt=0.95, description="share of the cycle on the ground")
     left: Cycles = Field(description="when the left foot comes down, in cycles")
     right: Cycles = Field(description="when the right foot comes down, in cycles")
-    lift: float = Field(ge=0.0, le=0.3, description="H of [GC] Eq. 10: height of a step")
+    lift: float = Field(ge=0.0, le=0.3, description="height of a step")
     turn_rad: float = Field(
         0.0, ge=0.0, le=1.2, description="of the girdle to either side, with its legs"
     )
+
+    @property
+    def segments(self) -> tuple[float, ...]:
+        """Lengths from the root to the ankle or fetlock, then the foot; missing ones left out."""
+        parts = (self.blade, self.upper, self.lower, self.cannon, self.foot)
+        return tuple(part for part in parts if part > 0.0)
+
+    @property
+    def sole_height(self) -> float:
+        """Height of the foot's axis above the ground: toes lie on it."""
+        thin = 0.5 * self.thick if self.thin is None else self.thin
+        return thin if self.sole == "toes" and self.foot > 0.0 else 0.0
 
 
 class OrnamentConfig(Strict):
@@ -97,6 +152,7 @@ class OrnamentConfig(Strict):
     root: Point = Field(description="ahead of that place, to the left and above the axis")
     tip: Point
     thick: float = Field(gt=0.0, le=0.1, description="radius at the root")
+    bow: Point = Field((0.0, 0.0, 0.0), description="of its middle, off the line to the tip")
     swing_rad: float = Field(0.0, ge=0.0, le=1.2, description="to and fro, once a step")
     paired: bool = Field(False, description="the same on the other side")
     dark: bool = Field(False, description="of the colour of the skin's bands")
@@ -104,7 +160,7 @@ class OrnamentConfig(Strict):
     @property
     def mirrored(self) -> Self:
         """The one on the other side."""
-        ends = {"root": self.root, "tip": self.tip}
+        ends = {"root": self.root, "tip": self.tip, "bow": self.bow}
         return self.model_copy(update={name: (x, -y, z) for name, (x, y, z) in ends.items()})
 
 
@@ -121,6 +177,11 @@ class AnimalConfig(Strict):
     stride: float = Field(gt=0.0, le=3.0, description="way of a cycle, body lengths")
     cycle_s: float = Field(gt=0.02, le=20.0, description="duration of a cycle")
     leg_pairs: tuple[LegPairConfig, LegPairConfig] = Field(description="front, then hind")
+    feet: Literal["footfall", "gc-printed"] = Field(
+        "footfall",
+        description="paths of the feet: footfall (ours) stands still on the ground; gc-printed is "
+        "[GC] Eq. 9-10 as printed, with one height for left and right",
+    )
     vault: float = Field(
         0.0, ge=0.0, le=1.0, description="how far the body rides on legs as on pendulums"
     )

@@ -17,7 +17,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
-from snakewalk.sim.rendering.shade import add_shade
+from snakewalk.sim.rendering.shade import SoftShade, link_surface_m
 from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
 
 SMOOTHING_S = 1.2
@@ -113,6 +113,7 @@ def render_film(
         for k, shot in enumerate(shots):
             now = float(shot_s[k])
             stage.pose(scene, shot, camera[k], now)
+            screen.reload(stage.model, stage.shade.texture)
             trail.add(scene, now)
             add_axes(scene, _corner(camera[k]), _scale_m(robot.length_m), ground)
             caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip()
@@ -144,7 +145,7 @@ class _Stage:
         marks: Marks,
     ) -> None:
         look = style.look
-        self._robot, self._ground, self._reached_s = robot, ground, marks.reached_s
+        self._robot, self._reached_s = robot, marks.reached_s
         self.bodies = len(look.rest_m) if look is not None and look.free else 1
         self.spine = slice(1, 1 + (self.bodies if self.bodies > 1 else robot.link_count))
         legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
@@ -155,7 +156,10 @@ class _Stage:
             look=look,
             fine=style.fine,
             hollow=marks.hollow,
+            shade=True,
         )
+        self.shade = SoftShade(self.model, ground)
+        self._faces = None if look is None else look.faces
         self.data = mujoco.MjData(self.model)
         self._view, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._reached = 0
@@ -182,11 +186,16 @@ class _Stage:
         view.distance, view.elevation = camera[4], -33.0
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, view, every, scene)
-        spine = self.spine
-        add_shade(
-            *(scene, np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])),
-            *(self._robot, self._ground),
-        )
+        self.shade.lay(scene, self._surface_m(scene))
+
+    def _surface_m(self, scene: mujoco.MjvScene) -> Floats:
+        """Points (P, 3) of the body's surface as it was posed last."""
+        if self._faces is None:
+            spine, data = self.spine, self.data
+            links = np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])
+            return link_surface_m(*links, self._robot)
+        corners = np.array(scene.skinvert, float).reshape(-1, 3)[: int(self._faces.max()) + 1]
+        return np.concatenate([corners, corners[self._faces].mean(axis=1)])
 
 
 def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Floats:

@@ -16,7 +16,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.physics.body import finish, mjcf
-from snakewalk.sim.rendering.shade import SUN_DIRECTION
+from snakewalk.sim.rendering.shade import SUN_DIRECTION, add_sheet
 
 Rgba = tuple[float, float, float, float]
 BACK: tuple[Rgba, Rgba] = ((0.80, 0.56, 0.20, 1), (0.36, 0.22, 0.11, 1))
@@ -85,12 +85,13 @@ def dressed_model(
     fine: bool = False,
     prints: Sequence[FloorPrint] = (),
     hollow: bool = False,
+    shade: bool = False,
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
     ``look`` is the skin; None is a capsule a link. ``fine`` smooths edges: three times the work of
     a software renderer. ``hollow`` waypoints, of a run whose arrivals are not measured, have a
-    dashed ring and no pole.
+    dashed ring and no pole. ``shade`` adds the sheet of a ``SoftShade``.
 
     Raises:
         InputError: the installed MuJoCo cannot edit models.
@@ -112,6 +113,8 @@ def dressed_model(
         _skin(spec, robot)
     else:
         _animal(spec, look)
+    if shade:
+        add_sheet(spec)
     _water(spec, world, ground)
     for k, sheet in enumerate(prints):
         _print(spec, f"print{k}", sheet)

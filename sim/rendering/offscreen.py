@@ -66,6 +66,11 @@ class Offscreen:
         mujoco.mjr_readPixels(pixels, None, view, self._mjr)
         return pixels[::-1]
 
+    def reload(self, model: mujoco.MjModel, texture: int) -> None:
+        """Pass a texture of the model, which has changed, to the renderer."""
+        self._gl.make_current()
+        mujoco.mjr_uploadTexture(model, self._mjr, texture)
+
     def __enter__(self) -> Self:
         return self
 

@@ -40,9 +40,55 @@ _END = (
     "--frames %s: the motion ends after %s frames, where the head leaves the ground of %s; "
     "ask for fewer frames, or add waypoints"
 )
+FEET = ("footfall", "gc-printed")
+"""Paths of the feet of an animal with legs."""
 _SYNTHESISED = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
 """Endings of the files, by content."""
+
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="write NAME.npz, NAME.png, ...; default: the run's name"),
+]
+Motion = Annotated[
+    str | None,
+    typer.Option(
+        help="kind of motion: walk; walk-printed, aimed as [PT] prints it; kp, the state "
+        "graph of [KP]"
+    ),
+]
+Animal = Annotated[
+    str | None,
+    typer.Option(
+        help="animal with legs instead of a snake: lizard, goat, or a .toml ([KP])",
+        autocompletion=completion.ANIMALS,
+    ),
+]
+Feet = Annotated[
+    str | None,
+    typer.Option(
+        help="feet of --animal: footfall (ours), or gc-printed, [GC] Eq. 9-10 as printed; "
+        "default: of the animal's file",
+        autocompletion=completion.words(*FEET),
+    ),
+]
+Frames = Annotated[
+    int | None,
+    typer.Option(
+        min=2,
+        max=100_000,
+        help="number of frames, fewer if the head leaves the world; default: until the last "
+        "waypoint is reached",
+    ),
+]
+Film = Annotated[
+    bool, typer.Option("--film", help="write a film of the skin on the ground to NAME.mp4")
+]
+Glb = Annotated[bool, typer.Option("--glb", help="write the skin as animated glTF to NAME.glb")]
+Look = Annotated[
+    str,
+    typer.Option(help="body in film and glTF: animal, or a BODY that `snakewalk body` accepts"),
+]
 
 
 @command(
@@ -56,50 +102,19 @@ _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
 )
 def synthesise(
     run: RunName = DEFAULT_RUN,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="write NAME.npz, NAME.png, ...; default: the run's name"
-        ),
-    ] = None,
+    output: Output = None,
     robot: Robot = None,
     world: World = None,
     track: TrackFile = None,
     seed: Seed = None,
-    motion: Annotated[
-        str | None,
-        typer.Option(
-            help="kind of motion: walk; walk-printed, aimed as [PT] prints it; kp, the state "
-            "graph of [KP]"
-        ),
-    ] = None,
-    animal: Annotated[
-        str | None,
-        typer.Option(
-            help="animal with legs instead of a snake: lizard, goat, or a .toml ([KP])",
-            autocompletion=completion.ANIMALS,
-        ),
-    ] = None,
+    motion: Motion = None,
+    animal: Animal = None,
+    feet: Feet = None,
     set_: Set = None,
-    frames: Annotated[
-        int | None,
-        typer.Option(
-            min=2,
-            max=100_000,
-            help="number of frames, fewer if the head leaves the world; default: until the last "
-            "waypoint is reached",
-        ),
-    ] = None,
-    film: Annotated[
-        bool, typer.Option("--film", help="write a film of the skin on the ground to NAME.mp4")
-    ] = False,
-    glb: Annotated[
-        bool, typer.Option("--glb", help="write the skin as animated glTF to NAME.glb")
-    ] = False,
-    look: Annotated[
-        str,
-        typer.Option(help="body in film and glTF: animal, or a BODY that `snakewalk body` accepts"),
-    ] = "animal",
+    frames: Frames = None,
+    film: Film = False,
+    glb: Glb = False,
+    look: Look = "animal",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -120,6 +135,8 @@ def synthesise(
     refuse_to_overwrite(list(files.values()), force)
     check_picture(files["picture"])
     if animal is None:
+        if feet is not None:
+            raise InputError(f"--feet {feet}: is for animals with legs; add --animal")
         facts, complete = _snake(prepared, frames, look, files)
     else:
         kept = {"--motion": motion, "--track": track, "--look": None if look == "animal" else look}
@@ -128,7 +145,7 @@ def synthesise(
             raise InputError(
                 f"{wrong[0]}: is for snakes; --animal {animal} has its own motion and skin"
             )
-        facts, complete = _with_legs(prepared, frames, animal, files)
+        facts, complete = _with_legs(prepared, frames, animal, feet, files)
     if frames is not None and facts["frames"] != frames:
         LOGGER.warning(_END, frames, facts["frames"], prepared.world.name)
     show(facts | {what: str(files[what]) if what in files else None for what in _ENDINGS}, as_json)
@@ -161,10 +178,14 @@ def _snake(
 
 
 def _with_legs(
-    prepared: WalkRun, frames: int | None, name: str, files: Mapping[str, Path]
+    prepared: WalkRun, frames: int | None, name: str, feet: str | None, files: Mapping[str, Path]
 ) -> tuple[dict[str, object], bool]:
     """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
     config = read_animal(name)
+    if feet is not None:
+        if feet not in FEET:
+            raise InputError(f"--feet {feet}: choose {' or '.join(FEET)}")
+        config = config.model_copy(update={"feet": feet})
     body = None
     if "skin" in files or "film" in files:
         from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415  --film and --glb: an extra

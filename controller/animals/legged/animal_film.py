@@ -18,6 +18,9 @@ from snakewalk.controller.animals.synthesis.synthesis_skin import film_over
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 
+_SHOWN = 1.2
+"""Length that the camera frames over the body's: legs and horns stand above and below the spine."""
+
 
 @dataclass(frozen=True, slots=True)
 class AnimalBody:
@@ -59,7 +62,7 @@ class AnimalBody:
             file,
             animal_bones(made.animal, made.motion),
             rig_look(self.rig, self.texture),
-            robot=as_long_robot(prepared.robot, made.animal.length_m),
+            robot=as_long_robot(prepared.robot, _SHOWN * made.animal.length_m),
             reached_s=made.reached_s(),
             paths=[(0.0, dots)],
             title=f"{made.animal.name}, {prepared.run.name}",

@@ -1,4 +1,4 @@
-"""The body of an animal with legs: its skin on the spine, tapered tubes as legs and ornaments.
+"""The body of an animal with legs: its skin on the spine, skinned legs, tapered ornaments.
 
 [KP] 4.1 builds a goat of eleven parts and a lizard of five, each of ellipses across it.
 """
@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.animal import AnimalConfig, OrnamentConfig
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion
+from snakewalk.controller.animals.legged.leg import toe_left
+from snakewalk.controller.animals.legged.leg_mesh import LegColours, carried_part, leg_parts
+from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion, body_frame
 from snakewalk.controller.animals.legged.prototype import SEGMENTS
-from snakewalk.controller.animals.mesh.mesh import tube_faces, vertex_normals
 from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin, Weights
 from snakewalk.controller.gaits.wave import TURN
@@ -19,8 +20,8 @@ from snakewalk.controller.track.bone_motion import BoneMotion
 
 _AROUND = 14
 """Corners of a ring."""
-_KNEE, _FOOT = 0.75, 0.55
-"""Radii of a leg there over that at the hip."""
+_ROWS = 7
+"""Rings of a bowed ornament between its ends."""
 _POINT = 0.15
 """Radius of an ornament's tip over that of its root."""
 _PLAIN_UV = 0.3, 0.98
@@ -43,44 +44,48 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
 
     def hang(corners: Floats, carrier: int, uv: tuple[float, float]) -> None:
         """Add a bone with its part."""
-        parts.append(_part(corners, len(rest), uv))
+        parts.append(carried_part(corners, _AROUND, len(rest), uv))
         rest.append(np.zeros(3))
         parent.append(carrier)
 
-    for pair in animal.leg_pairs:
-        hip_m, knee_m, foot_m = (length_m * pair.thick * share for share in (1.0, _KNEE, _FOOT))
-        for _ in range(2):
-            upper, lower = length_m * pair.upper, length_m * pair.lower
-            hang(_tube(upper, hip_m, knee_m), _carrier(pair.at), _PLAIN_UV)
-            hang(_tube(lower, knee_m, foot_m), len(rest) - 1, _PLAIN_UV)
     dark = (1.0 / bands if bands else 0.5), _DARK_V
+    for pair in animal.leg_pairs:
+        for side in (1.0, -1.0):
+            first = len(rest)
+            parts += leg_parts(pair, length_m, first, side, LegColours(_PLAIN_UV, dark))
+            starts_m = length_m * np.concatenate([[0.0], np.cumsum(pair.segments)[:-1]])
+            rest += [np.array([-start, 0.0, 0.0]) for start in starts_m]
+            parent += [_carrier(pair.at), *range(first, first + len(starts_m) - 1)]
     for one in animal.all_ornaments:
         thick_m = length_m * one.thick
-        cone = _tube(_length_m(one, length_m), thick_m, _POINT * thick_m)
+        cone = _horn(one, length_m, thick_m)
         uv = dark if one.dark else _PLAIN_UV
         if one.swing_rad > 0.0:
             hang(cone, _carrier(one.at), uv)
         else:
             root = length_m * np.array(one.root) + [-one.at * length_m, 0.0, skin.axis_m]
-            parts.append(_part(cone @ _turned(one).T + root, _carrier(one.at), uv))
+            parts.append(carried_part(cone @ _turned(one).T + root, _AROUND, _carrier(one.at), uv))
     return Rig(*_joined(parts), np.array(rest), np.array(parent, dtype=np.int64))
 
 
 def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
-    """Bones over time: those of the spine, two of each leg, one of each ornament that swings."""
+    """Bones over time: of the spine, of the segments of each leg, of each ornament that swings."""
     length_m = animal.length_m
     front = [motion.spine_m[:, k] for k in range(SEGMENTS)]
     turns = [
         _facing(motion.spine_m[:, k] - motion.spine_m[:, k + 1], motion.up) for k in range(SEGMENTS)
     ]
     long_m = [length_m / SEGMENTS] * SEGMENTS
-    for k in range(4):
+    frame = body_frame(motion.spine_m, motion.up)
+    for k, joints in enumerate(motion.joints_m):
         pair = animal.leg_pairs[k // 2]
-        hip, knee, end = motion.hip_m[:, k], motion.knee_m[:, k], motion.end_m[:, k]
-        ahead = motion.spine_m[:, 0] - motion.spine_m[:, -1]
-        front += [hip, knee]
-        turns += [_facing(hip - knee, ahead), _facing(knee - end, ahead)]
-        long_m += [length_m * pair.upper, length_m * pair.lower]
+        steps_m = joints[:, :-1] - joints[:, 1:]
+        front += [joints[:, j] for j in range(steps_m.shape[1])]
+        turns += [_facing(steps_m[:, j], frame.ahead) for j in range(steps_m.shape[1])]
+        long_m += [length_m * part for part in pair.segments]
+        if pair.foot > 0.0:
+            right = -toe_left(pair, frame, 1.0 if k % 2 == 0 else -1.0)
+            turns[-1] = _beside(steps_m[:, -1], right)
     steps = 2.0 * TURN * motion.time_s / animal.cycle_s
     for one in animal.all_ornaments:
         if one.swing_rad > 0.0:
@@ -115,34 +120,37 @@ def _facing(forward: Floats, up: Floats) -> Floats:
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
+def _beside(forward: Floats, y: Floats) -> Floats:
+    """(T, 3, 3) turns whose x is along ``forward`` and whose y is ``y``, normal to it."""
+    x = forward / np.linalg.norm(forward, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
 def _carrier(at: float) -> int:
     """Index of the spine's bone at a place along the body."""
     return min(int(at * SEGMENTS), SEGMENTS - 1)
 
 
-def _tube(long_m: float, thick_m: float, end_m: float) -> Floats:
+def _horn(one: OrnamentConfig, length_m: float, thick_m: float) -> Floats:
+    """(V, 3) rings of a cone in its bone, bowed as a parabola, then its two tips."""
+    long_m = _length_m(one, length_m)
+    cone = _tube(long_m, thick_m, _POINT * thick_m, _ROWS if any(one.bow) else 1)
+    on = np.clip(-cone[:, 0] / long_m, 0.0, 1.0)
+    bow = length_m * np.array(one.bow) @ _turned(one)
+    return np.asarray(cone + 4.0 * (on * (1.0 - on))[:, None] * bow)
+
+
+def _tube(long_m: float, thick_m: float, end_m: float, rows: int) -> Floats:
     """(V, 3) rings of a tapered tube along -x from 0, round at both ends, then its two tips."""
     cap = np.array([1.0, 2.0]) * np.pi / 6.0
-    x = [*(thick_m * np.cos(cap)), 0.0, -0.5 * long_m, -long_m, *(-long_m - end_m * np.sin(cap))]
-    middle_m = 0.5 * (thick_m + end_m)
-    radius = [*(thick_m * np.sin(cap)), thick_m, middle_m, end_m, *(end_m * np.cos(cap))]
+    on = np.linspace(0.0, 1.0, rows + 2)
+    x = [*(thick_m * np.cos(cap)), *(-long_m * on), *(-long_m - end_m * np.sin(cap))]
+    taper = thick_m + (end_m - thick_m) * on
+    radius = [*(thick_m * np.sin(cap)), *taper, *(end_m * np.cos(cap))]
     turn = np.arange(_AROUND) * TURN / _AROUND
     y, z = np.outer(radius, np.cos(turn)), np.outer(radius, np.sin(turn))
     rings = np.stack([np.repeat(x, _AROUND), y.ravel(), z.ravel()], axis=-1)
     return np.vstack([rings, [thick_m, 0.0, 0.0], [-long_m - end_m, 0.0, 0.0]])
-
-
-def _part(corners: Floats, bone: int, uv: tuple[float, float]) -> tuple[Mesh, Weights]:
-    count = len(corners)
-    faces = tube_faces((count - 2) // _AROUND, _AROUND)
-    mesh = Mesh(
-        vertices=corners,
-        normals=vertex_normals(corners, faces),
-        uv=np.tile(np.array(uv), (count, 1)),
-        faces=faces,
-    )
-    shares = np.tile([0.0, 1.0, 0.0], (count, 1))
-    return mesh, Weights(np.full((count, 3), bone, dtype=np.int64), shares)
 
 
 def _joined(parts: list[tuple[Mesh, Weights]]) -> tuple[Mesh, Weights]:

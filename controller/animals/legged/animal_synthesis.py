@@ -64,6 +64,15 @@ class SynthesisedAnimal:
         stays = on[1:] & on[:-1]
         return float(np.linalg.norm(np.diff(foot, axis=0), axis=-1)[stays].max(initial=0.0))
 
+    @property
+    def stance_slip_m(self) -> float:
+        """Longest way of a foot on the ground between coming down and leaving."""
+        foot, on = self.motion.foot_m, self.motion.on_ground
+        way = np.linalg.norm(np.diff(foot, axis=0), axis=-1) * (on[1:] & on[:-1])
+        total = np.concatenate([np.zeros((1, way.shape[1])), np.cumsum(way, axis=0)])
+        begun = np.maximum.accumulate(np.where(on, 0.0, total), axis=0)
+        return float((total - begun)[on].max(initial=0.0))
+
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
         animal, motion = self.animal, self.motion
@@ -83,7 +92,9 @@ class SynthesisedAnimal:
             "speed_m_s": round(animal.speed_m_s, 4),
             "speed_body_lengths_s": round(animal.stride / animal.cycle_s, 4),
             "steepest_deg": round(float(np.degrees(np.arccos(motion.up[:, 2].min()))), 1),
+            "feet": animal.feet,
             "slip_most_m": round(self.slip_m, 9),
+            "slip_stance_most_m": round(self.stance_slip_m, 6),
             "leg_short_most_m": round(
                 float(np.linalg.norm(motion.end_m - motion.foot_m, axis=-1).max()), 6
             ),
@@ -96,6 +107,8 @@ class SynthesisedAnimal:
 
         ``points`` (T, S + 1, 2) and ``height_m`` (T, S + 1) are the spine, head first; ``hip_m``,
         ``knee_m`` and ``foot_m`` (T, 4, 3), in the order of ``legs``; ``on_ground`` (T, 4).
+        ``front_joints_m`` and ``hind_joints_m`` (T, 2, J, 3) are all joints of the left and the
+        right leg, from the root to the toe.
         """
         motion = self.motion
         np.savez_compressed(
@@ -109,9 +122,11 @@ class SynthesisedAnimal:
             height_m=motion.spine_m[..., 2],
             legs=np.array(LEGS),
             hip_m=motion.hip_m,
-            knee_m=motion.knee_m,
+            knee_m=motion.knee_m(self.animal),
             foot_m=motion.end_m,
             on_ground=motion.on_ground,
+            front_joints_m=np.stack(motion.joints_m[:2], axis=1),
+            hind_joints_m=np.stack(motion.joints_m[2:], axis=1),
         )
 
 

@@ -16,7 +16,7 @@ from snakewalk.config.animal import AnimalConfig
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
-from snakewalk.controller.animals.legged.leg import knees_m
+from snakewalk.controller.animals.legged.leg import LegFrame, leg_joints_m
 from snakewalk.controller.animals.legged.prototype import Prototype
 from snakewalk.controller.terrain.path import SplinePath
 
@@ -32,18 +32,33 @@ class AnimalMotion:
     """(T,)"""
     spine_m: Floats
     """(T, S + 1, 3) head first."""
-    hip_m: Floats
-    """(T, 4, 3) front left, front right, hind left, hind right."""
-    knee_m: Floats
-    """(T, 4, 3)"""
+    joints_m: tuple[Floats, Floats, Floats, Floats]
+    """(T, J, 3) of each leg, from its root to its toe: front left, front right, hind left, hind
+    right."""
     foot_m: Floats
     """(T, 4, 3) where the feet should be."""
-    end_m: Floats
-    """(T, 4, 3) where the legs end: at the feet, if they reach."""
+    sole_m: Floats
+    """(4,) height of the toes' ends of the legs above the ground."""
     up: Floats
     """(T, 3) normal of the local ground plane."""
     on_ground: Bools
     """(T, 4)"""
+
+    @property
+    def hip_m(self) -> Floats:
+        """(T, 4, 3) roots of the legs: hips, or pivots of the shoulder blades."""
+        return np.stack([leg[:, 0] for leg in self.joints_m], axis=1)
+
+    @property
+    def end_m(self) -> Floats:
+        """(T, 4, 3) where the legs end: at the feet, if they reach."""
+        end = np.stack([leg[:, -1] for leg in self.joints_m], axis=1)
+        return np.asarray(end - self.sole_m[:, None] * self.up[:, None])
+
+    def knee_m(self, animal: AnimalConfig) -> Floats:
+        """(T, 4, 3) knees or elbows: the lower ends of the upper segments."""
+        knee = [2 if pair.blade > 0.0 else 1 for pair in animal.leg_pairs for _ in range(2)]
+        return np.stack([leg[:, k] for leg, k in zip(self.joints_m, knee, strict=True)], axis=1)
 
 
 class PathNormals:
@@ -104,15 +119,22 @@ def transformed(
         return np.asarray(turned + base[:, None])
 
     spine, hip = stood(spine), stood(hip)
-    length_m = animal.length_m
-    pairs = [pair for pair in animal.leg_pairs for _ in range(2)]
-    upper, lower = (
-        np.array([length_m * part for part in parts])
-        for parts in zip(*((pair.upper, pair.lower) for pair in pairs), strict=True)
+    frame = body_frame(spine, up)
+    front_left, front_right, hind_left, hind_right = (
+        leg_joints_m(
+            animal.leg_pairs[k // 2],
+            animal.length_m,
+            hip[:, k],
+            foot[:, k] + animal.leg_pairs[k // 2].sole_height * animal.length_m * up,
+            made.air[:, k],
+            frame,
+            1.0 if k % 2 == 0 else -1.0,
+        )
+        for k in range(4)
     )
-    forward = spine[:, 0] - spine[:, -1]
-    knee, end = knees_m(hip, foot, upper, lower, _towards(animal, hip, forward, up))
-    return AnimalMotion(made.time_s, spine, hip, knee, foot, end, up, made.on_ground)
+    joints = front_left, front_right, hind_left, hind_right
+    sole_m = animal.length_m * np.repeat([pair.sole_height for pair in animal.leg_pairs], 2)
+    return AnimalMotion(made.time_s, spine, joints, foot, sole_m, up, made.on_ground)
 
 
 def local_planes(plan_m: Floats, height_m: Floats) -> tuple[Floats, Floats, Floats]:
@@ -144,17 +166,11 @@ def _upright(up: Floats) -> Floats:
     return Rotation.from_rotvec(axis * (angle / np.maximum(sine, 1e-12))).as_matrix()
 
 
-def _towards(animal: AnimalConfig, hip_m: Floats, forward: Floats, up: Floats) -> Floats:
-    """(T, 4, 3) where knees point."""
-    left = np.cross(up, forward)
+def body_frame(spine_m: Floats, up: Floats) -> LegFrame:
+    """Directions of bodies with spines (T, S + 1, 3) that stand on planes of normals (T, 3)."""
+    left = np.cross(up, spine_m[:, 0] - spine_m[:, -1])
     left /= np.linalg.norm(left, axis=-1, keepdims=True)
-    ahead = np.cross(left, up)
-    found = np.empty_like(hip_m)
-    for k in range(4):
-        side = 1.0 if k % 2 == 0 else -1.0
-        ways = {"out": up + side * left, "ahead": ahead, "behind": -ahead}
-        found[:, k] = ways[animal.leg_pairs[k // 2].knee]
-    return found
+    return LegFrame(np.cross(left, up), left, up)
 
 
 def _elevation_m(ground: HeightField | None, points_m: Floats) -> Floats:

@@ -1,8 +1,9 @@
 """The prototype: an animal with legs that goes along a straight line on level ground ([KP] 4.2.2).
 
 The body bends in a standing wave with its nodes at the girdles, each turned furthest when its legs
-are; the head keeps its heading. A foot on the ground stays where it is; in the air it goes as [GC]
-Eq. 9-10, each foot with a phase of its own. How high the body rides follows from the legs.
+are; the head keeps its heading. A foot on the ground stays where it is, and each foot has a phase
+of its own (``feet = "footfall"``). The feet of [GC] Eq. 9-10 as printed are ``printed_feet``. The
+height of the body follows from the legs.
 """
 
 from dataclasses import dataclass
@@ -38,6 +39,8 @@ class Prototype:
     """(T, 4, 3)"""
     on_ground: Bools
     """(T, 4) the time chart of contacts ([KP] Fig. 13)."""
+    air: Floats
+    """(T, 4) share of a foot's time in the air that has passed, 0 on the ground."""
 
 
 def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
@@ -52,16 +55,17 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     cycles = time_s / animal.cycle_s
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
     phase = [_since_down(pair, cycles) for pair in animal.leg_pairs]
-    step_m = animal.stride * length_m
-    foot, hip, contact, high = [], [], [], []
+    foot, hip, contact, air, high = [], [], [], [], []
     for pair, at in zip(animal.leg_pairs, phase, strict=True):
-        ahead = 0.5 * step_m * pair.duty * swing(at, pair.duty)
+        ahead, rise, on = footfall(animal, pair, at)
         high.append(_ride(animal, pair, ahead, at))
+        air.append(np.where(on, 0.0, np.clip((at - pair.duty) / (1.0 - pair.duty), 0.0, 1.0)))
+        if animal.feet == "gc-printed":
+            ahead, rise, on = printed_feet(animal, pair, cycles)
         place = length_m * (pair.foot_ahead - pair.at) + animal.speed_m_s * time_s
         side = np.broadcast_to(_SIDES * pair.foot_side * length_m, at.shape)
-        rise = length_m * pair.lift * lift(at, pair.duty)
         foot.append(np.stack([place[:, None] + ahead, side, rise], axis=-1))
-        contact.append(at < pair.duty)
+        contact.append(on)
     spine = _spine_m(animal, time_s, np.stack(high, axis=1))
     for pair in animal.leg_pairs:
         turned = _spine_rad(animal, cycles, np.array([pair.at]))
@@ -74,7 +78,42 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
         np.concatenate(hip, axis=1),
         np.concatenate(foot, axis=1),
         np.concatenate(contact, axis=1),
+        np.concatenate(air, axis=1),
     )
+
+
+def footfall(animal: AnimalConfig, pair: LegPairConfig, at: Floats) -> tuple[Floats, Floats, Bools]:
+    """Feet ahead of the middle of their steps (...), above the ground (...), and on it (...).
+
+    Args:
+        animal: its stride.
+        pair: one pair of its legs.
+        at: (...) cycles since the foot came down, 0 to 1.
+
+    """
+    ahead_m = 0.5 * animal.stride * animal.length_m * pair.duty * swing(at, pair.duty)
+    return ahead_m, animal.length_m * pair.lift * lift(at, pair.duty), at < pair.duty
+
+
+def printed_feet(
+    animal: AnimalConfig, pair: LegPairConfig, cycles: Floats
+) -> tuple[Floats, Floats, Bools]:
+    """Left and right foot (T, 2) of a pair by [GC] Eq. 9-10 as printed, as ``footfall`` gives them.
+
+    ``R_Fy = T_y (H + H_R) + H_RF`` and ``R_Fz = -T_z (L + L_R)``; the left foot has no minus sign.
+    ``T_y = sin(omega t)`` is the same for both feet, so one of them goes forward while it is low.
+    The paper leaves L and H open. Here L makes the right foot stand still at its lowest point, 2 H
+    is the height of a step, and ``H_RF = H`` puts that point on the ground. The fine parameters H_R
+    and L_R are 0. A foot counts as on the ground in the lower quarter of its height.
+    """
+    lowest = pair.right + 0.5 * pair.duty
+    turn = TURN * (cycles - lowest) - 0.25 * TURN
+    t_y, t_z = np.sin(turn), np.cos(turn)
+    high_m = 0.5 * animal.length_m * pair.lift
+    long_m = animal.stride * animal.length_m / TURN
+    rise = np.repeat((t_y * high_m + high_m)[:, None], 2, axis=1)
+    ahead = np.stack([t_z * long_m, -t_z * long_m], axis=-1)
+    return ahead, rise, rise <= 0.5 * high_m
 
 
 def _spine_m(animal: AnimalConfig, time_s: Floats, high_m: Floats) -> Floats:

@@ -7,10 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from snakewalk.config.animal import AnimalConfig
 from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, INK, PURPLE, SKY
 from snakewalk.controller.animals.legged.animal_synthesis import SynthesisedAnimal
-from snakewalk.controller.animals.legged.prototype import LEGS
+from snakewalk.controller.animals.legged.prototype import LEGS, footfall, printed_feet
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.path import draw_ground
 from snakewalk.controller.figures.style import WIDTH_IN, legend_above, save_picture, style
@@ -33,14 +34,15 @@ def draw_animal(made: SynthesisedAnimal, file: Path, title: str) -> None:
     low, high = plan.min(axis=0) - _MARGIN_M, plan.max(axis=0) + _MARGIN_M
     map_in = float(np.clip(0.9 * WIDTH_IN * (high - low)[1] / (high - low)[0], 2.6, 6.0))
     with style():
-        figure = Figure(figsize=(WIDTH_IN, map_in + 4.0), layout="constrained", dpi=110)
-        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 4.0])[:, 0]
+        figure = Figure(figsize=(WIDTH_IN, map_in + 6.4), layout="constrained", dpi=110)
+        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 6.4])[:, 0]
         axes = upper.subplots(1, 1)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         _map(axes, made, title)
-        chart, height = lower.subplots(2, 1, height_ratios=[1.0, 1.3])
+        chart, feet, height = lower.subplots(3, 1, height_ratios=[1.0, 1.3, 1.3])
         _contacts(chart, made)
+        _feet(feet, made.animal)
         _heights(height, made)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
@@ -74,8 +76,7 @@ def _body(axes: Axes, made: SynthesisedAnimal, frame: int) -> None:
     motion = made.motion
     axes.plot(*motion.spine_m[frame, :, :2].T, color=INK, linewidth=2.0)
     for k in range(len(LEGS)):
-        leg = np.stack([motion.hip_m[frame, k], motion.knee_m[frame, k], motion.end_m[frame, k]])
-        axes.plot(*leg[:, :2].T, color=INK, linewidth=1.0)
+        axes.plot(*motion.joints_m[k][frame, :, :2].T, color=INK, linewidth=1.0)
 
 
 def _contacts(axes: Axes, made: SynthesisedAnimal) -> None:
@@ -93,6 +94,31 @@ def _contacts(axes: Axes, made: SynthesisedAnimal) -> None:
     axes.set_xlabel("cycles")
 
 
+def _feet(axes: Axes, animal: AnimalConfig) -> None:
+    """Paths of the front feet over a cycle, seen from the trunk: ours, and [GC] Eq. 9-10."""
+    pair, length_m = animal.leg_pairs[0], animal.length_m
+    cycles = np.linspace(0.0, 1.0, 241)
+    at = (cycles[:, None] - [pair.left, pair.right]) % 1.0
+    ahead, rise, _ = footfall(animal, pair, at)
+    order = np.argsort(at[:, 0])
+    axes.plot(100.0 * ahead[order, 0], 100.0 * rise[order, 0], color=BLUE, label="footfall (ours)")
+    ahead, rise, _ = printed_feet(animal, pair, cycles)
+    axes.plot(
+        100.0 * ahead[:, 0], 100.0 * rise[:, 0], color=AMBER, linestyle="--",
+        label="gc-printed: [GC] Eq. 9-10",
+    )  # fmt: skip
+    for k, way in ((0, "left foot: forward while low"), (1, "right foot: back while low")):
+        x = 55.0 * float(np.abs(ahead).max()) * (1.0 - 2.0 * k)
+        arrow = {"arrowstyle": "->", "color": AMBER, "linewidth": 1.4}
+        axes.annotate("", (x, 0.0), (0.0, 0.0), arrowprops=arrow)
+        beside = "left" if k == 0 else "right"
+        axes.text(1.05 * x, 0.0, f" {way} ", color=INK, ha=beside, va="bottom", fontsize=8.0)
+    axes.set_xlabel("ahead of the middle of a step (cm)")
+    axes.set_ylabel("height (cm)")
+    axes.set_ylim(-0.15 * 100.0 * length_m * pair.lift, 1.25 * 100.0 * length_m * pair.lift)
+    legend_above(axes, 2)
+
+
 def _heights(axes: Axes, made: SynthesisedAnimal) -> None:
     """Ground and body along the way."""
     motion = made.motion
@@ -102,7 +128,7 @@ def _heights(axes: Axes, made: SynthesisedAnimal) -> None:
     if made.ground is not None:
         ground = made.ground.elevation_m(*middle.T)
     axes.fill_between(along, ground, ground.min() - 0.02, color=GREY, alpha=0.35, linewidth=0)
-    axes.plot(along, motion.hip_m[..., 2].mean(axis=1), color=BLUE, label="hips, mean")
+    axes.plot(along, motion.hip_m[..., 2].mean(axis=1), color=BLUE, label="roots of the legs, mean")
     axes.plot(along, ground, color=INK, linewidth=1.0, label="ground below them")
     axes.set_xlabel("distance along the track of the trunk (m)")
     axes.set_ylabel("height (m)")

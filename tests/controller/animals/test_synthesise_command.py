@@ -252,7 +252,7 @@ def test_an_animal_with_legs_is_led_over_the_hills(tmp_path: Path) -> None:
 
 
 def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> None:
-    own = locate("animals", "goat").read_text().replace("length_m = 1.1", "length_m = 0.5")
+    own = locate("animals", "goat").read_text().replace("length_m = 1.25", "length_m = 0.5")
     (tmp_path / "kid.toml").write_text(own.replace('skin = "goat"', 'skin = "own.toml"'))
     (tmp_path / "own.toml").write_text(locate("skins", "goat").read_text())
     out = tmp_path / "kid"
@@ -263,5 +263,26 @@ def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> 
     assert done.returncode == 0
     assert json.loads(done.stdout)["frames"] == 12
     tree = pygltflib.GLTF2().load(str(out.with_suffix(".glb")))
-    assert len(tree.skins[0].joints) == 24 + 8 + 1  # spine, legs, and the beard that swings
+    assert len(tree.skins[0].joints) == 24 + 18 + 1  # spine, legs, and the beard that swings
     assert out.with_suffix(".mp4").stat().st_size > 1000
+
+
+def test_the_feet_as_printed_are_an_option_and_their_slip_is_reported(tmp_path: Path) -> None:
+    words = ["synthesise", "flat-square", "--frames", "40", "--json"]
+    slip = {}
+    for feet in ("footfall", "gc-printed"):
+        out = ["-o", str(tmp_path / feet), "--animal", "goat", "--feet", feet]
+        done = snakewalk(*words, *out)
+        assert done.returncode == 0, done.stderr
+        facts = json.loads(done.stdout)
+        assert facts["feet"] == feet
+        slip[feet] = facts["slip_stance_most_m"]
+    assert slip["footfall"] < 1e-6
+    assert slip["gc-printed"] > 0.1
+    for wrong, message in (
+        (["--animal", "goat", "--feet", "round"], "choose footfall or gc-printed"),
+        (["--feet", "footfall"], "add --animal"),
+    ):
+        done = snakewalk(*words, "-o", str(tmp_path / "x"), *wrong)
+        assert done.returncode == 2
+        assert message in done.stderr

@@ -27,19 +27,55 @@ def moved(name: str) -> AnimalMotion:
 
 
 @pytest.mark.parametrize("name", ANIMALS)
-def test_legs_of_the_mesh_end_at_the_feet(name: str) -> None:
+def test_bones_of_the_legs_lie_between_their_joints(name: str) -> None:
     animal, motion = read_animal(name), moved(name)
     rig, bones = AnimalBody.of(animal).rig, animal_bones(animal, motion)
     assert len(rig.rest_m) == bones.front_m.shape[1] == len(bones.bone_m) == len(rig.parent)
-    for frame in (0, 3):
-        corners = posed_m(rig, bones, frame)
-        for k in range(4):
-            thick = animal.length_m * animal.leg_pairs[k // 2].thick
-            lower = (rig.held.bones[:, 1] == SEGMENTS + 2 * k + 1) & (rig.held.shares[:, 1] == 1.0)
-            far = np.linalg.norm(corners[lower] - motion.end_m[frame, k], axis=-1)
-            assert far.min() == pytest.approx(0.55 * thick, rel=1e-6)  # the round end's radius
+    first = SEGMENTS
+    for k, joints in enumerate(motion.joints_m):
+        parts = len(animal.leg_pairs[k // 2].segments)
+        own = slice(first, first + parts)
+        ends = bones.front_m[:, own] - bones.bone_m[own, None] * bones.rotation[:, own, :, 0]
+        np.testing.assert_allclose(bones.front_m[:, own], joints[:, :-1], atol=1e-12)
+        np.testing.assert_allclose(ends, joints[:, 1:], atol=1e-9)
+        first += parts
     turned = np.einsum("tkji,tkjl->tkil", bones.rotation, bones.rotation)
     np.testing.assert_allclose(turned, np.broadcast_to(np.eye(3), turned.shape), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ANIMALS)
+def test_hooves_and_toes_lie_on_the_ground_and_not_in_it(name: str) -> None:
+    """Of a foot that stands: the lowest corner is within 1 % of a leg's length of the ground."""
+    animal = read_animal(name)
+    line = SplinePath(np.array([[0.0, 0.0], [3.0, 0.0], [6.0, 0.0]]))
+    motion = transformed(
+        prototype(animal, np.linspace(1, 2, 9) * animal.cycle_s), animal, line, None
+    )
+    rig, bones = AnimalBody.of(animal).rig, animal_bones(animal, motion)
+    leg_m = animal.length_m * sum(animal.leg_pairs[1].segments)
+    first, standing = SEGMENTS, 0
+    for k in range(4):
+        first += len(animal.leg_pairs[k // 2].segments)
+        foot = (rig.held.bones[:, 1] == first - 1) & (rig.held.shares[:, 1] > 0.99)
+        for frame in range(len(motion.time_s)):
+            lowest = posed_m(rig, bones, frame)[foot, 2].min()
+            assert lowest > -0.01 * leg_m
+            if motion.on_ground[frame, k]:
+                assert lowest < 0.01 * leg_m
+                standing += 1
+    assert standing > 18
+
+
+@pytest.mark.parametrize("name", ANIMALS)
+def test_the_skin_of_a_leg_is_one_piece(name: str) -> None:
+    """Corners at a joint belong to both bones, and the shares of a corner sum to 1."""
+    rig = AnimalBody.of(read_animal(name)).rig
+    np.testing.assert_allclose(rig.held.shares.sum(axis=1), 1.0)
+    assert rig.held.shares.min() >= 0.0
+    pair = read_animal(name).leg_pairs[0]
+    for joint in range(1, len(pair.segments)):
+        before = (rig.held.bones[:, 1] == SEGMENTS + joint) & (rig.held.shares[:, 0] > 0.4)
+        assert before.sum() >= 8  # at least half a ring
 
 
 def test_a_goat_has_the_papers_eleven_parts() -> None:

@@ -7,7 +7,6 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.animals.legged.animal_synthesis import ANIMALS, read_animal
-from snakewalk.controller.animals.legged.leg import knees_m
 from snakewalk.controller.animals.legged.motion_transformation import (
     PathNormals,
     local_planes,
@@ -110,24 +109,3 @@ def test_a_plane_is_found_exactly() -> None:
     middle, level, normal = local_planes(plan, height)
     np.testing.assert_allclose(level, (middle * slope).sum(axis=-1) + 0.3)
     np.testing.assert_allclose(-normal[:, :2] / normal[:, 2:], slope, atol=1e-12)
-
-
-def test_a_knee_divides_its_leg_and_points_where_it_should() -> None:
-    rng = np.random.default_rng(7)
-    hip = rng.normal(size=(100, 3))
-    upper, lower = np.full(100, 0.6), np.full(100, 0.5)
-    foot = hip + 0.3 * rng.normal(size=(100, 3))
-    towards = rng.normal(size=(100, 3))
-    knee, end = knees_m(hip, foot, upper, lower, towards)
-    np.testing.assert_allclose(np.linalg.norm(knee - hip, axis=-1), 0.6)
-    np.testing.assert_allclose(np.linalg.norm(knee - end, axis=-1), 0.5)
-    far = np.linalg.norm(foot - hip, axis=-1)
-    reached = (far > 0.1) & (far < 1.1)
-    assert reached.sum() > 80
-    np.testing.assert_allclose(end[reached], foot[reached])
-    way = (foot - hip) / far[:, None]
-    beside = towards - (towards * way).sum(axis=-1, keepdims=True) * way
-    assert ((knee - hip) * beside).sum(axis=-1).min() > -1e-9
-    too_far = hip + np.array([2.0, 0.0, 0.0])
-    _, short = knees_m(hip, too_far, upper, lower, towards)
-    np.testing.assert_allclose(np.linalg.norm(short - hip, axis=-1), 1.1)

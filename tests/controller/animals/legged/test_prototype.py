@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 
 from snakewalk.config.animal import AnimalConfig
 from snakewalk.controller.animals.legged.animal_synthesis import ANIMALS, read_animal
-from snakewalk.controller.animals.legged.prototype import LEGS, SEGMENTS, prototype
+from snakewalk.controller.animals.legged.prototype import (
+    LEGS,
+    SEGMENTS,
+    printed_feet,
+    prototype,
+)
 
 SHIPPED = [read_animal(name) for name in ANIMALS]
 
@@ -112,3 +117,35 @@ def test_any_figures_leave_feet_in_place(
     way = np.linalg.norm(np.diff(made.foot_m, axis=0), axis=-1)
     assert way[stays].max(initial=0.0) < 1e-11
     assert np.isfinite(made.spine_m).all()
+
+
+def test_the_feet_of_gc_as_printed_share_their_height_and_one_goes_forward() -> None:
+    """[GC] Eq. 9-10 with the default fine parameters, against the printed formulas."""
+    goat = read_animal("goat")
+    pair = goat.leg_pairs[0]
+    cycles = np.linspace(0.0, 2.0, 2001)
+    ahead, rise, on = printed_feet(goat, pair, cycles)
+    step_height = 0.5 * goat.length_m * pair.lift  # H, and H_RF: the lowest point is on the ground
+    step_length = goat.stride * goat.length_m / (2.0 * np.pi)  # L
+    omega_t = 2.0 * np.pi * (cycles - pair.right - 0.5 * pair.duty) - 0.5 * np.pi
+    t_y, t_z = np.sin(omega_t), np.cos(omega_t)
+    np.testing.assert_allclose(ahead[:, 1], -t_z * step_length, atol=1e-12)
+    np.testing.assert_allclose(ahead[:, 0], t_z * step_length, atol=1e-12)
+    np.testing.assert_allclose(rise[:, 1], t_y * step_height + step_height, atol=1e-12)
+    np.testing.assert_array_equal(rise[:, 0], rise[:, 1])
+    low = int(np.argmin(rise[:1000, 1]))
+    speed = np.gradient(ahead, cycles, axis=0)[low] / (goat.stride * goat.length_m)
+    np.testing.assert_allclose(speed, [1.0, -1.0], atol=1e-3)  # only the right foot stands still
+    np.testing.assert_array_equal(on[:, 0], on[:, 1])  # both feet, or none, are on the ground
+
+
+def test_printed_feet_slip_and_ours_do_not() -> None:
+    goat = read_animal("goat")
+    times = over(goat)
+    slips = {}
+    for feet in ("footfall", "gc-printed"):
+        made = prototype(goat.model_copy(update={"feet": feet}), times)
+        stays = made.on_ground[1:] & made.on_ground[:-1]
+        slips[feet] = np.abs(np.diff(made.foot_m[..., 0], axis=0))[stays].sum()
+    assert slips["footfall"] < 1e-9
+    assert slips["gc-printed"] > goat.stride * goat.length_m
