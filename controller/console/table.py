@@ -82,7 +82,7 @@ class CsvTable:
             self._path.unlink()
 
     def held(self, place: tuple[str, ...]) -> dict[str, str] | None:
-        """Return the row of a place, empty if rows are not kept; None if there is none yet."""
+        """Return the row of a place, empty if rows are not kept; None if it is missing."""
         return self._held.get(place)
 
     def append(self, row: Mapping[str, object]) -> None:

@@ -88,6 +88,9 @@ TrialsPicture = Annotated[
     Path | None,
     typer.Option(help="draw complete and failed runs with reasons (.png, .svg, .pdf)"),
 ]
+TrialsParquet = Annotated[
+    Path | None, typer.Option(help="write the table --out as Parquet here, in addition")
+]
 TrialsOut = Annotated[
     Path | None,
     typer.Option(
@@ -157,9 +160,7 @@ def trials(
     out: TrialsOut = None,
     dask: Dask = None,
     picture: TrialsPicture = None,
-    parquet: Annotated[
-        Path | None, typer.Option(help="write the table --out as Parquet here, in addition")
-    ] = None,
+    parquet: TrialsParquet = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -168,10 +169,7 @@ def trials(
     Each seed moves the start, so that runs differ even if the motion makes no random choice.
     The same files give the same run. After an update of the program, begin a new --out.
     """
-    check_picture(picture)
-    check_parquet(parquet)
-    if parquet is not None and out is None:
-        raise InputError(f"--parquet {parquet}: is made from the CSV: give --out FILE, too")
+    _check_results(picture, parquet, out)
     require_extra("trials need", "mujoco" if dask is None else "distributed")
     overs = [study.parse_over(text) for text in over or ()]
     _check_keys([key for key, _ in overs])
@@ -197,6 +195,13 @@ def trials(
         _print(rows, [key for key, values in overs if len(values) > 1])
     if all(trial.cause == "refused" for trial in found):
         raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _check_results(picture: Path | None, parquet: Path | None, out: Path | None) -> None:
+    check_picture(picture)
+    check_parquet(parquet)
+    if parquet is not None and out is None:
+        raise InputError(f"--parquet {parquet}: is made from the CSV: give --out FILE, too")
 
 
 def _cases(
