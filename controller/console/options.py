@@ -37,6 +37,7 @@ Assume = Annotated[
     typer.Option(help="KEY=VALUE: a value that the file does not state; may be repeated"),
 ]
 Seed = Annotated[int | None, typer.Option(help="seed of every random choice")]
+Dask = Annotated[str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="first seed; the others follow it")]
 Motion = Annotated[
     str | None,

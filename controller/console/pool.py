@@ -3,9 +3,12 @@
 import os
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import Counter, deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from itertools import islice
 from multiprocessing import active_children, parent_process
 from typing import TypeVar
 
@@ -14,6 +17,12 @@ from snakewalk.controller.console.child_process import SafePool
 
 A = TypeVar("A")
 B = TypeVar("B")
+AHEAD = 4
+"""Items that are submitted for each worker, so that none waits for this process (ours)."""
+LEAST_AHEAD = 16
+"""Items that are submitted to a cluster at least: its workers may still start (ours)."""
+ATTEMPTS = 3
+"""Times that an item may end its worker (ours)."""
 
 
 @contextmanager
@@ -60,17 +69,74 @@ def each(
 ) -> Iterator[tuple[A, B]]:
     """Yield (item, result) as they finish; ``dask`` is the address of a scheduler.
 
+    A few items for each worker are submitted at a time, so memory does not grow with their number.
+    If a worker dies, its items start again.
+
     Raises:
-        InputError: no scheduler answers at that address.
+        InputError: no scheduler answers at that address, or an item ended its worker
+            ``ATTEMPTS`` times.
 
     """
     if dask is not None:
         yield from _on_cluster(work, items, dask)
         return
+    upcoming, suspects = iter(range(len(items))), deque[int]()
+    deaths: Counter[int] = Counter()
+    while True:
+        done = yield from _on_one_pool(work, items, workers, upcoming, suspects, deaths)
+        if done:
+            return
+
+
+def _on_one_pool(
+    work: Callable[[A], B],
+    items: Sequence[A],
+    workers: int,
+    upcoming: Iterator[int],
+    suspects: deque[int],
+    deaths: Counter[int],
+) -> Generator[tuple[A, B], None, bool]:
+    """Yield results until all are done, or a worker dies: then the pool is broken.
+
+    ``suspects`` are the items that ran or waited when a worker died. They run first, one at a time,
+    so that ``deaths`` counts only the item that ends its worker.
+    """
+    waiting: dict[Future[B], int] = {}
     with process_pool(workers) as pool:
-        waiting = {pool.submit(work, item): item for item in items}
-        for done in as_completed(waiting):
-            yield waiting[done], done.result()
+        while True:
+            most, source = (1, suspects) if suspects else (AHEAD * workers, None)
+            while len(waiting) < most:
+                number = suspects.popleft() if source else next(upcoming, None)
+                if number is None:
+                    break
+                waiting[pool.submit(work, items[number])] = number
+            if not waiting:
+                return True
+            alone = len(waiting) == 1
+            finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            broken = False
+            for future in finished:
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    broken = True
+                    continue
+                number = waiting.pop(future)
+                yield items[number], result
+            if broken:
+                suspects.extend(sorted(waiting.values()))
+                if alone:
+                    _count_death(deaths, suspects[-1], items)
+                return False
+
+
+def _count_death(deaths: Counter[int], number: int, items: Sequence[A]) -> None:
+    deaths[number] += 1
+    if deaths[number] >= ATTEMPTS:
+        raise InputError(
+            f"{items[number]}: a worker process ended {ATTEMPTS} times while it ran this item; "
+            "look for a lack of memory, then repeat the command: finished items are kept"
+        )
 
 
 def _on_cluster(work: Callable[[A], B], items: Sequence[A], address: str) -> Iterator[tuple[A, B]]:
@@ -81,7 +147,28 @@ def _on_cluster(work: Callable[[A], B], items: Sequence[A], address: str) -> Ite
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(f"--dask {address}: no scheduler answers there ({error})") from None
     with client:
-        futures = client.map(work, items, pure=False)
-        waiting = {future.key: item for future, item in zip(futures, items, strict=True)}
-        for future in distributed.as_completed(futures):
-            yield waiting[future.key], future.result()
+        upcoming, waiting = iter(range(len(items))), dict[str, int]()
+        finished = distributed.as_completed()
+
+        def submit(number: int) -> None:
+            future = client.submit(work, items[number], pure=False)
+            waiting[future.key] = number
+            finished.add(future)
+
+        deaths: Counter[int] = Counter()
+        while True:
+            ahead = max(LEAST_AHEAD, AHEAD * sum(client.nthreads().values()))
+            for number in islice(upcoming, ahead - len(waiting)):
+                submit(number)
+            if not waiting:
+                return
+            for _ in range(min(len(waiting), LEAST_AHEAD)):
+                future = next(finished)
+                number = waiting.pop(future.key)
+                try:
+                    result = future.result()
+                except distributed.KilledWorker:
+                    _count_death(deaths, number, items)
+                    submit(number)
+                    continue
+                yield items[number], result

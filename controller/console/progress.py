@@ -16,7 +16,7 @@ from rich.progress import (
 
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.runtime.drive import Progress as RunProgress
-from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.clock import Clock, WallClock
 
 T = TypeVar("T")
 EVERY = 10
@@ -175,9 +175,20 @@ def in_real_time(on_progress: Callable[[RunProgress], None]) -> Callable[[RunPro
 
 
 def show_progress(
-    items: Iterable[T], description: str, total: int, *, done: int = 0, transient: bool = True
+    items: Iterable[T],
+    description: str,
+    total: int,
+    *,
+    done: int = 0,
+    transient: bool = True,
+    clock: Clock | None = None,
 ) -> Iterator[T]:
-    """Yield items under a bar that counts them; ``done`` of ``total`` were done before."""
+    """Yield items under a bar that counts them; ``done`` of ``total`` were done before.
+
+    The bar estimates the remaining time from the items that were finished under it.
+    """
+    clock = clock or WallClock()
+    start_s = clock.now_s()
     with ProgressBar(description, total, transient=transient) as bar:
         bar.update(done)
         for number, item in enumerate(items, start=done + 1):
@@ -186,4 +197,21 @@ def show_progress(
             except GeneratorExit:  # the caller failed, and reports it
                 bar.hide()
                 raise
-            bar.update(number)
+            rate_hz = (number - done) / max(clock.now_s() - start_s, 1e-9)
+            bar.update(number, note=remaining_note((total - number) / rate_hz))
+
+
+def remaining_note(seconds: float) -> str:
+    """Return an estimate of a remaining time as text, in two units at most; empty of none."""
+    minutes = round(seconds / 60.0)
+    if seconds < 1.0:
+        return ""
+    if seconds < 90.0:
+        return f"about {seconds:.0f} s remain"
+    if minutes < 90:
+        return f"about {minutes} min remain"
+    hours, minutes = divmod(minutes, 60)
+    if hours < 48:
+        return f"about {hours} h {minutes} min remain"
+    days, hours = divmod(hours, 24)
+    return f"about {days} d {hours} h remain"

@@ -3,17 +3,19 @@
 import csv
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Final, Self
 
 from snakewalk.config.archive import read_text
 from snakewalk.config.errors import InputError
 
+_NO_ROW: Final[dict[str, str]] = {}
 
-def read_csv_table(path: Path, columns: Sequence[str], command: str) -> list[dict[str, str]]:
-    """Read the whole rows of a table that ``command`` wrote; a torn last line is dropped.
+
+def read_csv_table(path: Path, columns: Sequence[str], command: str) -> Iterator[dict[str, str]]:
+    """Yield the whole rows of a table that ``command`` wrote; a torn last line is dropped.
 
     Raises:
         InputError: the file is something else.
@@ -29,26 +31,33 @@ def read_csv_table(path: Path, columns: Sequence[str], command: str) -> list[dic
         raise InputError(
             f"{path}: is not a table of `snakewalk {command}` of this version; choose another file"
         )
-    return list(rows)
+    return iter(rows)
 
 
 class CsvTable:
     """Appends rows; knows those that are there already by the columns of ``place``."""
 
     def __init__(
-        self, path: Path, *, columns: Sequence[str], place: Sequence[str], command: str
+        self,
+        path: Path,
+        *,
+        columns: Sequence[str],
+        place: Sequence[str],
+        command: str,
+        keeps_rows: bool = True,
     ) -> None:
-        """Open or make the table.
+        """Open or make the table; without ``keeps_rows`` only the places stay in memory.
 
         Raises:
             InputError: the file is something else.
 
         """
         self._path, self._columns, self._place = path, tuple(columns), tuple(place)
-        rows: list[dict[str, str]] = []
+        self._keeps_rows = keeps_rows
+        self._held: dict[tuple[str, ...], dict[str, str]] = {}
         if path.exists() and path.stat().st_size:
-            rows = read_csv_table(path, columns, command)
-        self._held = {tuple(row[key] for key in self._place): row for row in rows}
+            for row in read_csv_table(path, columns, command):
+                self._hold(row)
 
     def __enter__(self) -> Self:
         """Cut off a torn last line and open for appending."""
@@ -73,7 +82,7 @@ class CsvTable:
             self._path.unlink()
 
     def held(self, place: tuple[str, ...]) -> dict[str, str] | None:
-        """Return the row of a place; None if the table does not hold it yet."""
+        """Return the row of a place, empty if rows are not kept; None if it is missing."""
         return self._held.get(place)
 
     def append(self, row: Mapping[str, object]) -> None:
@@ -84,4 +93,7 @@ class CsvTable:
         self._writer.writerow(text)
         self._file.flush()
         os.fsync(self._file.fileno())
-        self._held[tuple(text[key] for key in self._place)] = text
+        self._hold(text)
+
+    def _hold(self, row: dict[str, str]) -> None:
+        self._held[tuple(row[key] for key in self._place)] = row if self._keeps_rows else _NO_ROW

@@ -1,6 +1,6 @@
 """Points of a sweep: a Sobol sequence over the parameters of gaits, as far as robots allow them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from snakewalk.controller.run.factory import gait_keys
 from snakewalk.controller.run.run_keys import with_keys_of
 
 SLOWEST_HZ = 0.2
+_BLOCK = 10
+"""Points that are drawn at a time, as a power of two."""
 _TRIES = 64
 """Most draws for each point: a robot may refuse most of a range."""
 
@@ -105,8 +107,7 @@ def points_of(
     sobol = qmc.Sobol(
         len(space.spans), rng=np.random.default_rng([seed, crc32(gait.name.encode())])
     )
-    draws = sobol.random_base2(int(np.ceil(np.log2(count * _TRIES))))
-    for unit in draws:
+    for unit in _draws(sobol, int(np.ceil(np.log2(count * _TRIES)))):
         if len(found) >= count:
             break
         values = space.values(unit)
@@ -118,6 +119,13 @@ def points_of(
         number = len(found)
         found.append(Point(*place, number, seed, seconds, values, replaced))
     return found, refused
+
+
+def _draws(sobol: qmc.Sobol, exponent: int) -> Iterator[Floats]:
+    """Yield 2^exponent points (d,) of the sequence, drawn a block at a time."""
+    block = min(exponent, _BLOCK)
+    for _ in range(1 << exponent - block):
+        yield from sobol.random(1 << block)
 
 
 def robot_file(name_or_path: str) -> str | None:

@@ -5,9 +5,11 @@ gait and robot, with the defaults and the best point of each kind.
 """
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from snakewalk.controller.console.parquet import Kind
 from snakewalk.controller.console.table import CsvTable, read_csv_table
 from snakewalk.controller.gaits.gait import Aim
 from snakewalk.controller.gaits.registry import GAITS
@@ -19,6 +21,26 @@ _MEASURED = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
 COLUMNS = (*_PLACE, *_MEASURED, *_PARAMETERS)
 """Empty where a gait has no such parameter, or nothing could be measured."""
+_TEXT = ("gait", "robot", "world", "keys", "ended", "pose_evidence", "pose_source")
+_INTEGER = ("number", "seed", "cycles")
+_TRUTH = tuple(
+    key
+    for gait in GAITS.values()
+    for key, field in gait.model.model_fields.items()
+    if field.annotation is bool
+)
+
+
+def _kind(column: str) -> Kind:
+    if column in _TEXT:
+        return "text"
+    if column in _INTEGER:
+        return "integer"
+    return "truth" if column in _TRUTH else "number"
+
+
+KINDS: dict[str, Kind] = {column: _kind(column) for column in COLUMNS}
+"""Kind of each column in a Parquet file."""
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
@@ -28,6 +50,11 @@ def read_table(path: Path) -> list[dict[str, str]]:
         InputError: no table of a sweep.
 
     """
+    return list(table_rows(path))
+
+
+def table_rows(path: Path) -> Iterator[dict[str, str]]:
+    """Yield the whole rows of a table one by one; otherwise as ``read_table``."""
     return read_csv_table(path, COLUMNS, "sweep")
 
 
@@ -41,7 +68,7 @@ class SweepTable(CsvTable):
             InputError: the file is something else.
 
         """
-        super().__init__(path, columns=COLUMNS, place=_PLACE, command="sweep")
+        super().__init__(path, columns=COLUMNS, place=_PLACE, command="sweep", keeps_rows=False)
 
     def missing(self, points: list[Point]) -> list[Point]:
         """The entries of ``points`` that the table lacks."""
@@ -89,34 +116,55 @@ class GaitDigest:
     default_slip: float | None
 
 
-def digest(rows: list[dict[str, str]]) -> list[GaitDigest]:
+class _Running:
+    """Numbers of a gait, robot and set of replaced values, from rows that are seen once."""
+
+    def __init__(self) -> None:
+        self.points = self.ran = 0
+        self.first: dict[str, str] | None = None
+        self.most_bl = self.most_pace = self.least_cost = math.nan
+        self.torque_n_m = self.celsius = math.nan
+
+    def add(self, row: dict[str, str]) -> None:
+        """Count a row."""
+        self.points += 1
+        if not row["cycles"] or row["ended"] != "ran to its end":
+            return
+        self.ran += 1
+        if self.first is None and row["number"] == "0":
+            self.first = row
+        self.most_bl = _most([self.most_bl, distance_bl(row)])
+        self.most_pace = _most([self.most_pace, pace(row)])
+        self.least_cost = -_most([-self.least_cost, -number(row, "cost_of_transport")])
+        self.torque_n_m = _most([self.torque_n_m, abs(number(row, "peak_torque_n_m"))])
+        self.celsius = _most([self.celsius, abs(number(row, "peak_temperature_c"))])
+
+
+def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
     """Return one row a gait, robot and set of replaced values, as they appear."""
-    found: list[GaitDigest] = []
-    cases = [(row["gait"], row["robot"], row["keys"]) for row in rows]
-    for gait, robot, keys in dict.fromkeys(cases):
-        some = [row for row, case in zip(rows, cases, strict=True) if case == (gait, robot, keys)]
-        ran = [row for row in some if row["cycles"] and row["ended"] == "ran to its end"]
-        first = next((row for row in ran if row["number"] == "0"), None)
-        found.append(
-            GaitDigest(
-                gait=gait,
-                robot=robot,
-                keys=keys,
-                points=len(some),
-                tripped=len(some) - len(ran),
-                default_bl_cycle=_round(math.nan if first is None else distance_bl(first), 3),
-                most_bl_cycle=_round(_most([distance_bl(row) for row in ran]), 3),
-                default_pace=_round(math.nan if first is None else pace(first), 3),
-                most_pace=_round(_most([pace(row) for row in ran]), 3),
-                pace=UNITS[GAITS[gait].aim],
-                default_cost=_round(_of(first, "cost_of_transport"), 2),
-                least_cost=_round(-_most([-number(r, "cost_of_transport") for r in ran]), 2),
-                peak_torque_n_m=_round(_peak(ran, "peak_torque_n_m"), 2),
-                peak_c=_round(_peak(ran, "peak_temperature_c"), 1),
-                default_slip=_round(_of(first, "slip"), 2),
-            )
+    found: dict[tuple[str, str, str], _Running] = {}
+    for row in rows:
+        found.setdefault((row["gait"], row["robot"], row["keys"]), _Running()).add(row)
+    return [
+        GaitDigest(
+            gait=gait,
+            robot=robot,
+            keys=keys,
+            points=some.points,
+            tripped=some.points - some.ran,
+            default_bl_cycle=_round(math.nan if some.first is None else distance_bl(some.first), 3),
+            most_bl_cycle=_round(some.most_bl, 3),
+            default_pace=_round(math.nan if some.first is None else pace(some.first), 3),
+            most_pace=_round(some.most_pace, 3),
+            pace=UNITS[GAITS[gait].aim],
+            default_cost=_round(_of(some.first, "cost_of_transport"), 2),
+            least_cost=_round(some.least_cost, 2),
+            peak_torque_n_m=_round(some.torque_n_m, 2),
+            peak_c=_round(some.celsius, 1),
+            default_slip=_round(_of(some.first, "slip"), 2),
         )
-    return found
+        for (gait, robot, keys), some in found.items()
+    ]
 
 
 def pace(row: dict[str, str]) -> float:
@@ -134,10 +182,6 @@ def distance_bl(row: dict[str, str]) -> float:
 
 def _of(row: dict[str, str] | None, key: str) -> float:
     return math.nan if row is None else number(row, key)
-
-
-def _peak(rows: list[dict[str, str]], key: str) -> float:
-    return _most([abs(number(row, key)) for row in rows])
 
 
 def _most(values: list[float]) -> float:

@@ -274,12 +274,16 @@ def trials(
     planned: Sequence[tuple[Case, int]],
     workers: int,
     *,
+    dask: str | None = None,
     spread_m: float,
     changes: Mapping[str, object],
 ) -> Iterator[Trial]:
-    """Yield the planned trials as they finish; ``changes`` replace fields of the runs."""
+    """Yield the planned trials as they finish; ``changes`` replace fields of the runs.
+
+    ``dask`` is the address of a scheduler, whose workers simulate instead of ``workers`` processes.
+    """
     work = partial(_run_seed, spread_m=spread_m, changes=changes)
-    for _, trial in each(work, planned, workers=workers):
+    for _, trial in each(work, planned, workers=workers, dask=dask):
         yield trial
 
 

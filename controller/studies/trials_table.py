@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import get_type_hints
 
 from pydantic import TypeAdapter
 
+from snakewalk.controller.console.parquet import Kind
 from snakewalk.controller.console.table import CsvTable
 from snakewalk.controller.studies.trials import Case, Trial
 
@@ -14,6 +16,13 @@ _MEASURED = tuple(f.name for f in fields(Trial) if f.name not in {"case", "seed"
 _PLACE = ("config", "start_spread_m", "seed")
 COLUMNS = (*_CASE, *_PLACE, *_MEASURED)
 """``config`` is the digest of the three files; ``keys`` are written as ``KEY=VALUE KEY=VALUE``."""
+
+_NUMBERS = get_type_hints(Trial)
+_BY_TYPE: dict[object, Kind] = {bool: "truth", int: "integer", float: "number"}
+KINDS: dict[str, Kind] = {
+    column: _BY_TYPE.get(_NUMBERS.get(column), "text") for column in COLUMNS
+} | {"relief": "number", "start_spread_m": "number", "seed": "integer"}
+"""Kind of each column in a Parquet file."""
 
 
 class TrialsTable(CsvTable):

@@ -13,15 +13,16 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, Set, console, key_values
+from snakewalk.controller.console.options import Dask, Force, Json, Set, console, key_values
+from snakewalk.controller.console.parquet import check_parquet, write_parquet
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.sweep_measure import measure
 from snakewalk.controller.studies.sweep_points import plan_sweep
+from snakewalk.controller.studies.sweep_table import KINDS, digest, read_table, table_rows
 from snakewalk.controller.studies.sweep_table import SweepTable as Sweep
-from snakewalk.controller.studies.sweep_table import digest, read_table
 
 _HEADS = {
     "points": "n",
@@ -43,9 +44,9 @@ _HEADS = {
     group=MOTION,
     examples=(
         "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
-        "sweep --dask tcp://cluster:8786 --points 500",
+        "sweep --dask tcp://cluster:8786 --points 5000 --parquet sweep.parquet",
     ),
-    results=("picture",),
+    results=("picture", "parquet"),
     tables=("out",),
 )
 def sweep(
@@ -71,9 +72,7 @@ def sweep(
     ] = 12.0,
     seed: Annotated[int, typer.Option(min=0, help="seed of the choice of points")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
-    dask: Annotated[
-        str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")
-    ] = None,
+    dask: Dask = None,
     out: Annotated[
         Path,
         typer.Option("--out", "-o", help="write the table here; runs that it contains are skipped"),
@@ -81,11 +80,15 @@ def sweep(
     picture: Annotated[
         Path | None, typer.Option(help="draw the table here (.png, .svg, .pdf)")
     ] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(help="write the table as Parquet here, in addition")
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Measure gaits over their parameters: speed, cost of transport, torque, heat, slip."""
     check_picture(picture)
+    check_parquet(parquet)
     keys = key_values("--set", set_)
 
     require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
@@ -109,10 +112,11 @@ def sweep(
                 refused[row.ended] += 1
     for why, times in refused.items():
         LOGGER.warning("%d of %d points %s", times, len(missing), why)
-    held = read_table(out) if out.exists() else []
-    rows = [asdict(one) for one in digest(held)]
+    rows = [asdict(one) for one in digest(table_rows(out))] if out.exists() else []
     if picture is not None:
-        pictures().draw_sweep(held, picture)
+        pictures().draw_sweep(read_table(out) if out.exists() else [], picture)
+    if parquet is not None and out.exists():
+        write_parquet(out, parquet, KINDS)
     if as_json:
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
         print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from rich.table import Table
@@ -18,18 +18,20 @@ from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
+    Dask,
     FirstSeed,
     Force,
     Json,
     TrackFile,
     console,
 )
+from snakewalk.controller.console.parquet import check_parquet, write_parquet
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.run.factory import moves_by_gait
 from snakewalk.controller.studies import trials as study
 from snakewalk.controller.studies.commands.pictures import pictures
-from snakewalk.controller.studies.trials_table import TrialsTable
+from snakewalk.controller.studies.trials_table import KINDS, TrialsTable
 
 _HEADS = {
     "run": "run",
@@ -86,6 +88,9 @@ TrialsPicture = Annotated[
     Path | None,
     typer.Option(help="draw complete and failed runs with reasons (.png, .svg, .pdf)"),
 ]
+TrialsParquet = Annotated[
+    Path | None, typer.Option(help="write the table --out as Parquet here, in addition")
+]
 TrialsOut = Annotated[
     Path | None,
     typer.Option(
@@ -94,11 +99,18 @@ TrialsOut = Annotated[
 ]
 
 
+class _Where(NamedTuple):
+    """Where the runs are simulated: processes, or a Dask cluster by its address."""
+
+    workers: int
+    dask: str | None
+
+
 @command(
     "trials",
     group=JOB,
     examples=("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
-    results=("picture",),
+    results=("picture", "parquet"),
     tables=("out",),
 )
 def trials(
@@ -110,7 +122,7 @@ def trials(
             autocompletion=completion.RUNS_OR_GAITS,
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per row")] = 20,
+    seeds: Annotated[int, typer.Option(min=1, max=100_000, help="number of runs per row")] = 20,
     first_seed: FirstSeed = 0,
     start_spread: StartSpread = 0.04,
     motion: Annotated[
@@ -146,7 +158,9 @@ def trials(
     track: TrackFile = None,
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     out: TrialsOut = None,
+    dask: Dask = None,
     picture: TrialsPicture = None,
+    parquet: TrialsParquet = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -155,8 +169,8 @@ def trials(
     Each seed moves the start, so that runs differ even if the motion makes no random choice.
     The same files give the same run. After an update of the program, begin a new --out.
     """
-    check_picture(picture)
-    require_extra("trials need", "mujoco")
+    _check_results(picture, parquet, out)
+    require_extra("trials need", "mujoco" if dask is None else "distributed")
     overs = [study.parse_over(text) for text in over or ()]
     _check_keys([key for key, _ in overs])
     cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, overs)
@@ -167,7 +181,9 @@ def trials(
     changes = {"track": track, "seconds": seconds}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
-    found = _run(planned, cases, changes, start_spread, workers, out)
+    found = _run(planned, cases, changes, start_spread, _Where(workers, dask), out)
+    if parquet is not None and out is not None:
+        write_parquet(out, parquet, KINDS)
     summaries = study.table(found, cases)
     if picture is not None:
         pictures().draw_trials(summaries, picture)
@@ -179,6 +195,13 @@ def trials(
         _print(rows, [key for key, values in overs if len(values) > 1])
     if all(trial.cause == "refused" for trial in found):
         raise InputError(f"no run was possible: {study.reasons(found)}")
+
+
+def _check_results(picture: Path | None, parquet: Path | None, out: Path | None) -> None:
+    check_picture(picture)
+    check_parquet(parquet)
+    if parquet is not None and out is None:
+        raise InputError(f"--parquet {parquet}: is made from the CSV: give --out FILE, too")
 
 
 def _cases(
@@ -220,7 +243,7 @@ def _run(
     cases: list[study.Case],
     changes: dict[str, Any],
     start_spread: float,
-    workers: int,
+    where: _Where,
     out: Path | None,
 ) -> list[study.Trial]:
     """Run the trials that the table ``out`` does not hold, and return all."""
@@ -232,7 +255,9 @@ def _run(
     done = {(trial.case, trial.seed) for trial in found}
     missing = [item for item in planned if item not in done]
     with table or nullcontext():
-        some = study.trials(missing, workers, spread_m=start_spread, changes=changes)
+        some = study.trials(
+            *(missing, where.workers), dask=where.dask, spread_m=start_spread, changes=changes
+        )
         for trial in show_progress(
             some, str(out or "trials"), len(planned), done=len(found), transient=False
         ):

@@ -5,18 +5,21 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.console.pool import each, process_pool
+from snakewalk.controller.console.pool import AHEAD, each, process_pool
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.studies.sweep_points import points_of
 from snakewalk.controller.studies.trials import Case, trials
+from tests.helpers.dying_workers import square
 
 distributed = pytest.importorskip("distributed")
 
@@ -27,6 +30,51 @@ def test_a_cluster_by_its_address_gives_what_processes_give() -> None:
     ) as cluster:
         far = dict(each(math.factorial, range(7), workers=1, dask=cluster.scheduler_address))
     assert far == {n: math.factorial(n) for n in range(7)}
+
+
+def dying(folder: Path, *deaths: int) -> list[tuple[str, int, int]]:
+    return [(str(folder), number, many) for number, many in enumerate(deaths)]
+
+
+def test_a_worker_that_is_killed_loses_no_item(tmp_path: Path) -> None:
+    items = dying(tmp_path, 0, 0, 0, 1, 0, 0, 0, 0, 0, 2, *[0] * 10)
+    found = list(each(square, items, workers=2))
+    assert sorted(result for _, result in found) == [n**2 for n in range(20)]
+    assert {item: item[1] ** 2 for item in items} == dict(found)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_an_item_that_always_ends_its_worker_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="ended 3 times while it ran this item"):
+        list(each(square, dying(tmp_path, 0, 9), workers=1))
+    assert len(list(tmp_path.iterdir())) in {3, 4}  # maybe once beside the other, then alone
+
+
+def test_a_cluster_whose_worker_is_killed_loses_no_item(tmp_path: Path) -> None:
+    items = dying(tmp_path, 0, 0, 1, *[0] * 17)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        found = list(each(square, items, workers=1, dask=cluster.scheduler_address))
+    assert {item: item[1] ** 2 for item in items} == dict(found)
+    assert len(found) == len(items)
+
+
+def test_few_items_are_under_way_at_a_time() -> None:
+    class Items(Sequence[Any]):
+        taken = 0
+
+        def __len__(self) -> int:
+            return 40
+
+        def __getitem__(self, number: Any) -> Any:
+            Items.taken += 1
+            return number
+
+    most = 0
+    for done, _ in enumerate(each(math.factorial, Items(), workers=1)):
+        most = max(most, Items.taken - 2 * done)  # each is looked at again when it is yielded
+    assert most <= AHEAD + 2
 
 
 def test_points_travel_to_other_processes() -> None:

@@ -4,7 +4,13 @@ from contextlib import suppress
 
 import pytest
 
-from snakewalk.controller.console.progress import PathBar, ProgressBar, TimeBar, show_progress
+from snakewalk.controller.console.progress import (
+    PathBar,
+    ProgressBar,
+    TimeBar,
+    remaining_note,
+    show_progress,
+)
 from snakewalk.controller.runtime.drive import Progress
 
 
@@ -62,3 +68,41 @@ def test_a_caller_that_rejects_an_item_leaves_no_line(capsys: pytest.CaptureFixt
             if number == 2:
                 raise ValueError("no such recording")
     assert capsys.readouterr().err == ""
+
+
+class SteppedClock:
+    """A minute passes each time that somebody looks."""
+
+    def __init__(self) -> None:
+        self.time_s = 0.0
+
+    def now_s(self) -> float:
+        self.time_s += 60.0
+        return self.time_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        self.time_s = time_s
+
+
+def test_the_remaining_time_counts_only_what_was_done_now(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shown = show_progress(
+        iter("ab"), "trials", 100_000, done=50_000, transient=False, clock=SteppedClock()
+    )
+    assert list(shown) == ["a", "b"]
+    assert "about 34 d 17 h remain" in capsys.readouterr().err.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, ""),
+        (89.0, "about 89 s remain"),
+        (90.0, "about 2 min remain"),
+        (5400.0, "about 1 h 30 min remain"),
+        (2.0 * 86_400.0, "about 2 d 0 h remain"),
+    ],
+)
+def test_a_remaining_time_has_two_units_at_most(seconds: float, text: str) -> None:
+    assert remaining_note(seconds) == text

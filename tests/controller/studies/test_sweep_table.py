@@ -10,10 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.parquet import write_parquet
 from snakewalk.controller.studies.plots.sweep import draw_sweep
 from snakewalk.controller.studies.sweep_measure import Measurement
 from snakewalk.controller.studies.sweep_points import Point
-from snakewalk.controller.studies.sweep_table import COLUMNS, SweepTable, digest, read_table
+from snakewalk.controller.studies.sweep_table import (
+    COLUMNS,
+    KINDS,
+    SweepTable,
+    digest,
+    read_table,
+)
 
 pytestmark = pytest.mark.usefixtures("legible_figures")
 
@@ -107,3 +114,32 @@ def test_digest_takes_the_defaults_and_the_best(tmp_path: Path) -> None:
     assert one.points == 7
     assert one.tripped == 1
     assert one.most_bl_cycle == pytest.approx(1.044, abs=1e-3)  # hypot(0.3, left 1.0)
+
+
+def test_a_table_becomes_parquet_with_types(tmp_path: Path, monkeypatch: Any) -> None:
+    """In blocks: a table of 100,000 rows is never in memory as a whole."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    monkeypatch.setattr("snakewalk.controller.console.parquet.BLOCK_BYTES", 2000)
+    path, out = tmp_path / "sweep.csv", tmp_path / "sweep.parquet"
+    with SweepTable(path) as table:
+        for k in range(30):
+            point = replace(POINTS[k % 6], number=k)
+            table.add(point, row(0.1 * k) if k != 3 else Measurement("refused: no, never"))
+    assert write_parquet(path, out, KINDS) == 30
+    found = parquet.read_table(out)
+    assert parquet.ParquetFile(out).num_row_groups > 1
+    assert tuple(found.column_names) == COLUMNS
+    rows = found.to_pylist()
+    assert [one["number"] for one in rows] == list(range(30))
+    assert [one["waves"] for one in rows[:6]] == pytest.approx([1.0 + 0.1 * k for k in range(6)])
+    assert (rows[0]["mirror"], rows[0]["cycles"]) == (False, 5)
+    assert (rows[3]["ended"], rows[3]["cycles"]) == ("refused: no, never", None)
+
+
+def test_a_table_of_finished_points_keeps_no_rows(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.csv"
+    with SweepTable(path) as table:
+        table.add(POINTS[0], row(0.1))
+    again = SweepTable(path)
+    assert again.missing(POINTS) == POINTS[1:]
+    assert again.held(POINTS[0].key) == {}

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.parquet import write_parquet
 from snakewalk.controller.studies import trials as study
 from snakewalk.controller.studies.commands.trials import trials as command
 from snakewalk.controller.studies.trials import Case, Trial, plan_trials, prepare_case, wilson
-from snakewalk.controller.studies.trials_table import TrialsTable
+from snakewalk.controller.studies.trials_table import KINDS, TrialsTable
 from tests.helpers.in_process import work_in_this_process
 
 FLAT, HILLS = Case("flat-square", "serpenoid"), Case("jacksboro-traverse", "walk")
@@ -279,3 +280,19 @@ def test_a_kept_table_is_not_run_again(
     monkeypatch.setattr(study, "trials", ran)
     command([str(run)], seeds=1, over=over, **options)
     assert json.loads(capsys.readouterr().out)["table"] == rows
+
+
+def test_trials_become_parquet(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    path, out = tmp_path / "trials.csv", tmp_path / "trials.parquet"
+    with TrialsTable(path, {FLAT: "digest"}, 0.04) as table:
+        table.add(Trial(FLAT, 4, (0.5, -1.0), 3, complete=True, reached=3, duration_s=12.5))
+        table.add(Trial(FLAT, 5, cause="error", why="ValueError: a, b"))
+    assert write_parquet(path, out, KINDS) == 2
+    first, second = parquet.read_table(out).to_pylist()
+    assert (first["seed"], first["complete"], first["duration_s"]) == (4, True, 12.5)
+    assert first["start_m"] == "0.5 -1.0"
+    assert (second["why"], second["complete"], second["relief"]) == ("ValueError: a, b", False, 1.0)
+    assert math.isnan(second["duration_s"])
+    with pytest.raises(InputError, match="give --out FILE, too"):
+        command(["flat-square"], parquet=out)
