@@ -115,7 +115,7 @@ class BodyContrast:
         return StandingOut(share.astype(np.float32), self.origin_px, self.to_px, self.is_compressed)
 
     def hard_shadow(self, links_m: Floats, shade: float) -> float:
-        """Return the area of dark colourless pixels beside a body with its links (L, 2) there.
+        """Return the area of dark colourless pixels next to a body with its links (L, 2) there.
 
         They are darker than a shadow that removes ``shade`` of the light. The unit is the area of
         the body.

@@ -17,8 +17,8 @@ _ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is measur
 _DARKEST: Final = np.uint8(8)  # grey levels: a ratio to less than this says nothing
 _GLARE: Final = 0.3  # by how much light may grow beyond that of the surroundings: soft edges (ours)
 _COARSE: Final = 4  # pixels of a frame a pixel of its wide light
-_COLUMNS: Final = 4  # every so many columns count for the light of a row
-_ROWS: Final = 4  # over so many rows a band's edge is measured
+_COLUMNS: Final = 4  # step between the columns that give the light of a row
+_ROWS: Final = 4  # distance of the rows between which an edge of a band is measured
 _BANDS: Final = 0.06  # change of the light there that is a band's edge (ours)
 
 

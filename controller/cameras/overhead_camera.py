@@ -35,7 +35,7 @@ from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_SHADOW, _LARGE_SHADOW = 0.02, 0.05  # of the body's area: dark and colourless beside it (ours)
+_SHADOW, _LARGE_SHADOW = 0.02, 0.05  # of the body's area: dark and colourless next to it (ours)
 _SURROUNDINGS = 0.25  # of the picture's width: the square in which the body is a small part
 _MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
 _HALF = 2  # the floor is matched on a picture smaller by this factor
@@ -369,7 +369,7 @@ class OverheadDetector:
         found = track_pose(robot, contrast.standing_out(self.shade), prior, time_s)
         shadow = contrast.hard_shadow(links_at(prior, found), self.shade)
         if shadow > _SHADOW:
-            found = _beside_shadow(robot, contrast, prior, found, shadow)
+            found = _next_to_shadow(robot, contrast, prior, found, shadow)
         if self.bump is not None and not self.bump.undone:
             return replace(found, fault=str(self.bump), bump=self.bump)
         px = self.model.in_image(prior.links_m, self.axis_height_m)
@@ -416,10 +416,10 @@ class OverheadDetector:
         return np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
 
 
-def _beside_shadow(
+def _next_to_shadow(
     robot: RobotConfig, contrast: BodyContrast, prior: BodyPrior, found: TrackedPose, shadow: float
 ) -> TrackedPose:
-    """Find a body beside a hard shadow by its colour.
+    """Find a body next to a hard shadow by its colour.
 
     If the body has no colour, the shadow may be the body, so its place is rejected.
     """

@@ -177,7 +177,7 @@ class _Look:
     sections: NDArray[np.bool_]
     """(S,) sections that show a body."""
     used: NDArray[np.bool_]
-    """(S,) of these, sections without another object beside the body, if there are enough."""
+    """(S,) of these, sections without another object next to the body, if there are enough."""
     along: Floats
     """(2,) by how much the body ends beyond each tip, m."""
     ends: NDArray[np.bool_]
@@ -209,7 +209,7 @@ def _look(
     across, width = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
     along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
     sections, ends = (width > _THIN) & (width < _THICK), ends & ~hidden
-    free = _beside(value[:count].reshape(section_spots.shape[:2])) < _FREE
+    free = _outside(value[:count].reshape(section_spots.shape[:2])) < _FREE
     used = sections & free
     if wide != _NARROW or used.mean() < _LEAST_FREE or seen.is_compressed:
         used = sections
@@ -349,7 +349,7 @@ def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, Floa
     return (value @ off) / np.maximum(content, 1e-9), width
 
 
-def _beside(value: Floats) -> Floats:
+def _outside(value: Floats) -> Floats:
     """(S,) how much stands out at the outer ends of the sections (S, N), on the worse side."""
     return np.maximum(value[:, :_OUTER].mean(axis=1), value[:, -_OUTER:].mean(axis=1))
 
