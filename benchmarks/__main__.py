@@ -29,6 +29,7 @@ MODULES = tuple(
         "capture",
         "overhead",
         "disturbed_views",
+        "hard_views",
         "camera_run",
         "repertoire",
         "support",

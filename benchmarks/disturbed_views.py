@@ -291,7 +291,7 @@ def measure(
             image = _bent(_whole(effect(scene.picture.astype(float), chance, at)), lens)
         else:
             image = _whole(effect(_bent(scene.picture, lens).astype(float), chance, at))
-        prior = _belief(scene, robot, chance)
+        prior = belief(scene, robot, chance)
         found = detector.registered(image).track(image, 0.0, prior, robot)
         noticed += found.bump is not None
         if not found.fault:
@@ -336,7 +336,7 @@ def measure_in_time(runs: list[list[Stay]], floor: Image, learn_s: float, *, bar
                 now_s += _STEP_S
                 frame = scene.picture + noise[n % len(noise)]
                 image = _whole(_bars(frame, now_s) if bars else frame)
-                prior = _belief(scene, robot, chance)
+                prior = belief(scene, robot, chance)
                 found = detector.track(image, now_s, prior, robot)
                 detector = learning.after(detector, image, prior, found)
             if stay.judged and not found.fault:
@@ -345,7 +345,7 @@ def measure_in_time(runs: list[list[Stay]], floor: Image, learn_s: float, *, bar
     return Found(len(off_m), wrong, max(off_m, default=float("nan")), 0)
 
 
-def _belief(scene: Scene, robot: RobotConfig, chance: np.random.Generator) -> BodyPrior:
+def belief(scene: Scene, robot: RobotConfig, chance: np.random.Generator) -> BodyPrior:
     """Off by up to 40 mm each way and 0.1 rad."""
     believed = pose_at(
         scene.head_m + chance.uniform(-0.04, 0.04, 2),

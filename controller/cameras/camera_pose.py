@@ -91,6 +91,16 @@ class CameraPose:
         """Frames taken in so far."""
         self.used = 0
         """Number of these that were used."""
+        self.covariance: Floats | None = None
+        """(3, 3) of x, y (m) and heading (rad) of the head in the last frame that was used."""
+        self._sigma_m: list[float] = []
+
+    def facts(self) -> dict[str, float | int]:
+        """Return the numbers of frames, and the usual uncertainty of the head's place in them."""
+        facts: dict[str, float | int] = {"frames": self.frames, "frames_used": self.used}
+        if self._sigma_m:
+            facts["head_sigma_median_m"] = round(float(np.median(self._sigma_m)), 4)
+        return facts
 
     def __call__(self, state: JointState) -> BodyPose:
         """Advance to the state's time, and process the frames that have arrived."""
@@ -128,10 +138,13 @@ class CameraPose:
         if found.fault:
             self._reason = found.fault
             return
-        self._place(found.time_s, found.head_m, found.heading_rad)
+        self._place(found, found.time_s)
 
-    def _place(self, time_s: float, head_m: Floats, heading_rad: float) -> None:
+    def _place(self, found: PoseFit | TrackedPose, time_s: float) -> None:
         """Put the drifting frame where a camera saw the head."""
+        head_m, heading_rad = found.head_m, found.heading_rad
+        self.covariance = found.covariance
+        self._sigma_m.append(float(np.sqrt(np.linalg.eigvalsh(found.covariance[:2, :2])[-1])))
         then = self._at(time_s)
         self.used += 1
         self._fixed_s = time_s
@@ -148,7 +161,7 @@ class CameraPose:
         if fit.error_m > MISFIT * self._robot.mean_link_length_m:
             self._reason = f"the image lies {fit.error_m * 1e3:.0f} mm off the measured joints"
             return
-        self._place(detection.time_s, fit.head_m, fit.heading_rad)
+        self._place(fit, detection.time_s)
 
     def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
         """Which end is the head: by the joints' shape; where both fit, by the last estimate."""

@@ -72,9 +72,7 @@ class OverheadCameraPose:
                 lambda text: context.on_event("camera", text),
                 context.prepared.ground,
             )
-            yield PoseProvider(
-                measure, lambda: {"frames": measure.frames, "frames_used": measure.used}
-            )
+            yield PoseProvider(measure, measure.facts)
 
 
 def _camera(context: PoseContext) -> "RenderedCamera | DeviceCamera":

@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Image
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.body_contrast import links_at
 from snakewalk.controller.cameras.floor_light import in_light_of
 from snakewalk.controller.cameras.overhead_camera import OverheadDetector
 from snakewalk.controller.cameras.pose_tracking import REACH_M, BodyPrior, TrackedPose
@@ -73,7 +74,7 @@ def _body(
     detector: OverheadDetector, prior: BodyPrior, found: TrackedPose, robot: RobotConfig
 ) -> Image:
     """(H, W) 255 where the body and its neighbourhood are."""
-    links_px = detector.model.in_image(_links(prior, found), detector.axis_height_m)
+    links_px = detector.model.in_image(links_at(prior, found), detector.axis_height_m)
     length_px = float(np.hypot(*np.diff(links_px, axis=0).T).sum())
     metre = length_px / robot.middles_apart_m
     mask = np.zeros(detector.background.shape[:2], dtype=np.uint8)
@@ -81,12 +82,3 @@ def _body(
     wide_px = 2.0 * (REACH_M + 2.0 * robot.body_radius_m) * metre
     cv2.polylines(mask, [spots], False, 255, max(1, round(wide_px)))
     return mask
-
-
-def _links(prior: BodyPrior, found: TrackedPose) -> Floats:
-    """(L, 2) centres of the links at the pose that was found."""
-    ahead = prior.forward[0]
-    turn = found.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
-    c, s = np.cos(turn), np.sin(turn)
-    away = prior.links_m - prior.links_m[0]
-    return np.asarray(found.head_m + away @ np.array([[c, s], [-s, c]]))

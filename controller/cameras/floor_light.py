@@ -17,6 +17,9 @@ _ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is measur
 _DARKEST: Final = np.uint8(8)  # grey levels: a ratio to less than this says nothing
 _GLARE: Final = 0.3  # by how much light may grow beyond that of the surroundings: soft edges (ours)
 _COARSE: Final = 4  # pixels of a frame a pixel of its wide light
+_COLUMNS: Final = 4  # step between the columns that give the light of a row
+_ROWS: Final = 4  # distance of the rows between which an edge of a band is measured
+_BANDS: Final = 0.06  # change of the light there that is a band's edge (ours)
 
 
 def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
@@ -30,6 +33,21 @@ def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
     """
     light = _light(image, floor, int(np.sqrt(2.0 * body_area_px)) + 1)
     return np.asarray(cv2.multiply(floor, light, scale=1.0 / _ONE), dtype=np.uint8)
+
+
+def banded_floor(image: Image, floor: Image) -> Image:
+    """(H, W[, 3]) the empty floor with the bands of rows that a flickering lamp leaves in a frame.
+
+    The rows must be complete: the median of each row is its light. The floor itself where the
+    light has no steps.
+    """
+    ratio = grey_of(image[:, ::_COLUMNS]) / np.maximum(grey_of(floor[:, ::_COLUMNS]), _DARKEST)
+    light = np.median(ratio, axis=1).astype(np.float32)
+    step = np.abs(np.diff(np.log(np.maximum(light, 0.01)[::_ROWS])))
+    if step.max(initial=0.0) < _BANDS:
+        return floor
+    rows = light.reshape(-1, *(1,) * (floor.ndim - 1))
+    return np.clip(np.rint(floor * rows), 0.0, 255.0).astype(np.uint8)
 
 
 def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
@@ -48,7 +66,7 @@ def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
 
 def _light(image: Image, floor: Image, side_px: int) -> Image:
     """(H, W[, 3]) what the floor's grey levels are multiplied with in a frame, in hundredths."""
-    ratio = cv2.divide(_grey(image), np.maximum(_grey(floor), _DARKEST), scale=_ONE)
+    ratio = cv2.divide(grey_of(image), np.maximum(grey_of(floor), _DARKEST), scale=_ONE)
     light = np.asarray(
         cv2.medianBlur(np.asarray(ratio, dtype=np.uint8), min(side_px | 1, 255)), dtype=np.uint8
     )
@@ -75,6 +93,7 @@ def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:
     return apart
 
 
-def _grey(image: Image) -> Image:
+def grey_of(image: Image) -> Image:
+    """(H, W) grey levels of a picture (H, W[, 3])."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.asarray(grey, dtype=np.uint8)

@@ -17,6 +17,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.body_contrast import DEEP_SHADE, BodyContrast, links_at
 from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
 from snakewalk.controller.cameras.floor_markers import (
     Bump,
@@ -28,20 +29,14 @@ from snakewalk.controller.cameras.floor_markers import (
 )
 from snakewalk.controller.cameras.ground_rest import Heights
 from snakewalk.controller.cameras.lens import Lens, projected
-from snakewalk.controller.cameras.pose_tracking import (
-    REACH_M,
-    BodyPrior,
-    StandingOut,
-    TrackedPose,
-    track_pose,
-)
+from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose, track_pose
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
+_SHADOW, _LARGE_SHADOW = 0.02, 0.05  # of the body's area: dark and colourless next to it (ours)
 _SURROUNDINGS = 0.25  # of the picture's width: the square in which the body is a small part
-_CALM_PX = 200  # fewest pixels away from the body that give the noise
 _MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
 _HALF = 2  # the floor is matched on a picture smaller by this factor
 _PARTS = 6, 4  # of a picture, across and down
@@ -368,51 +363,19 @@ class OverheadDetector:
 
         """
         self._check_size(image)
-        seen = self._standing_out(image, prior, robot)
-        found = track_pose(robot, seen, prior, time_s)
+        floors = [self.background] if self.pictured is None else [self.background, self.pictured]
+        to_px = self.model.projection(self.axis_height_m)
+        contrast = BodyContrast.around(image, floors, to_px, prior, robot)
+        found = track_pose(robot, contrast.standing_out(self.shade), prior, time_s)
+        shadow = contrast.hard_shadow(links_at(prior, found), self.shade)
+        if shadow > _SHADOW:
+            found = _next_to_shadow(robot, contrast, prior, found, shadow)
         if self.bump is not None and not self.bump.undone:
             return replace(found, fault=str(self.bump), bump=self.bump)
         px = self.model.in_image(prior.links_m, self.axis_height_m)
         within = (px >= 0.0) & (px <= np.array(image.shape[1::-1]) - 1.0)
         fault = str(FrameStatus.CUT) if found.fault and not within.all() else found.fault
         return replace(found, fault=fault, bump=self.bump)
-
-    def _standing_out(self, image: Image, prior: BodyPrior, robot: RobotConfig) -> StandingOut:
-        to_px = self.model.projection(self.axis_height_m)
-        reach_m = REACH_M + 3.0 * robot.body_radius_m
-        around = reach_m * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-        px = to_px((prior.links_m[:, None] + around).reshape(-1, 2))
-        rows, columns = image.shape[:2]
-        left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
-        right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
-        window = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
-        frame = np.ascontiguousarray(image[window])
-        line = to_px(prior.links_m) - (left, top)
-        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.middles_apart_m
-        radius = robot.body_radius_m * metre
-        area = 2.0 * radius * robot.length_m * metre
-        now = np.asarray(cv2.GaussianBlur(frame, (3, 3), 0.0), dtype=np.uint8)
-        apart = np.full(frame.shape[:2], np.inf, dtype=np.float32)
-        for floor in (self.background, self.pictured):
-            if floor is not None:
-                lit = cv2.GaussianBlur(lit_floor(frame, floor[window], area), (3, 3), 0.0)
-                off = unexplained(now, np.asarray(lit, dtype=np.uint8), self.shade)
-                apart = np.minimum(apart, off)
-        near = np.zeros(apart.shape, dtype=np.uint8)
-        spots = np.rint(line).astype(np.int32).reshape(-1, 1, 2)
-        cv2.polylines(near, [spots], False, 255, max(1, round(2.0 * reach_m * metre)))
-        away = apart[near == 0]
-        some = away if away.size > _CALM_PX else apart.ravel()
-        middle = float(np.median(some))
-        above = some[some > middle] - middle
-        spread = (1.4826 * float(np.median(above)) if above.size else 0.0) + 0.5
-        clear = middle + 4.0 * spread
-        body = apart[(near > 0) & (apart > clear)]
-        level = float(np.median(body)) if body.size > 0.2 * area else 255.0
-        low_level = middle + 2.0 * spread
-        share = (apart - low_level) / max(0.7 * level - low_level, spread)
-        share = np.clip(share, 0.0, 1.0) * (near > 0)
-        return StandingOut(share.astype(np.float32), np.array([left, top], dtype=float), to_px)
 
     def _check_size(self, image: Image) -> None:
         floor = self.background
@@ -451,6 +414,21 @@ class OverheadDetector:
         floor = self.background
         lit = lit_floor(image, floor, 0.5 * (_SURROUNDINGS * image.shape[1]) ** 2)
         return np.minimum(unexplained(image, lit, self.shade), 255.0).astype(np.uint8)
+
+
+def _next_to_shadow(
+    robot: RobotConfig, contrast: BodyContrast, prior: BodyPrior, found: TrackedPose, shadow: float
+) -> TrackedPose:
+    """Find a body next to a hard shadow by its colour.
+
+    If the body has no colour, the shadow may be the body, so its place is rejected.
+    """
+    by_colour = track_pose(robot, contrast.standing_out(DEEP_SHADE), prior, found.time_s)
+    if not by_colour.fault:
+        return by_colour
+    if found.fault or shadow < _LARGE_SHADOW:
+        return found
+    return replace(found, fault="a hard shadow near the body has its colour; soften the light")
 
 
 def _texture(image: Image) -> NDArray[np.float32]:

@@ -19,6 +19,8 @@ _BLUR_M = 0.003
 """Usual error of a link's place on the line."""
 _TIPS_M = 0.02
 """How far the line's middle may be off the body's."""
+_STIFF = _BLUR_M / _TIPS_M  # holds the slide itself near 0, not a step of it
+_ALIKE = 0.2  # share of a link's variance that all links have in common (ours)
 _REGULAR = 3e-5  # a straight body's slide and shift are one thing: neither runs away
 
 
@@ -34,6 +36,8 @@ class PoseFit:
     """(L, 2) centres of the links as fitted."""
     error_m: float
     """Root of the mean square distance of the links from their places on the line."""
+    covariance: Floats
+    """(3, 3) of the head's x, y (m) and of its heading (rad)."""
 
 
 def fit_both_ends(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tuple[PoseFit, PoseFit]:
@@ -66,11 +70,13 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
         usual = 1.4826 * float(np.median(size)) + 1e-4
         weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))  # Huber
         shift_along_m += _shift_along(turned, ahead, away, weight, shift_along_m)
+    error_m = float(np.sqrt((size * size).mean()))
     return PoseFit(
         shift,
         float(np.arctan2(turn[1, 0], turn[0, 0])),
         turned + shift,
-        float(np.sqrt((size * size).mean())),
+        error_m,
+        _covariance(turned, ahead, weight, error_m),
     )
 
 
@@ -90,8 +96,14 @@ def _shift_along(
     One step of least squares for slide, shift and turn together; tips that are lost or stick out
     move the middle by a few millimetres, and a straight body leaves it there.
     """
+    matrix = _motions(links, ahead, weight)
+    target = np.append(away.ravel() * np.sqrt(np.repeat(weight, 2)), -_STIFF * shifted_m)
+    return float(least_squares(matrix, target, np.full(4, _REGULAR))[3])
+
+
+def _motions(links: Floats, ahead: Floats, weight: Floats) -> Floats:
+    """(2 L + 1, 4) weighted motion of the links for a shift, a turn and a slide along the line."""
     count = len(links)
-    row = np.sqrt(np.repeat(weight, 2))
     one, none = np.ones(count), np.zeros(count)
     columns = [
         np.stack([one, none], axis=1),
@@ -99,11 +111,18 @@ def _shift_along(
         np.stack([-links[:, 1], links[:, 0]], axis=1),
         -ahead,
     ]
+    row = np.sqrt(np.repeat(weight, 2))
     matrix = np.stack([column.ravel() for column in columns], axis=1) * row[:, None]
-    stiff = _BLUR_M / _TIPS_M  # holds the slide itself near 0, not this step of it
-    matrix = np.vstack([matrix, [0.0, 0.0, 0.0, stiff]])
-    target = np.append(away.ravel() * row, -stiff * shifted_m)
-    return float(least_squares(matrix, target, np.full(4, _REGULAR))[3])
+    return np.vstack([matrix, [0.0, 0.0, 0.0, _STIFF]])
+
+
+def _covariance(links: Floats, ahead: Floats, weight: Floats, error_m: float) -> Floats:
+    """(3, 3) of the head's place and heading; ``links`` (L, 2) lie relative to the head's."""
+    matrix = _motions(links, ahead, weight)
+    error_m = max(error_m, 0.5 * _BLUR_M)
+    turn = 12.0 * _ALIKE / float(np.square(links[-1] - links[0]).sum() + 1e-9)
+    least = error_m * error_m * np.diag([_ALIKE, _ALIKE, turn])
+    return np.asarray(error_m * error_m * np.linalg.inv(matrix.T @ matrix)[:3, :3] + least)
 
 
 def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]:

@@ -7,7 +7,7 @@ looked at.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
@@ -28,6 +28,9 @@ _WIDE: Final = 2.0  # radii to each side that a section looks at, at first
 _NARROW: Final = 1.5  # and then
 _STILL_M: Final = 3e-4  # a smaller step ends the fit
 _SAMPLES: Final = 17
+_OUTER: Final = 2  # of them, at each end of a section
+_FREE: Final = 0.3  # share of the body's contrast there, without another object (ours)
+_LEAST_FREE: Final = 0.5  # of the sections: with fewer free ones all count
 _SECTION_M: Final = 0.003  # usual error of a section's middle
 _TIP_M: Final = 0.012  # of a tip: heads and tails differ from the model
 _CAP: Final = 0.4  # of the radius: by how much a tip sticks out of its link
@@ -35,8 +38,23 @@ _REGULAR: Final = np.array([1e-6, 1e-6, 1e-6])
 _LEAST_SEEN: Final = 0.7  # of the sections
 _LEAST_HALF: Final = 0.5  # of those of each half of the body
 _OFF: Final = 0.3  # of the radius: largest residual of a fit that is believed
+_OFF_IN_BLOCKS: Final = 0.2  # the same in a compressed frame, whose blocks are alike (ours)
+_SIGMA_IN_BLOCKS: Final = 0.25  # of the radius: largest standard deviation there (ours)
+_TOO_COMPRESSED: Final = "the frame is compressed too strongly; raise the camera's JPEG quality"
 _TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
+_NO_TIP: Final = "a tip of the body is not where it must be"
+_BOTH: Final = np.array([False, False])
+_ONE_HIDDEN: Final = np.array([True, False]), np.array([False, True])
+_SURE_M: Final = 0.008  # largest standard deviation of a pose of which one tip is hidden (ours)
+_UNKNOWN: Final = np.array([REACH_M, REACH_M, _TURN_RAD])  # if the frame shows nothing
+_ALIKE: Final = 1.0  # sections next to each other have similar errors (ours)
+_ALIKE_IN_BLOCKS: Final = 4.0  # the same in a compressed frame (ours)
+_SHAPE: Final = 0.04  # radii: error of all sections together, from the body's look (ours)
 _THIN, _THICK = 0.2, 1.5  # of the body's width: limits of the content of a section
+
+
+ToPixels = Callable[[Floats], Floats]
+"""Places (..., 2) in the world, as high as the body's axis, to pixels of the frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +79,17 @@ class TrackedPose:
     """Heading of the head link, in (-pi, pi]."""
     error_m: float
     """Root of the mean square distance of the sections' middles from the chain."""
+    covariance: Floats
+    """(3, 3) of the head's x, y (m) and of its heading (rad)."""
     fault: str
     """Why it must not be used; empty where it may."""
     bump: Bump | None = None
     """Bump of the camera since it was set up."""
+
+    @property
+    def sigma_m(self) -> float:
+        """Standard deviation of the head's place in its least certain direction."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +100,9 @@ class StandingOut:
     """(h, w) 0: floor, 1: as much as the body."""
     origin_px: Floats
     """(2,) x, y of its first pixel in the frame."""
-    to_px: Callable[[Floats], Floats]
-    """Places (..., 2) in the world, as high as the body's axis, to pixels of the frame."""
+    to_px: ToPixels
+    is_compressed: bool = False
+    """Whether compression has blurred the colours of the frame over blocks."""
 
     def at(self, places_m: Floats) -> Floats:
         """(...,) share at places (..., 2)."""
@@ -142,6 +168,59 @@ def _chain(robot: RobotConfig, prior: BodyPrior) -> _Chain:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """A chain at a shift and a turn, compared with a frame."""
+
+    across: Floats
+    """(S,) offset of the middle of each section to the left, m."""
+    sections: NDArray[np.bool_]
+    """(S,) sections that show a body."""
+    used: NDArray[np.bool_]
+    """(S,) of these, sections without another object next to the body, if there are enough."""
+    along: Floats
+    """(2,) by how much the body ends beyond each tip, m."""
+    ends: NDArray[np.bool_]
+    """(2,) tips that are seen."""
+    rows: Floats
+    """(K, 3) motion of sections and tips for a shift and a turn, in their usual errors."""
+    target: Floats
+    """(K,) offsets of sections and tips, in their usual errors."""
+
+
+def _look(
+    robot: RobotConfig,
+    seen: StandingOut,
+    chain: _Chain,
+    place: tuple[Floats, float, float],
+    hidden: NDArray[np.bool_],
+) -> _Look:
+    """Compare at a shift (2,), a turn and a half width of the sections in radii."""
+    (shift, turn, wide), radius_m = place, robot.body_radius_m
+    c, s = np.cos(turn), np.sin(turn)
+    spin = np.array([[c, s], [-s, c]])
+    at = chain.middle_m + shift
+    here, forward = (chain.places_m - chain.middle_m) @ spin, chain.ahead @ spin
+    ends_m, out = (chain.tips_m - chain.middle_m) @ spin, chain.out @ spin
+    section_spots, off = _section_spots(here + at, forward, wide * radius_m)
+    tip_spots, off_tip = _tip_spots(ends_m + at, out, radius_m)
+    value = seen.at(np.concatenate([section_spots.reshape(-1, 2), tip_spots.reshape(-1, 2)]))
+    count = section_spots.shape[0] * section_spots.shape[1]
+    across, width = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
+    along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
+    sections, ends = (width > _THIN) & (width < _THICK), ends & ~hidden
+    free = _outside(value[:count].reshape(section_spots.shape[:2])) < _FREE
+    used = sections & free
+    if wide != _NARROW or used.mean() < _LEAST_FREE or seen.is_compressed:
+        used = sections
+    normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
+    rows = np.concatenate([
+        _rows(here, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / _TIP_M
+    ])  # fmt: skip
+    target = np.concatenate([across[used] / _SECTION_M, along[ends] / _TIP_M])
+    return _Look(across, sections, used, along, ends, rows, target)
+
+
 def _fit(
     robot: RobotConfig,
     seen: StandingOut,
@@ -149,48 +228,75 @@ def _fit(
     time_s: float,
     start: tuple[Floats, float],
 ) -> TrackedPose:
-    """Fit the chain rigidly from a shift (2,) and a turn about its middle on."""
-    (shift, turn), middle, radius_m = start, chain.middle_m, robot.body_radius_m
-    places, tips = chain.places_m - middle, chain.tips_m - middle
+    """Fit the chain rigidly from a shift (2,) and a turn about its middle on.
+
+    If one tip is not at its place while all the rest is, that tip counts as hidden.
+    """
+    found = _fit_tips(robot, seen, chain, time_s, start, _BOTH)
+    if found.fault != _NO_TIP:
+        return found
+    tries = (_fit_tips(robot, seen, chain, time_s, start, hidden) for hidden in _ONE_HIDDEN)
+    good = [one for one in tries if not one.fault and one.sigma_m < _SURE_M]
+    return min(good, key=lambda one: one.error_m, default=found)
+
+
+def _fit_tips(
+    robot: RobotConfig,
+    seen: StandingOut,
+    chain: _Chain,
+    time_s: float,
+    start: tuple[Floats, float],
+    hidden: NDArray[np.bool_],
+) -> TrackedPose:
+    shift, turn = start
     wide = _WIDE
     for left in range(_ROUNDS, 0, -1):
         wide = _NARROW if left <= _ROUNDS // 2 else wide
-        c, s = np.cos(turn), np.sin(turn)
-        spin = np.array([[c, s], [-s, c]])
-        here, forward, out = places @ spin, chain.ahead @ spin, chain.out @ spin
-        ends_m = tips @ spin
-        at = middle + shift
-        section_spots, off = _section_spots(here + at, forward, wide * radius_m)
-        tip_spots, off_tip = _tip_spots(ends_m + at, out, radius_m)
-        value = seen.at(np.concatenate([section_spots.reshape(-1, 2), tip_spots.reshape(-1, 2)]))
-        count = section_spots.shape[0] * section_spots.shape[1]
-        across, sections = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
-        along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
-        if sections.sum() < 3:
+        look = _look(robot, seen, chain, (shift, turn, wide), hidden)
+        if look.sections.sum() < 3:
             break
-        normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
-        rows = np.concatenate([
-            _rows(here, normal)[sections] / _SECTION_M, _rows(ends_m, out)[ends] / _TIP_M
-        ])  # fmt: skip
-        target = np.concatenate([across[sections] / _SECTION_M, along[ends] / _TIP_M])
-        usual = max(1.0, 1.4826 * float(np.median(np.abs(target))))
-        weight = np.sqrt(1.0 / np.maximum(1.0, np.abs(target) / (1.5 * usual)))
-        step = least_squares(rows * weight[:, None], target * weight, _REGULAR)
+        size = np.abs(look.target)
+        usual = max(1.0, 1.4826 * float(np.median(size)))
+        weight = np.sqrt(1.0 / np.maximum(1.0, size / (1.5 * usual)))
+        step = least_squares(look.rows * weight[:, None], look.target * weight, _REGULAR)
         shift, turn = shift + step[:2], turn + float(step[2])
         if float(np.hypot(*step[:2])) < _STILL_M:
             if wide == _NARROW:
                 break
             wide = _NARROW
-    head = spin.T @ (chain.head_m - middle) + middle + shift
+    c, s = np.cos(turn), np.sin(turn)
+    spin = np.array([[c, s], [-s, c]])
+    head = spin.T @ (chain.head_m - chain.middle_m) + chain.middle_m + shift
     heading = chain.heading_rad + turn
-    error_m = float(np.sqrt(np.mean(across[sections] ** 2))) if sections.any() else np.inf
-    return TrackedPose(
+    off_m = look.across[look.used]
+    error_m = float(np.sqrt(np.mean(off_m**2))) if off_m.size else np.inf
+    alike = _ALIKE_IN_BLOCKS if seen.is_compressed else _ALIKE
+    found = TrackedPose(
         time_s,
         head,
         float(np.arctan2(np.sin(heading), np.cos(heading))),
         error_m,
-        _fault(robot, sections, error_m, along, ends, shift),
+        _covariance(robot, look, head - chain.middle_m - shift, alike),
+        _fault(robot, look, error_m, shift),
     )
+    vague = max(error_m / _OFF_IN_BLOCKS, found.sigma_m / _SIGMA_IN_BLOCKS) > robot.body_radius_m
+    if seen.is_compressed and vague and not found.fault:
+        return replace(found, fault=_TOO_COMPRESSED)
+    return found
+
+
+def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -> Floats:
+    """(3, 3) of the head, which lies at ``head_m`` from the middle of the sections."""
+    size = np.abs(look.target)
+    usual = max(1.0, 1.4826 * float(np.median(size))) if size.size else 1.0
+    weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))
+    known = look.rows.T @ (look.rows * weight[:, None]) + np.diag(1.0 / np.square(_UNKNOWN))
+    spread = float((weight * size * size).sum()) / max(float(weight.sum()), 1e-9)
+    middle = max(1.0, spread) * alike * np.linalg.inv(known)
+    carry = np.array([[1.0, 0.0, -head_m[1]], [0.0, 1.0, head_m[0]], [0.0, 0.0, 1.0]])
+    least = (_SHAPE * robot.body_radius_m) ** 2
+    turn = least / (robot.length_m**2 / 12.0)
+    return np.asarray(carry @ (middle + np.diag([least, least, turn])) @ carry.T)
 
 
 def _search(
@@ -236,12 +342,16 @@ def _section_spots(here: Floats, forward: Floats, wide_m: float) -> tuple[Floats
     return here[:, None] + off[:, None] * normal[:, None], off
 
 
-def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, NDArray[np.bool_]]:
-    """Offset (S,) of the middle of the difference to the left of the chain, and its validity."""
-    held = value.sum(axis=1)
-    width = held * (off[1] - off[0]) / (2.0 * radius_m)
-    told = (width > _THIN) & (width < _THICK)
-    return (value @ off) / np.maximum(held, 1e-9), told
+def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, Floats]:
+    """Offset (S,) of the middle of the difference to the left of the chain, and its width (S,)."""
+    content = value.sum(axis=1)
+    width = content * (off[1] - off[0]) / (2.0 * radius_m)
+    return (value @ off) / np.maximum(content, 1e-9), width
+
+
+def _outside(value: Floats) -> Floats:
+    """(S,) how much stands out at the outer ends of the sections (S, N), on the worse side."""
+    return np.maximum(value[:, :_OUTER].mean(axis=1), value[:, -_OUTER:].mean(axis=1))
 
 
 def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floats]:
@@ -270,25 +380,18 @@ def _rows(r: Floats, direction: Floats) -> Floats:
     return np.column_stack([direction, turned])
 
 
-def _fault(
-    robot: RobotConfig,
-    sections: NDArray[np.bool_],
-    error_m: float,
-    along: Floats,
-    ends: NDArray[np.bool_],
-    shift: Floats,
-) -> str:
-    half = len(sections) // 2
-    share = float(sections.mean())
-    least = min(float(sections[:half].mean()), float(sections[half:].mean()))
-    if share < _LEAST_SEEN or least < _LEAST_HALF:
+def _fault(robot: RobotConfig, look: _Look, error_m: float, shift: Floats) -> str:
+    half = len(look.sections) // 2
+    share = float(look.sections.mean())
+    halves = look.sections[:half], look.sections[half:]
+    if share < _LEAST_SEEN or min(float(one.mean()) for one in halves) < _LEAST_HALF:
         return f"{100.0 * share:.0f} % of the body is seen where it must be"
     if error_m > _OFF * robot.body_radius_m:
         return f"the image lies {error_m * 1e3:.0f} mm off the measured joints"
-    if not ends.any():
+    if not look.ends.any():
         return "neither tip of the body is seen"
-    if float(np.abs(along[ends]).max()) > _TIP_OFF * robot.body_radius_m:
-        return "a tip of the body is not where it must be"
+    if float(np.abs(look.along[look.ends]).max()) > _TIP_OFF * robot.body_radius_m:
+        return _NO_TIP
     if float(np.hypot(*shift)) > 1.4 * REACH_M:
         return "the image lies too far from the possible places of the body"
     return ""

@@ -1,0 +1,176 @@
+"""Contrast of a body with its floor in a frame, near to where the body is expected.
+
+Three conditions of a frame need another way of comparison, and are recognised in the frame itself:
+a flickering lamp (bands of rows), strong compression (blocks of 8 px), a hard shadow. Frames
+without them are compared as they are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.cameras.floor_light import banded_floor, grey_of, lit_floor, unexplained
+from snakewalk.controller.cameras.pose_tracking import (
+    REACH_M,
+    BodyPrior,
+    StandingOut,
+    ToPixels,
+    TrackedPose,
+)
+
+_CALM_PX: Final = 200  # fewest pixels away from the body that give the noise
+_BLOCK_PX: Final = 8  # of JPEG and of MJPEG
+_BLOCKS: Final = 1.3  # steps between blocks over those within: more is compression (ours)
+_STEP: Final = 4  # grey levels: a larger step is an edge of the scene, not of a block (ours)
+_CLEAR: Final = 0.4  # of the body's contrast: halos of compression have less (ours)
+DEEP_SHADE: Final = 0.9
+"""Share of the light that a hard shadow may remove (ours)."""
+_COLOURLESS: Final = 0.08  # largest spread of a shadow's light over the channels (ours)
+_BRIGHT: Final = 40.0  # grey levels of a floor on which a shadow shows (ours)
+_BODY: Final = 1.25  # radii to each side of the axis that may belong to the body (ours)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyContrast:
+    """The part of a frame around an expected body, and the same part of its floor."""
+
+    frame: Image
+    """(h, w[, 3])."""
+    floors: tuple[Image, ...]
+    """(h, w[, 3]) each: a pixel that one of them explains is floor."""
+    near: NDArray[np.uint8]
+    """(h, w) 255 where the body can be."""
+    origin_px: Floats
+    """(2,) x, y of the first pixel in the frame."""
+    to_px: ToPixels
+    radius_px: float
+    area_px: float
+    """Area of the body."""
+    is_compressed: bool
+
+    @classmethod
+    def around(
+        cls,
+        image: Image,
+        floors: Sequence[Image],
+        to_px: ToPixels,
+        prior: BodyPrior,
+        robot: RobotConfig,
+    ) -> Self:
+        """Cut the part around an expected body out of a frame (H, W[, 3]) and its floors."""
+        reach_m = REACH_M + 3.0 * robot.body_radius_m
+        around = reach_m * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        px = to_px((prior.links_m[:, None] + around).reshape(-1, 2))
+        rows, columns = image.shape[:2]
+        left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
+        right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
+        high, wide = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
+        frame = np.ascontiguousarray(image[high, wide])
+        line = to_px(prior.links_m) - (left, top)
+        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.middles_apart_m
+        radius = robot.body_radius_m * metre
+        near = np.zeros(frame.shape[:2], dtype=np.uint8)
+        _draw(near, line, 2.0 * reach_m * metre)
+        return cls(
+            frame,
+            tuple(banded_floor(image[high], floor[high])[:, wide] for floor in floors),
+            near,
+            np.array([left, top], dtype=float),
+            to_px,
+            radius,
+            2.0 * radius * robot.length_m * metre,
+            _is_compressed(image),
+        )
+
+    def standing_out(self, shade: float) -> StandingOut:
+        """Return how much each pixel stands out; shadows may remove ``shade`` of the light."""
+        now = _smooth(self.frame)
+        apart = np.full(now.shape[:2], np.inf, dtype=np.float32)
+        for floor in self.floors:
+            apart = np.minimum(apart, unexplained(now, self._lit(floor), shade))
+        away = apart[self.near == 0]
+        some = away if away.size > _CALM_PX else apart.ravel()
+        middle = float(np.median(some))
+        above = some[some > middle] - middle
+        spread = (1.4826 * float(np.median(above)) if above.size else 0.0) + 0.5
+        clear = middle + 4.0 * spread
+        body = apart[(self.near > 0) & (apart > clear)]
+        low_level = middle + 2.0 * spread
+        if body.size <= 0.2 * self.area_px:
+            level = 255.0
+        elif self.is_compressed:  # halos are not the body
+            strongest = np.sort(apart[self.near > 0])[-int(self.area_px) :]
+            level = float(np.median(strongest))
+            low_level = max(low_level, _CLEAR * level)
+        else:
+            level = float(np.median(body))
+        share = (apart - low_level) / max(0.7 * level - low_level, spread)
+        share = np.clip(share, 0.0, 1.0) * (self.near > 0)
+        return StandingOut(share.astype(np.float32), self.origin_px, self.to_px, self.is_compressed)
+
+    def hard_shadow(self, links_m: Floats, shade: float) -> float:
+        """Return the area of dark colourless pixels next to a body with its links (L, 2) there.
+
+        They are darker than a shadow that removes ``shade`` of the light. The unit is the area of
+        the body.
+        """
+        if self.frame.ndim == 2:
+            return 0.0
+        now = _smooth(self.frame).astype(np.float32)
+        dark = self.near > 0
+        for floor in self.floors:
+            lit = self._lit(floor).astype(np.float32)
+            ratio = now / np.maximum(lit, 1.0)
+            most, least = ratio.max(axis=2), ratio.min(axis=2)
+            dark &= (most < 1.0 - shade) & (most - least < _COLOURLESS)
+            dark &= lit.min(axis=2) > _BRIGHT
+        body = np.zeros(dark.shape, dtype=np.uint8)
+        _draw(body, self.to_px(links_m) - self.origin_px, 2.0 * _BODY * self.radius_px)
+        return int((dark & (body == 0)).sum()) / self.area_px
+
+    def _lit(self, floor: Image) -> Image:
+        """(h, w[, 3]) the floor in the light of the frame, smoothed as the frame."""
+        ground = np.ascontiguousarray(floor)
+        if not self.is_compressed or self.frame.ndim == 2:
+            return _smooth(lit_floor(self.frame, ground, self.area_px))
+        channels = [  # compression shifts colours over large parts
+            lit_floor(
+                np.ascontiguousarray(self.frame[..., k]), np.ascontiguousarray(ground[..., k]),
+                self.area_px,
+            )
+            for k in range(self.frame.shape[2])
+        ]  # fmt: skip
+        return _smooth(np.dstack(channels))
+
+
+def links_at(prior: BodyPrior, found: TrackedPose) -> Floats:
+    """(L, 2) centres of the links of an expected body at the pose that was found."""
+    ahead = prior.forward[0]
+    turn = found.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
+    c, s = np.cos(turn), np.sin(turn)
+    away = prior.links_m - prior.links_m[0]
+    return np.asarray(found.head_m + away @ np.array([[c, s], [-s, c]]))
+
+
+def _smooth(image: Image) -> Image:
+    return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.0), dtype=np.uint8)
+
+
+def _draw(mask: NDArray[np.uint8], line_px: Floats, wide_px: float) -> None:
+    spots = np.rint(line_px).astype(np.int32).reshape(-1, 1, 2)
+    cv2.polylines(mask, [spots], False, 255, max(1, round(wide_px)))
+
+
+def _is_compressed(image: Image) -> bool:
+    """Whether the steps at every eighth column of a frame are the largest."""
+    grey = grey_of(image[::3]).astype(np.int16)
+    step = np.minimum(np.abs(np.diff(grey, axis=1)), _STEP).mean(axis=0)
+    step = step[: len(step) // _BLOCK_PX * _BLOCK_PX].reshape(-1, _BLOCK_PX)
+    step = np.median(step, axis=0)  # edges of the scene are in few columns
+    return bool(step[-1] > _BLOCKS * np.median(step[:-1]))
