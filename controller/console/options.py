@@ -65,8 +65,8 @@ RunPort = Annotated[
     str | None,
     typer.Option(
         callback=check_port_name,
-        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=sim for segments, "
-        "where sim simulates them; robot: the ports of the robot's file; default: the "
+        help="serial port, or a URL such as socket://pi:5000; 1-8=A,9-16=sim for segments "
+        "(sim: simulated servos); robot: the ports of the robot's file; default: the "
         "simulator",
     ),
 ]

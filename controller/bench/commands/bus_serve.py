@@ -63,19 +63,25 @@ LATE_SHARE = 0.05
 """Share of the time served; a larger loss is reported at the end (ours)."""
 Servos = Annotated[
     str | None,
-    typer.Option(help="servos on a bench, IDS[:MODEL],...: 1-16, or 1-2:XL430-W250,3-6:XL330-M288"),
+    typer.Option(
+        help="servos without a body, as IDS[:MODEL],..., e.g. 1-16 or 1-2:XL430-W250,3-6:XL330-M288"
+    ),
 ]
 BenchImu = Annotated[
     str | None,
-    typer.Option(help="level, motionless IMU to add to --servos, ID[:MODEL]: 200:imu_to_dxl"),
+    typer.Option(
+        help="level, motionless IMU to add to --servos, as ID[:MODEL], e.g. 200:imu_to_dxl"
+    ),
 ]
 Recorded = Annotated[
     Path | None,
-    typer.Option(help="replay the replies of an exchange that --record wrote, instead of servos"),
+    typer.Option(help="replay an exchange that --record wrote, instead of simulating servos"),
 ]
 WithConsole = Annotated[
     bool,
-    typer.Option("--console", help="read set, get, load, fault, pace, quit from standard input"),
+    typer.Option(
+        "--console", help="read commands (set, get, load, fault, pace, quit) from standard input"
+    ),
 ]
 
 
@@ -95,7 +101,7 @@ def serve(
     seed: Annotated[int, typer.Option(help="seed of the noise of the poses")] = 0,
     imu: BenchImu = None,
     baud: Annotated[int | None, typer.Option(help="baud rate of the servos in bit/s")] = None,
-    pace: Annotated[float, typer.Option(help="simulated seconds per second")] = 1.0,
+    pace: Annotated[float, typer.Option(help="simulated seconds per second of real time")] = 1.0,
     faults: Annotated[Path | None, typer.Option(help="TOML file of faults to simulate")] = None,
     latency: Annotated[float, typer.Option(help="latency of the USB adapter in ms")] = 0.0,
     link: Annotated[
@@ -107,7 +113,7 @@ def serve(
     play: Recorded = None,
     for_s: Annotated[
         float | None,
-        typer.Option("--for", help="stop after this many seconds; default: serve until ^C"),
+        typer.Option("--for", help="stop after this many seconds; default: serve until Ctrl-C"),
     ] = None,
     with_console: WithConsole = False,
     force: Force = False,

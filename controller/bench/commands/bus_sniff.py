@@ -20,18 +20,19 @@ from snakewalk.sim.sniff.trace import read_trace
 @command("bus sniff", examples=("bus sniff exchange.jsonl --json", "bus sniff /dev/ttyUSB1"))
 def sniff(
     source: Annotated[
-        Path, typer.Argument(help="recording (JSON lines, hex text, raw), or a serial device")
+        Path, typer.Argument(help="recording (JSON lines, hex text, raw bytes), or serial device")
     ],
     baud: Annotated[int, typer.Option(help="baud rate of the device in bit/s")] = 1_000_000,
     model: Annotated[
-        str, typer.Option(help="model, or its file, for servos whose model no ping has shown")
+        str,
+        typer.Option(help="model, or file of a model, of servos that the exchange does not ping"),
     ] = "XM430-W350",
     through: Annotated[
         bool, typer.Option("--through", help="forward the bytes between a client and the device")
     ] = False,
     for_s: Annotated[
         float | None,
-        typer.Option("--for", help="stop after this many seconds; default: sniff until ^C"),
+        typer.Option("--for", help="stop after this many seconds; default: sniff until Ctrl-C"),
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -38,8 +38,7 @@ ToEeprom = Annotated[
     bool,
     typer.Option(
         "--homing-offset",
-        help="write the zeros into the servos' EEPROM, Homing Offset(20), after a question, "
-        "instead of the file",
+        help="write the zeros into Homing Offset(20) of the servos instead of the file; asks first",
     ),
 ]
 
@@ -62,7 +61,7 @@ def calibrate(
     sweep: Sweep = True,
     homing_offset: ToEeprom = False,
     yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="write without asking, with --homing-offset")
+        bool, typer.Option("--yes", "-y", help="with --homing-offset: write without asking")
     ] = False,
     resume: Annotated[
         bool,

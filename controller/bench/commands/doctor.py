@@ -64,11 +64,12 @@ def doctor(
     accept: Annotated[
         bool,
         typer.Option(
-            "--accept", help="show how the servos differ from the robot's fingerprint file, and ask"
+            "--accept",
+            help="show how the servos differ from the fingerprint file, and ask to update it",
         ),
     ] = False,
     yes: Annotated[
-        bool, typer.Option("--yes", "-y", help="write without asking, with --accept")
+        bool, typer.Option("--yes", "-y", help="with --accept: write without asking")
     ] = False,
     as_json: Json = False,
 ) -> None:

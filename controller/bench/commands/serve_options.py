@@ -10,7 +10,7 @@ from snakewalk.controller.console import completion
 SimulatedRobot = Annotated[
     str | None,
     typer.Option(
-        help="shipped robot or a TOML file, in MuJoCo on the ground of --world",
+        help="shipped robot or a TOML file to simulate on the ground of --world",
         autocompletion=completion.ROBOTS,
     ),
 ]
@@ -26,7 +26,7 @@ At = Annotated[
     str | None,
     typer.Option(
         metavar="X,Y[,DEG]",
-        help="start of the head and direction of the body; default: the start of --run, else 0,0,0",
+        help="place of the head (m) and direction of the body; default: start of --run, else 0,0,0",
     ),
 ]
 PoseOut = Annotated[

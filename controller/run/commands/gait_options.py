@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 Name = Annotated[
     str,
     typer.Argument(
-        help="gait, shipped set of parameters, or a SET.toml", autocompletion=completion.GAITS
+        help="gait, shipped set of parameters, or file of parameters (.toml)",
+        autocompletion=completion.GAITS,
     ),
 ]
 Param = Annotated[

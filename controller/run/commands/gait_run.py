@@ -20,12 +20,12 @@ from snakewalk.controller.run.gait_job import GaitJob
 
 Then = Annotated[
     list[str] | None,
-    typer.Option(help="NAME@S[,PARAM=V]: change gait after S seconds; may be repeated"),
+    typer.Option(help="NAME@S[,PARAM=V]: change to gait NAME after S seconds; may be repeated"),
 ]
 By = Annotated[
     str,
     typer.Option(
-        help="method of changing gaits: blend, or cpg (oscillators)",
+        help="method for changes of the gait: blend, or cpg (coupled oscillators)",
         autocompletion=completion.words("blend", "cpg"),
     ),
 ]

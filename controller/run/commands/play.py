@@ -42,7 +42,7 @@ def play(
     speed: Annotated[
         str,
         typer.Option(
-            help="factor on the animal's speed; auto: as fast as the joints can, at most 1"
+            help="factor on the animal's speed; auto: the largest that the joints allow, at most 1"
         ),
     ] = "auto",
     scale: Annotated[
@@ -58,14 +58,19 @@ def play(
         list[str] | None,
         typer.Option(
             metavar="ROBOT=FILE",
-            help="joint of the file for a joint of the robot; rest as FILE keeps it at 0",
+            help="joint of the file that moves a joint of the robot; ROBOT=rest keeps it at 0; may "
+            "be repeated",
         ),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="of joint angles whose file does not state it: rad or deg")
+        str | None, typer.Option(help="unit of joint angles if the file states none: rad or deg")
     ] = None,
-    topic: Annotated[str | None, typer.Option(help="of a bag with several joint topics")] = None,
-    episode: Annotated[int | None, typer.Option(help="of a LeRobot dataset, from 0")] = None,
+    topic: Annotated[
+        str | None, typer.Option(help="topic of a bag that has several topics of joint angles")
+    ] = None,
+    episode: Annotated[
+        int | None, typer.Option(help="number of the episode of a LeRobot dataset, from 0")
+    ] = None,
     set_: Set = None,
     *,
     options: RunOptions,

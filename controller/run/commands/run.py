@@ -39,9 +39,11 @@ def run(
     pose: Annotated[
         str | None,
         typer.Option(
-            help="pose source of the head: simulator, camera, imu, joints, udp:PORT, ros:/TOPIC, "
-            "or a plug-in's",
-            autocompletion=completion.words("simulator", "camera", "imu", "joints", "udp:", "ros:"),
+            help="pose source of the head: simulator, camera, tags, imu, joints, udp:PORT, "
+            "ros:/TOPIC, or a source of a plug-in",
+            autocompletion=completion.words(
+                "simulator", "camera", "tags", "imu", "joints", "udp:", "ros:"
+            ),
         ),
     ] = None,
     map_: Annotated[
