@@ -174,10 +174,7 @@ def trials(
     overs = [study.parse_over(text) for text in over or ()]
     _check_keys([key for key, _ in overs])
     cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, overs)
-    if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
-        raise InputError(f"--track {track}: is of walks, and none is tried")
-    if seconds is not None and not any(case.is_gait for case in cases):
-        raise InputError(f"--seconds {seconds:g}: is of gaits; a run has run.time_limit_s (--over)")
+    _check_used(cases, track, seconds)
     changes = {"track": track, "seconds": seconds}
     seen = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
@@ -202,6 +199,16 @@ def _check_results(picture: Path | None, parquet: Path | None, out: Path | None)
     check_parquet(parquet)
     if parquet is not None and out is None:
         raise InputError(f"--parquet {parquet}: is made from the CSV: give --out FILE, too")
+
+
+def _check_used(
+    cases: Sequence[study.Case], track: Path | str | None, seconds: float | None
+) -> None:
+    """Refuse options that no case uses."""
+    if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
+        raise InputError(f"--track {track}: is of walks, and none is tried")
+    if seconds is not None and not any(case.is_gait for case in cases):
+        raise InputError(f"--seconds {seconds:g}: is of gaits; a run has run.time_limit_s (--over)")
 
 
 def _cases(
