@@ -12,7 +12,7 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.camera_latency import LatencyFit, fit_latency
-from snakewalk.controller.cameras.floor_markers import (
+from snakewalk.controller.cameras.markers.floor_markers import (
     Bump,
     FloorFit,
     Markers,

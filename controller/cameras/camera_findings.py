@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.controller.cameras.camera_check import CameraReport
-from snakewalk.controller.cameras.floor_markers import FEWEST
+from snakewalk.controller.cameras.markers.floor_markers import FEWEST
 from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
 from snakewalk.controller.console.finding import Finding
 

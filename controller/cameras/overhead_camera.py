@@ -19,7 +19,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.body_contrast import DEEP_SHADE, BodyContrast, links_at
 from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
-from snakewalk.controller.cameras.floor_markers import (
+from snakewalk.controller.cameras.ground_rest import Heights
+from snakewalk.controller.cameras.lens import Lens, projected
+from snakewalk.controller.cameras.markers.floor_markers import (
     Bump,
     Markers,
     PictureMove,
@@ -27,8 +29,6 @@ from snakewalk.controller.cameras.floor_markers import (
     fit_floor,
     picture_move,
 )
-from snakewalk.controller.cameras.ground_rest import Heights
-from snakewalk.controller.cameras.lens import Lens, projected
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose, track_pose
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
