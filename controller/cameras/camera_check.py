@@ -12,7 +12,7 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.camera_latency import LatencyFit, fit_latency
-from snakewalk.controller.cameras.floor_markers import (
+from snakewalk.controller.cameras.markers.floor_markers import (
     Bump,
     FloorFit,
     Markers,
@@ -20,6 +20,7 @@ from snakewalk.controller.cameras.floor_markers import (
     fit_floor,
     picture_move,
 )
+from snakewalk.controller.cameras.markers.lens_residual import Distortion, marker_distortion
 from snakewalk.controller.cameras.overhead_camera import LineDetection, OverheadDetector
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -58,6 +59,8 @@ class CameraReport:
     """Range of the picture's usual brightness (5 to 95 %), as a share of it."""
     latency: LatencyFit | None
     """None if no joints were read, or the picture of the empty floor is missing."""
+    distortion: Distortion | None = None
+    """Distortion of an uncalibrated lens, where the markers of the last picture show it."""
 
 
 class CameraCheck:
@@ -151,10 +154,13 @@ class CameraCheck:
         places = self._camera.marker_places_m
         first = None if self._detector is None else self._detector.model
         lens = None if first is None else first.lens
-        floor, fault = None, ""
+        floor, fault, distortion = None, "", None
         if places:
             try:
                 floor = fit_floor(self.markers, places, lens)
+                if lens is None and self._camera.lens is None:
+                    side_m = self._camera.marker_side_m
+                    distortion = marker_distortion(self.markers, places, size_px, side_m)
             except InputError as error:
                 fault = str(error)
         move = None
@@ -176,6 +182,7 @@ class CameraCheck:
             seen={name: count / max(self._looks, 1) for name, count in self._found.items()},
             others=tuple(sorted(set(self.markers) - set(places))),
             floor=floor,
+            distortion=distortion if distortion is not None and distortion.is_certain else None,
             fault=fault,
             bump=None if move is None else move.bump,
             light_spread=float((high - low) / max(usual, 1.0)),

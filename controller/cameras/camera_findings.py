@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.camera import CameraConfig
 from snakewalk.controller.cameras.camera_check import CameraReport
-from snakewalk.controller.cameras.floor_markers import FEWEST
+from snakewalk.controller.cameras.markers.floor_markers import FEWEST
 from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
 from snakewalk.controller.console.finding import Finding
 
@@ -90,7 +90,13 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         x, y, z = floor.lens_m.tolist()
         found += f"; the lens is {z:.2f} m above ({x:.2f}, {y:.2f})"
     worst = max(floor.residual_m, key=lambda name: floor.residual_m[name])
-    if floor.residual_m[worst] > MISPLACED_M:
+    if report.distortion is not None:
+        error_mm = 1e3 * report.distortion.error_m
+        second = Finding(
+            "floor", "warn", f"{found}; the lens distorts by up to {error_mm:.0f} mm",
+            "calibrate the lens: snakewalk camera board, snakewalk camera calibrate",
+        )  # fmt: skip
+    elif floor.residual_m[worst] > MISPLACED_M:
         second = Finding("floor", "fail", found, f"measure the place of marker {worst} again")
     elif abs(side / camera.marker_side_m - 1.0) > _SIDE:
         second = Finding(

@@ -15,7 +15,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.camera_check import CameraCheck
 from snakewalk.controller.cameras.camera_findings import camera_findings
 from snakewalk.controller.cameras.camera_watch import CameraWatch
-from snakewalk.controller.cameras.floor_markers import Markers
+from snakewalk.controller.cameras.markers.floor_markers import Markers
 from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.drivers.clock import WallClock

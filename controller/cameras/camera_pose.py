@@ -14,8 +14,8 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.cameras.floor_markers import Bump
 from snakewalk.controller.cameras.ground_rest import GroundRest, heights_of
+from snakewalk.controller.cameras.markers.floor_markers import Bump
 from snakewalk.controller.cameras.overhead_camera import LineDetection
 from snakewalk.controller.cameras.pose_fit import PoseFit, fit_both_ends
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose

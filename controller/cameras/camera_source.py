@@ -72,6 +72,9 @@ class OverheadCameraPose:
                 lambda text: context.on_event("camera", text),
                 context.prepared.ground,
             )
+            distortion = device.detector.model.distortion
+            if distortion is not None:
+                context.on_event("camera", str(distortion))
             yield PoseProvider(measure, measure.facts)
 
 

@@ -19,7 +19,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.body_contrast import DEEP_SHADE, BodyContrast, links_at
 from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
-from snakewalk.controller.cameras.floor_markers import (
+from snakewalk.controller.cameras.ground_rest import Heights
+from snakewalk.controller.cameras.lens import Lens, projected
+from snakewalk.controller.cameras.markers.floor_markers import (
     Bump,
     Markers,
     PictureMove,
@@ -27,8 +29,7 @@ from snakewalk.controller.cameras.floor_markers import (
     fit_floor,
     picture_move,
 )
-from snakewalk.controller.cameras.ground_rest import Heights
-from snakewalk.controller.cameras.lens import Lens, projected
+from snakewalk.controller.cameras.markers.lens_residual import Distortion, marker_distortion
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose, track_pose
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
@@ -66,6 +67,8 @@ class CameraModel:
     """x, y by which the picture has moved since the homography was measured."""
     markers: Markers = field(default_factory=dict)
     """Printed markers in the picture in which the homography was measured."""
+    distortion: Distortion | None = None
+    """Distortion of an uncalibrated lens, where the markers show it; it is not undone."""
     heights: Heights | None = None
     """Heights of known ground above the floor of the homography; None: the ground is that floor."""
 
@@ -147,16 +150,21 @@ class CameraModel:
             fit = fit_floor(markers, places, lens)
         except InputError as fault:
             raise InputError(f"camera: markers_m: {fault}") from None
+        size_px, side_m = (background.shape[1], background.shape[0]), camera.marker_side_m
+        distortion = None if lens else marker_distortion(markers, places, size_px, side_m)
+        if distortion is not None and not distortion.is_certain:
+            distortion = None
         worst = max(fit.residual_m, key=lambda name: fit.residual_m[name])
         if fit.residual_m[worst] > MISPLACED_M:
+            cause = "is its place right, or another's?" if distortion is None else str(distortion)
             raise InputError(
                 f"camera: markers_m: marker {worst} lies {1e3 * fit.residual_m[worst]:.0f} mm from "
-                "where it must be by the others: is its place right, or another's?"
+                f"where it must be by the others: {cause}"
             )
         foot, height = np.array(centre_m, dtype=float), camera.height_m
         if fit.lens_m is not None:
             foot, height = fit.lens_m[:2], float(fit.lens_m[2])
-        return cls(fit.floor_from_px, foot, height, lens, markers=markers)
+        return cls(fit.floor_from_px, foot, height, lens, markers=markers, distortion=distortion)
 
     def matrix(self, size_px: tuple[int, int]) -> Floats:
         """(3, 3) camera matrix; without a known lens, that of a lens so high above this floor."""
@@ -375,7 +383,10 @@ class OverheadDetector:
         px = self.model.in_image(prior.links_m, self.axis_height_m)
         within = (px >= 0.0) & (px <= np.array(image.shape[1::-1]) - 1.0)
         fault = str(FrameStatus.CUT) if found.fault and not within.all() else found.fault
-        return replace(found, fault=fault, bump=self.bump)
+        covariance = found.covariance
+        if self.model.distortion is not None:
+            covariance = covariance + self.model.distortion.covariance
+        return replace(found, fault=fault, bump=self.bump, covariance=covariance)
 
     def _check_size(self, image: Image) -> None:
         floor = self.background

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.cameras.floor_markers import Bump
+from snakewalk.controller.cameras.markers.floor_markers import Bump
 from snakewalk.drivers.least_squares import least_squares
 
 REACH_M: Final = 0.10

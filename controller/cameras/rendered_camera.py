@@ -20,8 +20,8 @@ from snakewalk.controller.cameras.camera_frames import (
 )
 from snakewalk.controller.cameras.camera_pose import PriorAt
 from snakewalk.controller.cameras.floor_learning import FloorLearning
-from snakewalk.controller.cameras.floor_markers import marker_picture
 from snakewalk.controller.cameras.ground_rest import heights_of
+from snakewalk.controller.cameras.markers.floor_markers import marker_picture
 from snakewalk.controller.cameras.overhead_camera import (
     CameraModel,
     LineDetection,

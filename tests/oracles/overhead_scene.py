@@ -8,7 +8,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.cameras.floor_markers import marker_picture
+from snakewalk.controller.cameras.markers.floor_markers import marker_picture
 from snakewalk.controller.cameras.overhead_camera import CameraModel
 from snakewalk.controller.kinematics.links import body_in_world, half_lengths_m
 from snakewalk.drivers.types import BodyPose

@@ -7,7 +7,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
-from snakewalk.controller.cameras.floor_markers import COUNT, marker_sheet
+from snakewalk.controller.cameras.markers.floor_markers import COUNT, marker_sheet
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 

@@ -18,7 +18,7 @@ from snakewalk.controller.cameras.camera_check import CameraCheck, CameraReport
 from snakewalk.controller.cameras.camera_findings import Lock, camera_findings
 from snakewalk.controller.cameras.camera_latency import LatencyFit
 from snakewalk.controller.cameras.camera_watch import CameraWatch, device_locks
-from snakewalk.controller.cameras.floor_markers import Bump, FloorFit
+from snakewalk.controller.cameras.markers.floor_markers import Bump, FloorFit
 from snakewalk.controller.cameras.overhead_camera import CameraModel
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.run.factory import prepare_job

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.calibration_board import CalibrationBoard
-from snakewalk.controller.cameras.floor_markers import find_markers
 from snakewalk.controller.cameras.lens import Lens
+from snakewalk.controller.cameras.markers.floor_markers import find_markers
 from snakewalk.controller.cli.command_line import app
 from tests.oracles.board_view import board_pictures
 

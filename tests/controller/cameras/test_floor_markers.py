@@ -11,13 +11,13 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_world
 from snakewalk.controller.cameras.camera_pose import CameraPose
-from snakewalk.controller.cameras.floor_markers import (
+from snakewalk.controller.cameras.lens import Lens
+from snakewalk.controller.cameras.markers.floor_markers import (
     Markers,
     find_markers,
     fit_floor,
     picture_move,
 )
-from snakewalk.controller.cameras.lens import Lens
 from snakewalk.controller.cameras.overhead_camera import (
     CameraModel,
     LineDetection,

@@ -192,7 +192,7 @@ def fit_floor(
             f"{missing}: in the picture, lit, at least 14 px wide?"
         )
     px = {name: _plain(seen[name], lens) for name in used}
-    middles = np.array([_middle(px[name]) for name in used])
+    middles = np.array([middle_of(px[name]) for name in used])
     floor = np.array([places_m[name] for name in used], dtype=float)
     for what, places in (("the picture", middles), ("markers_m", floor)):
         size = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
@@ -320,7 +320,7 @@ def _over_floor(pose: tuple[Floats, Floats], matrix: Floats) -> Floats:
     return np.asarray(matrix @ np.column_stack([rotation[:, :2], shift]))
 
 
-def _middle(corners: Floats) -> Floats:
+def middle_of(corners: Floats) -> Floats:
     """Where the diagonals (4, 2) cross: the middle, aslant as well."""
     a, b, c, d = corners
     along = np.linalg.solve(np.column_stack([c - a, b - d]), b - a)

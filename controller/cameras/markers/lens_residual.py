@@ -1,0 +1,129 @@
+"""Distortion of an uncalibrated lens, from the printed markers on the floor.
+
+Without distortion, pixels and floor are one homography. Places and shapes of the markers then agree
+within the accuracy of their corners and of their measured places. The fit adds one radial
+coefficient about the picture's middle, and reports it only if it is significant.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.cameras.lens import projected
+from snakewalk.controller.cameras.markers.floor_markers import FEWEST, Markers, middle_of
+
+_CORNER_PX: Final = 0.3  # standard deviation of a corner (ours)
+_PLACE_M: Final = 0.004  # of the measured place of a marker, each coordinate (ours)
+_SIDE: Final = 0.02  # of the side of all prints, as a share (ours)
+_SURE: Final = 3.0  # standard deviations of the coefficient from 0 (ours)
+_STARTS: Final = 0.0, 0.1  # of the coefficient: a strong distortion has a second minimum (ours)
+_GRID: Final = 9  # points across the picture where the error is evaluated
+_SQUARE: Final = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])  # as printed
+_SPAN_M: Final = 1.0  # of floor over which a distortion turns a body (ours)
+NOTICEABLE_M: Final = 0.005
+"""A smaller error of a place on the floor is not reported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Distortion:
+    """Radial distortion that the markers show."""
+
+    coefficient: float
+    """Share by which radii grow when the distortion is undone, at half a picture's width."""
+    sigma: float
+    """Standard deviation of the coefficient."""
+    error_m: float
+    """Largest error on the floor between the markers, if the distortion is ignored."""
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the lens distorts noticeably and significantly."""
+        return abs(self.coefficient) > _SURE * self.sigma and self.error_m > NOTICEABLE_M
+
+    @property
+    def covariance(self) -> Floats:
+        """(3, 3) of x, y (m) and heading (rad) of a body, if the distortion is ignored."""
+        return np.diag([(0.5 * self.error_m) ** 2] * 2 + [(0.5 * self.error_m / _SPAN_M) ** 2])
+
+    def __str__(self) -> str:
+        """Warning with its remedy."""
+        return (
+            f"the floor's markers show that the lens distorts: places are up to "
+            f"{1e3 * self.error_m:.0f} mm off; calibrate it (snakewalk camera board, snakewalk "
+            "camera calibrate) and set [camera] lens"
+        )
+
+
+def marker_distortion(
+    seen: Markers,
+    places_m: Mapping[int, Sequence[float]],
+    size_px: tuple[int, int],
+    side_m: float,
+) -> Distortion | None:
+    """Estimate the distortion of a lens from markers in a picture.
+
+    Args:
+        seen: corners of the markers.
+        places_m: (2,) of the middle of each marker on the floor.
+        size_px: width and height of the picture.
+        side_m: of a printed marker.
+
+    Returns:
+        None of fewer than four markers, or of markers on a line.
+
+    """
+    names = sorted(set(seen) & set(places_m))
+    if len(names) < FEWEST:
+        return None
+    middle, unit = 0.5 * (np.array(size_px) - 1.0), 0.5 * size_px[0]
+    px = (np.array([seen[name] for name in names]) - middle) / unit
+    floor = np.array([places_m[name] for name in names], dtype=float)
+    start, _ = cv2.findHomography(np.array([middle_of(one) for one in px]), floor)
+    if start is None or not np.isfinite(start).all() or abs(start[2, 2]) < 1e-9:
+        return None
+    start = np.asarray(start, dtype=float) / start[2, 2]
+    corners = projected(start, px)
+    top = corners[:, 1] - corners[:, 0]
+    turns = np.arctan2(top[:, 1], top[:, 0])
+    metre_px = unit * float(np.mean(np.hypot(*(px[:, 1] - px[:, 0]).T) / np.hypot(*top.T)))
+    count = len(names)
+
+    def off(values: Floats) -> Floats:
+        homography = np.append(values[:8], 1.0).reshape(3, 3)
+        turn, away = values[10 : 10 + count], values[10 + count :].reshape(count, 2)
+        c, s = np.cos(turn), np.sin(turn)
+        spin = np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
+        squares = side_m * (1.0 + _SIDE * values[9]) * (_SQUARE @ spin)
+        wanted = (floor + _PLACE_M * away)[:, None] + squares
+        found = projected(homography, _undone(px, float(values[8])))
+        return np.concatenate([
+            ((found - wanted) * metre_px / _CORNER_PX).ravel(), away.ravel(), values[9:10]
+        ])  # fmt: skip
+
+    first = np.concatenate([start.ravel()[:8], [0.0, 0.0], turns, np.zeros(2 * count)])
+    fits = []
+    for coefficient in _STARTS:
+        first[8] = coefficient
+        fits.append(least_squares(off, first, method="lm", x_scale="jac", max_nfev=4000))
+    fit = min(fits, key=lambda one: float(one.cost))
+    inverse = np.linalg.pinv(fit.jac.T @ fit.jac)
+    spare = max(len(fit.fun) - len(first), 1)
+    sigma = float(np.sqrt(inverse[8, 8] * max(1.0, 2.0 * fit.cost / spare)))
+    homography = np.append(fit.x[:8], 1.0).reshape(3, 3)
+    low, high = px.min(axis=(0, 1)), px.max(axis=(0, 1))
+    sides = (np.linspace(a, b, _GRID) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(*sides), axis=-1)
+    ignored = projected(start, grid) - projected(homography, _undone(grid, float(fit.x[8])))
+    error_m = float(np.hypot(ignored[..., 0], ignored[..., 1]).max())
+    return Distortion(float(fit.x[8]), sigma, error_m)
+
+
+def _undone(points: Floats, coefficient: float) -> Floats:
+    """(..., 2) points about the middle of the picture without radial distortion."""
+    radius2 = np.square(points).sum(axis=-1, keepdims=True)
+    return np.asarray(points * (1.0 + coefficient * radius2))
