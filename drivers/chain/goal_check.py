@@ -22,6 +22,7 @@ FOREIGN_READS, OWN_READS = 2, 4
 of this run, which a lost write leaves behind (ours). A line that loses one packet in twenty loses
 four writes in a row once in 160,000 reads."""
 _SECOND_MASTER = "another program writes goals (a second master)"
+_LOST_TO_ALL = "no servo has the newest goals: the line or the adapter loses what is written"
 _REMEMBERED = 256
 """Goals that are known to be of this run (ours)."""
 
@@ -39,6 +40,8 @@ class _Difference:
     """Whether all of them returned the same value."""
     is_foreign: bool
     """Whether one of them returned a goal that was never sent."""
+    lag: int
+    """Number of newer goals than the returned one, in all of them; 0 if it varies."""
 
 
 class GoalCheck:
@@ -111,22 +114,27 @@ class GoalCheck:
         if not self._sent:
             return None
         reply, sent = self.cycle.read(), self._sent[-1]
-        value = int(np.ascontiguousarray(reply.data).view(self._kind)[joint, 0])
+        values = np.ascontiguousarray(reply.data).view(self._kind)[:, 0]
+        value = int(values[joint])
         if not reply.valid[joint] or value == sent[joint]:
             return None
         is_foreign = not any(goals[joint] == value for goals in self._sent)
         cause = _SECOND_MASTER if is_foreign else "its servo ignores the goals"
+        if not is_foreign and len(sent) > 1 and (values[reply.valid] != sent[reply.valid]).all():
+            cause = _LOST_TO_ALL
         return f"Goal Position is {value}, not {sent[joint]}: {cause}"
 
     def _note(self, joint: int, value: int) -> None:
         known = self._differences.get(joint)
-        is_foreign = not any(goals[joint] == value for goals in self._sent)
+        lag = next((k for k, goals in enumerate(reversed(self._sent)) if goals[joint] == value), -1)
+        is_foreign = lag < 0
         if known is None:
-            self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign)
+            self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lag)
         elif known.write < self._writes:
             known.count, known.write = known.count + 1, self._writes
             known.is_constant &= value == known.value
             known.is_foreign |= is_foreign
+            known.lag = lag if lag == known.lag else 0
             known.value = value
 
     def _fault(
@@ -141,8 +149,12 @@ class GoalCheck:
             return f"{self._labels[joints[0]]}: {reason}"
         if first.is_foreign:
             cause = _SECOND_MASTER
+        elif first.is_constant and 1 < len(joints) == len(self._labels):
+            cause = _LOST_TO_ALL
         elif first.is_constant:
             cause = "it ignores sync writes, or another program writes goals"
+        elif first.lag:
+            cause = f"it accepts goals {first.lag} cycle{'s' * (first.lag > 1)} late"
         else:
             cause = "writes to it get lost"
         names = ", ".join(self._labels[joint] for joint in joints)

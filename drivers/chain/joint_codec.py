@@ -286,6 +286,11 @@ class Readings:
         return np.asarray(self._temperature)
 
     @property
+    def motion(self) -> Floats:
+        """(3, J) newest currents, velocities and positions."""
+        return self._motion
+
+    @property
     def current_a(self) -> Floats:
         """(J,) newest currents."""
         return np.asarray(self._motion[0])

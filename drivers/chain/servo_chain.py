@@ -21,6 +21,7 @@ from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import GoalEncoder, JointUnits, Readings
 from snakewalk.drivers.chain.liveness import SLOW_EVERY, LivenessCheck, RegisterCheck
 from snakewalk.drivers.chain.lost_replies import LostReplies
+from snakewalk.drivers.chain.motion_sensors import MotionSensors
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
 from snakewalk.drivers.chain.soft_hold import limit_currents
 from snakewalk.drivers.chain.start_up import (
@@ -89,8 +90,7 @@ class ServoChain:
         self.inspection: Inspection | None = None
         """The servos as found by the last ``enable``."""
         self.on_event: Callable[[str], None] = lambda line: None
-        """Gets a line on each setting that another program has left in a servo, when fast reads are
-        given up, and when replies get lost again and again."""
+        """Gets a line on each changed setting, and on each fault that does not end a run."""
         self.on_state: Callable[[JointState], None] = lambda state: None
         """Gets each state that was read."""
         self._bus = bus
@@ -119,9 +119,8 @@ class ServoChain:
         """Whether ``check_servos`` was called since the last read; the next read leaves it out."""
         self._losses = LostReplies()
         self._alarms = AlarmReader(bus, robot, self._readings)
-        stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
-        names = [robot.joint_label(joint) for joint in range(robot.joint_count)]
-        self._sensors = TemperatureSensors(names, np.array(stall_a))
+        self._sensors = TemperatureSensors.of(robot)
+        self._motion_sensors = MotionSensors(robot)
         self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)
         self._armed = False
         self._sent_at_s = -np.inf
@@ -380,7 +379,8 @@ class ServoChain:
         """Decode a group read of the state, or one more in this cycle; returns its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
-        for line in self._alarms.update(alerted):
+        lines = self._motion_sensors.update(self._readings.motion, reply.valid, measured_at_s)
+        for line in (*self._alarms.update(alerted), *lines):
             self.on_event(line)
         return measured_at_s
 

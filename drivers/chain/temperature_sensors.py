@@ -1,7 +1,7 @@
 """Temperature sensors: whether what they measure can be the motors' heat.
 
-A dead sensor reads 0, or never changes. The motor then gets hot without a warning, so the run
-reports it.
+A dead sensor reads 0, never changes, or jumps. The motor then gets hot without a warning, so the
+run reports it.
 """
 
 import math
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.robot import RobotConfig
 
 RISE_S_PER_K = 2.0
 """Time at full output and at rest that warms a motor by a kelvin, s (ours). It is the heat of the
@@ -24,6 +25,9 @@ EXPECTED_ALONE_K = 12.0
 as it is for a while."""
 CHANGED_K = 3.0
 """Change that shows a sensor that works (ours)."""
+JUMP_K, JUMP_K_S = 8.0, 1.0
+"""A reading that changes by more than this, and by this for each second, is not a temperature
+(ours): twice the heat of the stall current."""
 _LONGEST_STEP_S = 5.0
 """A pause between two readings counts as this much, s (ours)."""
 
@@ -46,12 +50,20 @@ class TemperatureSensors:
         self._is_reported = np.zeros(joints, np.bool_)
         self.expected_rise_k = np.zeros(joints)
         """(J,) by which the currents so far warm the motors."""
+        self._last_c = np.full(joints, np.nan)
         self._time_s = math.inf
+
+    @classmethod
+    def of(cls, robot: RobotConfig) -> "TemperatureSensors":
+        """Start without a reading of the servos of ``robot``."""
+        stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
+        return cls([robot.joint_label(k) for k in range(robot.joint_count)], np.array(stall_a))
 
     def update(self, temperature_c: Floats, current_a: Floats, time_s: float) -> list[str]:
         """Evaluate a reading of all joints (J,), NaN where unknown; returns lines to report."""
-        step_s = min(max(time_s - self._time_s, 0.0), _LONGEST_STEP_S)
-        self._time_s = time_s
+        since_s = max(time_s - self._time_s, 0.0)
+        step_s = min(since_s, _LONGEST_STEP_S)
+        before_c, self._last_c, self._time_s = self._last_c, temperature_c.copy(), time_s
         heat_k_s = (np.nan_to_num(current_a) / self._stall_a) ** 2 / RISE_S_PER_K
         self.expected_rise_k += step_s * (heat_k_s - self.expected_rise_k / COOLING_S)
         self._first_c = np.where(np.isnan(self._first_c), temperature_c, self._first_c)
@@ -62,11 +74,18 @@ class TemperatureSensors:
         is_frozen &= np.isfinite(self._first_c)
         if is_frozen.any() and not self._others_warm_up(change_k):
             is_frozen &= self._is_constant.all() & (self.expected_rise_k >= EXPECTED_ALONE_K)
+        has_jumped = np.abs(temperature_c - before_c) > JUMP_K + JUMP_K_S * since_s
         lines = []
-        for joint in np.flatnonzero((is_zero | is_frozen) & ~self._is_reported).tolist():
+        is_dead = is_zero | is_frozen | has_jumped
+        for joint in np.flatnonzero(is_dead & ~self._is_reported).tolist():
             self._is_reported[joint] = True
             if is_zero[joint]:
                 what = "temperature reads 0 C"
+            elif has_jumped[joint]:
+                what = (
+                    f"temperature has changed from {before_c[joint]:.0f} to "
+                    f"{temperature_c[joint]:.0f} C in {since_s:.1f} s"
+                )
             else:
                 what = (
                     f"temperature has read {temperature_c[joint]:.0f} C since the start, though "

@@ -7,7 +7,8 @@ ground may hold a current-limited joint off its goal for long, but then its serv
 the current that it is allowed.
 
 The current is evidence at small errors, too: a motor whose output stage works draws current as soon
-as its joint is off the goal and slow. If it draws next to none, the output stage is dead.
+as its joint is off the goal and slow. If it draws next to none, the output stage is dead. A
+velocity sensor may be dead as well, so a joint is also slow if its positions are.
 """
 
 import math
@@ -44,8 +45,8 @@ class FollowingError:
         joints = len(limits.limit_rad)
         output = np.zeros((3, joints)) if limits.output is None else limits.output
         self._rules = np.vstack([limits.following_limit_rad, limits.following_effort_a, output])
-        self._memory = np.zeros((2, joints))
-        self._since_s, self._idle_s = self._memory
+        self._memory = np.zeros((3, joints))
+        self._since_s, self._idle_s, self._last_rad = self._memory
         self.joint = -1
         """Joint of the newest reason to stop."""
         self.is_idle = False
@@ -56,6 +57,7 @@ class FollowingError:
         """Forget the past: the joints rest at their goals."""
         self._since_s[:] = np.nan
         self._idle_s[:] = 0.0
+        self._last_rad[:] = np.nan
         self._time_s = math.inf
 
     def update(self, state: JointState, goal_rad: Floats) -> str | None:
@@ -88,7 +90,8 @@ class FollowingError:
         return (
             f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal with "
             f"{state.current_a[joint]:.2f} A, expected about {expected_a:.2f} A: its motor does "
-            "not push: dead output stage, loose motor wire, or weakened by another program"
+            "not push: dead output stage, loose motor wire, weakened by another program, or a dead "
+            "current or position sensor"
         )
 
 
@@ -123,14 +126,16 @@ def _judge(
         last_s: time of the previous state; infinite for the first state.
         rules: (5, J) limit of the error, rad; current towards the goal that excuses it, A; and
             ``SafetyLimits.output``.
-        memory: (2, J) time since which a joint does not follow, or NaN; time without current, s.
+        memory: (3, J) time since which a joint does not follow, or NaN; time without current, s;
+            previous position, or NaN.
 
     Returns:
         The first joint whose motor has drawn no current for ``IDLE_TIME_S``, else the joint that
         has not followed for longest, else -1.
 
     """
-    step_s = min(max(time_s - last_s, 0.0), LONGEST_STEP_S)
+    since_s = time_s - last_s
+    step_s = min(max(since_s, 0.0), LONGEST_STEP_S)
     longest, idle = -1, -1
     for k in range(len(goal_rad)):
         if valid[k]:
@@ -147,8 +152,13 @@ def _judge(
                 expected_a = min(share * rules[3, k], rules[4, k])
                 if towards_a >= IDLE_SHARE * expected_a:
                     memory[1, k] = 0.0
-                elif share >= IDLE_OUTPUT and sign * velocity_rad_s[k] < SLOW_RAD_S:
-                    memory[1, k] += step_s
+                elif share >= IDLE_OUTPUT:
+                    # a velocity sensor may be dead, too, so the positions count as well
+                    moved_rad = sign * (position_rad[k] - memory[2, k])
+                    is_slow = sign * velocity_rad_s[k] < SLOW_RAD_S
+                    if is_slow or moved_rad < SLOW_RAD_S * since_s:
+                        memory[1, k] += step_s
+            memory[2, k] = position_rad[k]
             if idle < 0 and memory[1, k] >= IDLE_TIME_S:
                 idle = k
         if not np.isnan(memory[0, k]) and (longest < 0 or memory[0, k] < memory[0, longest]):

@@ -67,7 +67,7 @@ class MeasuredSteps:
         doubt = (
             f"{limits.joint_names[joint]}: measured {position_rad[joint]:.2f} rad after "
             f"{believed.position_rad[joint]:.2f} rad: no servo turns so fast: two servos with one "
-            "ID, exchanged IDs, a changed zero, or a lost turn count"
+            "ID, exchanged IDs, a changed zero, a lost turn count, or a position sensor that fails"
         )
         return _held(state, believed, doubted | ~state.valid), doubt
 

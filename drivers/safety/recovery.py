@@ -100,6 +100,8 @@ class Recovery(Generic[C]):
         self._confirm, self._on_event = confirm, on_event
         self.overload_reboots = overload_reboots
         """How many are left."""
+        self.refusal: str | None = None
+        """Why the last interruption was not recovered from; None if the policy forbids it."""
 
     def recover(
         self, reason: str, believed_rad: Floats, stopped: Callable[[], str | None]
@@ -116,7 +118,11 @@ class Recovery(Generic[C]):
             DriverError: it broke again while going on.
 
         """
-        if self._policy == "stop" or self._remaining <= 0:
+        self.refusal = None
+        if self._policy == "stop":
+            return None
+        if self._remaining <= 0:
+            self.refusal = "no more interruptions are recovered from in this run"
             return None
         self._remaining -= 1
         event = f"interrupted: {reason}; the servos hold"
@@ -141,6 +147,7 @@ class Recovery(Generic[C]):
             DriverError: it broke again while going on.
 
         """
+        self.refusal = None
         if self.overload_reboots <= 0:
             return None
         self.overload_reboots -= 1
@@ -165,11 +172,11 @@ class Recovery(Generic[C]):
             raise ChainError(f"{doubt}; check that it is the same robot, then start again")
         is_asked = self._policy == "confirm" or doubt is not None
         if is_asked and not (self._confirm and self._confirm(str(found))):
-            self._on_event("not confirmed")
+            self._give_up("not confirmed")
             return None
         why = stopped()
         if why is not None:
-            self._on_event(f"given up: {why}")
+            self._give_up(f"given up: {why}", why)
             return None
         state = self._chain.resume(found)
         self._on_event("going on from where it stands")
@@ -204,9 +211,14 @@ class Recovery(Generic[C]):
                 last = str(error)
             why = stopped()
             if why is not None or self._clock.now_s() >= give_up_s:
-                self._on_event(f"given up: {why or last}")
+                self._give_up(f"given up: {why or last}", why or last)
                 return None
             self._clock.sleep_until_s(self._clock.now_s() + _RETRY_S)
+
+    def _give_up(self, event: str, refusal: str | None = None) -> None:
+        """Report an end of the recovery, and keep its reason."""
+        self.refusal = refusal or event
+        self._on_event(event)
 
     def _try_reopen(self) -> str | None:
         """Open what is gone; why it cannot be, which ``patience_s`` waits for to change."""

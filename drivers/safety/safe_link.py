@@ -337,6 +337,9 @@ class SafeLink:
             except DriverError as again:
                 fault = again
                 reason = f"{reason}; while going on: {again}"
+            refusal = self._recovery.refusal
+            if state is None and refusal is not None and refusal not in reason:
+                reason = f"{reason}; not continued: {refusal}"
         if state is None:
             self._trip(reason)
             raise SafetyTrippedError(str(self.tripped)) from fault

@@ -59,9 +59,7 @@ def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> N
         assert not [event for event in other.events if event.kind == "friction"]
 
 
-def test_the_same_run_finds_the_same(
-    slalom: tuple[RunRecord, RunSummary], tmp_path: Path
-) -> None:
+def test_the_same_run_finds_the_same(slalom: tuple[RunRecord, RunSummary], tmp_path: Path) -> None:
     one, _ = slalom
     two, _ = walked(tmp_path / "two", "flat-slalom", **PLANTED)
     np.testing.assert_array_equal(one.friction.along, two.friction.along)

@@ -91,18 +91,42 @@ def test_a_servo_that_ignores_sync_writes_is_named(rig: Rig) -> None:
     assert "it ignores sync writes" in str(rig.link.tripped)
 
 
-def test_writes_that_get_lost_are_named(rig: Rig) -> None:
-    """A servo that takes only every third write holds goals of this run, all of them old."""
+@pytest.mark.parametrize(
+    ("lags", "cause"),
+    [
+        ((3,), "it accepts goals 3 cycles late"),
+        ((1,), "it accepts goals 1 cycle late"),
+        ((2, 3, 4), "writes to it get lost"),
+    ],
+)
+def test_older_goals_are_named_as_late_or_as_lost(
+    rig: Rig, lags: tuple[int, ...], cause: str
+) -> None:
+    """A servo that obeyed each goal two cycles late was reported as one that loses writes."""
     goals: list[int] = []
 
     def lag() -> None:
         goals.append(int(rig.line.bank["Goal Position"][3]))
-        rig.write_goals([3], goals[-4] if len(goals) > 3 else goals[-1])
+        cycles = lags[len(goals) % len(lags)]
+        rig.write_goals([3], goals[-1 - cycles] if len(goals) > cycles else goals[-1])
 
     rig.disturb = lag
     assert rig.swing(3 * SLOW_EVERY, 0.2) < 3 * SLOW_EVERY
     assert "joint yaw_04 (ID 4)" in str(rig.link.tripped)
-    assert "writes to it get lost" in str(rig.link.tripped)
+    assert str(rig.link.tripped).endswith(cause)
+
+
+def test_goals_that_reach_no_servo_are_lost_by_the_line(rig: Rig) -> None:
+    """The run blamed one servo: its servo ignores the goals."""
+    held = [int(each) for each in rig.line.bank["Goal Position"]]
+
+    def restore() -> None:
+        for joint, raw in enumerate(held):
+            rig.write_goals([joint], raw)
+
+    rig.disturb = restore
+    assert rig.swing(3 * SLOW_EVERY, 0.5) < 3 * SLOW_EVERY
+    assert "the line or the adapter loses what is written" in str(rig.link.tripped)
 
 
 def test_a_single_difference_is_no_fault(rig: Rig) -> None:

@@ -91,6 +91,14 @@ def test_older_goals_that_change_are_lost_writes() -> None:
     rig = Rig()
     rig.cycle()
     with pytest.raises(BusError, match=r"^b: Goal Position is 14, not 15: writes to it get lost$"):
+        rig.cycles([{1: value} for value in (11, 11, 12, 14)])
+
+
+def test_goals_that_are_late_by_the_same_number_of_cycles_are_named_so() -> None:
+    rig = Rig()
+    rig.cycle()
+    cause = r"^b: Goal Position is 14, not 15: it accepts goals 1 cycle late$"
+    with pytest.raises(BusError, match=cause):
         rig.cycles([{1: 11 + k} for k in range(OWN_READS)])
 
 

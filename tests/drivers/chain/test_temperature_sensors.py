@@ -49,6 +49,30 @@ def test_a_temperature_of_zero_is_reported_at_once_and_once() -> None:
     assert found.update(reading, np.zeros(J), STEP_S) == []
 
 
+@pytest.mark.parametrize(("after_c", "is_reported"), [(33, False), (34, True), (16, True)])
+def test_a_temperature_that_jumps_is_reported_once(after_c: int, *, is_reported: bool) -> None:
+    """A sensor that alternated between 30 and 70 C was silent."""
+    found = sensors()
+    steady = np.full(J, 25.0)
+    jumped = np.array([25.0, 25.0, after_c, 25.0])
+    lines = [
+        line
+        for k in range(20)
+        for line in found.update(jumped if k % 4 == 3 else steady, np.zeros(J), k * STEP_S)
+    ]
+    assert len(lines) == is_reported
+    if is_reported:
+        assert lines[0].startswith(
+            f"joint yaw_03 (ID 3): temperature has changed from 25 to {after_c} C in 0.3 s"
+        )
+
+
+def test_a_temperature_may_change_during_a_pause() -> None:
+    found = sensors()
+    assert found.update(np.full(J, 25.0), np.zeros(J), 0.0) == []
+    assert found.update(np.full(J, 40.0), np.zeros(J), 10.0) == []
+
+
 def test_a_temperature_that_does_not_rise_with_the_others_is_reported() -> None:
     (line,) = warm_up([10.0, 10.0, 0.0, 8.0], 60.0)
     assert line.startswith("joint yaw_03 (ID 3): temperature has read 25 C since the start")

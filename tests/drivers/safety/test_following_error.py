@@ -183,6 +183,7 @@ def idle(
     *,
     joint: int = 0,
     speed_rad_s: float = 0.0,
+    moved_rad_s: float = 0.0,
     seconds: float = 0.4,
     following: FollowingError | None = None,
     start_s: float = 0.0,
@@ -191,12 +192,14 @@ def idle(
     """Time after which a joint, held at an error with a current, is a fault; None if never."""
     following = following or FollowingError(JUDGED)
     for k in range(round(seconds / step_s) + 1):
+        position_rad = moved_rad_s * k * step_s
         found = state(
             time_s=start_s + k * step_s,
+            position_rad=one(position_rad, joint),
             current_a=one(amps, joint),
             velocity_rad_s=one(speed_rad_s, joint),
         )
-        fault = following.update(found, one(error_rad, joint))
+        fault = following.update(found, one(position_rad + error_rad, joint))
         if fault is not None:
             assert fault.startswith(JUDGED.joint_names[joint])
             assert "its motor does not push" in fault
@@ -240,9 +243,16 @@ def test_a_tenth_of_the_expected_current_towards_the_goal_shows_that_it_works(
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_a_joint_that_turns_towards_its_goal_may_draw_no_current(sign: float) -> None:
     """The motor's own voltage takes the output up."""
-    assert idle(sign * 0.1, 0.0, speed_rad_s=sign * 0.3) is None
-    assert idle(sign * 0.1, 0.0, speed_rad_s=sign * 0.299) is not None
+    assert idle(sign * 0.1, 0.0, speed_rad_s=sign * 0.3, moved_rad_s=sign * 0.31) is None
+    assert idle(sign * 0.1, 0.0, speed_rad_s=sign * 0.299, moved_rad_s=sign * 0.31) is not None
     assert idle(sign * 0.1, 0.0, speed_rad_s=-sign * 2.0) is not None
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_dead_velocity_sensor_does_not_hide_a_motor_without_current(sign: float) -> None:
+    """A velocity that always read 2.4 rad/s hid a dead output stage for the whole run."""
+    assert idle(sign * 0.1, 0.0, speed_rad_s=sign * 2.4) is not None
+    assert idle(sign * 0.1, 0.0, speed_rad_s=sign * 2.4, moved_rad_s=sign * 0.29) is not None
 
 
 def test_the_time_without_current_adds_up_between_errors_that_show_nothing() -> None:

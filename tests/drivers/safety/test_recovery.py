@@ -280,7 +280,7 @@ def test_what_is_not_as_it_was_does_not_go_on(
     rig.line.pull(0.3)
     change(rig)
     before = rig.position
-    with pytest.raises(SafetyTrippedError):
+    with pytest.raises(SafetyTrippedError, match=r"closed; not continued: .*" + re.escape(said)):
         rig.cycles(1)
     assert said in rig.events[-1]
     assert rig.events[-1].startswith("given up: ")

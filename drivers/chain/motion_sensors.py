@@ -1,0 +1,145 @@
+"""Motion sensors: whether current, velocity and position of a joint contradict each other.
+
+A sensor that always reports the same value hides what it should measure: a current above its limit,
+a dead output stage, a joint that stands. While a joint moves, its other readings show that. The run
+reports it.
+"""
+
+import math
+
+import numpy as np
+
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+CURRENT_READS, CURRENT_TRAVEL_RAD, BACK_RAD = 25, 0.5, 0.2
+"""A sensor is dead if a current stays the same for that many reads and that much travel, part of it
+back again (ours). Friction alone changes its sign when a joint turns back."""
+SATURATED = 0.9
+"""Share of a current limit from which on the limit keeps a current constant (ours)."""
+SPEED_READS, MISMATCH_RAD, MISMATCH_RAD_S = 25, 0.15, 0.1
+"""Position and velocity contradict each other if one of them stays the same for that many reads.
+The position must also differ from the integral of the velocity by this, and by this for each second
+(ours). The coarsest velocity unit is 0.08 rad/s."""
+WINDOW_S = 2.0
+"""A comparison of position and velocity begins again after this time (ours)."""
+LONGEST_STEP_S = 0.1
+"""A comparison begins again after a longer pause, s (ours)."""
+_FLOATS = readonly_array()
+_CURRENT, _VELOCITY, _POSITION = range(3)
+
+
+class MotionSensors:
+    """Compares the readings of J joints; reports each sensor once."""
+
+    def __init__(self, robot: RobotConfig) -> None:
+        """Start without a reading of the joints of ``robot``."""
+        joints = robot.joint_count
+        self._names = [robot.joint_label(joint) for joint in range(joints)]
+        self._limits_a = np.array(robot.current_limits_a)
+        self._last = np.full((3, joints), np.nan)
+        self._since = np.zeros((3, 4, joints))
+        self._is_dead = np.zeros((3, joints), np.bool_)
+        self._reported = self._is_dead.copy()
+        self._time_s = -math.inf
+
+    def update(self, motion: Floats, valid: Bools, time_s: float) -> list[str]:
+        """Evaluate currents, velocities and positions (3, J); returns lines to report.
+
+        Args:
+            motion: newest readings, A, rad/s and rad; NaN where unknown.
+            valid: (J,) whether a joint was read.
+            time_s: time of the readings.
+
+        """
+        step_s, self._time_s = time_s - self._time_s, time_s
+        if not 0.0 < step_s <= LONGEST_STEP_S:
+            self._last.fill(np.nan)
+        if not _compare(
+            *(motion, valid, step_s, self._limits_a),
+            *(self._last, self._since, self._is_dead),
+        ):
+            return []
+        new = self._is_dead & ~self._reported
+        self._reported |= new
+        return [self._line(int(sensor), int(joint), motion) for sensor, joint in np.argwhere(new)]
+
+    def _line(self, sensor: int, joint: int, motion: Floats) -> str:
+        value = motion[sensor, joint]
+        if sensor == _CURRENT:
+            what = f"current reads {value:.2f} A all the time, though the joint moves"
+            effect = "nothing watches its load"
+        elif sensor == _VELOCITY:
+            what = f"velocity reads {value:.2f} rad/s all the time, though its position differs"
+            effect = "a dead output stage may stay undetected"
+        else:
+            what = f"position reads {value:.2f} rad all the time, though its velocity is not 0"
+            effect = "nothing watches whether it follows"
+        name = self._names[joint]
+        return f"{name}: {what}: its sensor may be dead, and {effect}; stop the run and check it"
+
+
+@compiled(
+    f"boolean({readonly_array(dimensions=2)}, {readonly_array('boolean')}, float64, {_FLOATS},"
+    " float64[:, ::1], float64[:, :, ::1], boolean[:, ::1])",
+    makes_arrays=False,
+)
+def _compare(
+    motion: Floats,
+    valid: Bools,
+    step_s: float,
+    limits_a: Floats,
+    last: Floats,
+    since: Floats,
+    is_dead: Bools,
+) -> bool:
+    """Note for how long each reading stays the same, and how far its joint moves meanwhile.
+
+    Args:
+        motion: (3, J) currents, velocities, positions.
+        valid: (J,) whether a joint was read; the others keep their notes.
+        step_s: time since the previous readings.
+        limits_a: (J,) limits of the current; infinite without one.
+        last: (3, J) previous readings; NaN: begin again.
+        since: (3, 4, J) since each reading changed: reads, time, and for the current the travel and
+            the displacement, for the others displacement and integral of the velocity.
+        is_dead: (3, J) sensors that contradict the others; added to.
+
+    Returns:
+        Whether a sensor was added.
+
+    """
+    found = False
+    for k in range(motion.shape[1]):
+        if not valid[k]:
+            continue
+        moved = motion[2, k] - last[2, k]
+        turned = 0.5 * (motion[1, k] + last[1, k]) * step_s
+        for n in range(3):
+            begins = motion[n, k] != last[n, k] or np.isnan(moved) or np.isnan(turned)
+            if n > 0 and since[n, 1, k] >= WINDOW_S:
+                begins = True
+            if begins:
+                since[n, :, k] = 0.0
+            elif not is_dead[n, k]:
+                since[n, 0, k] += 1.0
+                since[n, 1, k] += step_s
+                since[n, 2, k] += abs(moved) if n == 0 else moved
+                since[n, 3, k] += moved if n == 0 else turned
+                reads, first, second = since[n, 0, k], since[n, 2, k], since[n, 3, k]
+                if n == 0:
+                    is_dead[n, k] = (
+                        reads >= CURRENT_READS
+                        and first >= CURRENT_TRAVEL_RAD
+                        and first - abs(second) >= BACK_RAD
+                        and abs(motion[0, k]) < SATURATED * limits_a[k]
+                    )
+                else:
+                    limit = MISMATCH_RAD + MISMATCH_RAD_S * since[n, 1, k]
+                    is_dead[n, k] = reads >= SPEED_READS and abs(first - second) >= limit
+                    if n == 1 and first == 0.0:  # both stay the same: the position is reported
+                        is_dead[n, k] = False
+                found |= is_dead[n, k]
+            last[n, k] = motion[n, k]
+    return found

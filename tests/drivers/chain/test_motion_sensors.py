@@ -1,0 +1,155 @@
+"""Current, velocity and position sensors that always read the same are reported, and no others."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from snakewalk.config.robot import RobotConfig, ServoConfig
+from snakewalk.config.run import SafetyConfig
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.chain.motion_sensors import (
+    BACK_RAD,
+    CURRENT_READS,
+    CURRENT_TRAVEL_RAD,
+    LONGEST_STEP_S,
+    SATURATED,
+    SPEED_READS,
+    MotionSensors,
+)
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.safety.limits import SafetyLimits
+from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.types import JointCommand
+from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+
+ROBOT = RobotConfig(
+    name="two",
+    joint_axes="yp",
+    servo=ServoConfig(pitch_p_gain=800, pitch_current_limit_a=0.5),
+)
+STEP_S = 0.02
+READ = np.ones(2, bool)
+Change = Callable[[np.ndarray], None]
+
+
+def swing(
+    change: Change,
+    cycles: int = 200,
+    *,
+    amplitude_rad: float = 0.3,
+    step_s: float = STEP_S,
+    valid: np.ndarray = READ,
+) -> list[tuple[int, str]]:
+    """Lines, and the readings at which they come; two joints swing at 2.5 rad/s."""
+    sensors, lines = MotionSensors(ROBOT), []
+    phase = np.array([0.3, 1.1])
+    for k in range(cycles):
+        angle = 2.5 * k * step_s + phase
+        motion = np.stack(
+            [
+                0.2 * np.cos(angle),
+                2.5 * amplitude_rad * np.cos(angle),
+                amplitude_rad * np.sin(angle),
+            ]
+        )
+        change(motion)
+        lines += [(k, line) for line in sensors.update(motion, valid, k * step_s)]
+    return lines
+
+
+def hold(sensor: int, value: float, joint: int = 0) -> Change:
+    """A reading of one joint that is always the same."""
+
+    def change(motion: np.ndarray) -> None:
+        motion[sensor, joint] = value
+
+    return change
+
+
+def test_readings_that_agree_are_not_reported() -> None:
+    assert swing(lambda motion: None, 3000) == []
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("amps", [0.0, 0.4, -0.44])
+def test_a_current_that_stays_the_same_while_the_joint_turns_back_is_reported_once(
+    amps: float, joint: int
+) -> None:
+    ((k, line),) = swing(hold(0, amps, joint), 1000)
+    name = ROBOT.joint_label(joint)
+    assert line.startswith(f"{name}: current reads {amps:.2f} A all the time")
+    assert CURRENT_READS <= k < 100
+
+
+def test_a_current_at_its_limit_may_stay_the_same() -> None:
+    assert swing(hold(0, 0.5 * SATURATED, joint=1)) == []
+    assert len(swing(hold(0, 0.5 * SATURATED, joint=0))) == 1  # a yaw joint has no limit
+
+
+@pytest.mark.parametrize("speed_rad_s", [0.0, 2.4, -785.0])
+def test_a_velocity_that_stays_the_same_is_reported_if_the_position_differs(
+    speed_rad_s: float,
+) -> None:
+    ((k, line),) = swing(hold(1, speed_rad_s))
+    assert "joint yaw_01 (ID 1): velocity reads" in line
+    assert SPEED_READS <= k < 50
+
+
+def test_a_position_that_stays_the_same_is_reported_if_the_velocity_is_not_zero() -> None:
+    ((_, line),) = swing(hold(2, 0.1))
+    assert "joint yaw_01 (ID 1): position reads 0.10 rad all the time" in line
+
+
+def test_a_frozen_servo_is_reported_once() -> None:
+    def frozen(motion: np.ndarray) -> None:
+        motion[:, 0] = 0.1, -0.3, 0.2
+
+    ((_, line),) = swing(frozen)
+    assert "position reads 0.20 rad all the time" in line
+
+
+def test_a_joint_at_rest_is_not_reported() -> None:
+    def rest(motion: np.ndarray) -> None:
+        motion[:] = np.array([[0.1, 0.1], [0.0, 0.0], [0.2, 0.2]])
+
+    assert swing(rest, 1000) == []
+
+
+def test_a_constant_speed_with_its_constant_current_is_not_reported() -> None:
+    """A simulated joint that slews has both."""
+    sensors = MotionSensors(ROBOT)
+    for k in range(300):
+        motion = np.array([[0.1, 0.1], [0.5, 0.5], [0.5 * k * STEP_S, 0.5 * k * STEP_S]])
+        assert sensors.update(motion, READ, k * STEP_S) == []
+
+
+def test_unread_unknown_and_rare_readings_are_not_judged() -> None:
+    assert swing(hold(0, 0.1), valid=np.zeros(2, bool)) == []
+    assert swing(hold(0, np.nan)) == []
+    assert swing(hold(1, 0.0), step_s=LONGEST_STEP_S + 0.01) == []
+
+
+def test_the_travel_of_a_constant_current_must_suffice() -> None:
+    least_rad = min(CURRENT_TRAVEL_RAD, 2.0 * BACK_RAD)
+    assert swing(hold(0, 0.1), 126, amplitude_rad=least_rad / 8) == []  # a period
+
+
+def test_a_run_reports_a_dead_current_sensor() -> None:
+    """The run went on without a word, and nothing watched the load of the joint."""
+    line = SimLine(ServoBank(ROBOT.servo_ids), BenchPlant(2))
+    chain = ServoChain(DynamixelBus(line), ROBOT)
+    events: list[str] = []
+    chain.on_event = events.append
+    link = SafeLink(chain, SafetyLimits.from_config(ROBOT, SafetyConfig()), line.clock)
+    link.enable()
+    line.firmware.set_reading(np.array([0]), "Present Current", 30)
+    start_s = line.clock.now_s()
+    for k in range(150):
+        line.clock.sleep_until_s(start_s + k * STEP_S)
+        link.read()
+        link.write(JointCommand(line.clock.now_s(), np.full(2, 0.3 * np.sin(2.5 * k * STEP_S))))
+    (event,) = events
+    assert event.startswith("joint yaw_01 (ID 1): current reads 0.08 A all the time")
