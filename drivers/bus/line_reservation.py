@@ -1,8 +1,7 @@
-"""Until when a line carries what was sent on it: no reply begins before.
+"""Time until which a line carries the bytes that were sent: no reply begins earlier.
 
-A write returns long before its bytes have left. The time of a reply counts from when the line is
-free, also if another request is still on it. A reply that is complete before it can have crossed
-the line is an older one that came twice.
+A write returns before its bytes have left. A reply that is complete before it can have crossed the
+line is a copy of an older one.
 """
 
 import numpy as np

@@ -1,8 +1,4 @@
-"""Requests that receive until the line is quiet, which shows more than one strict reply.
-
-Servos with the same ID reply at the same time. Their bytes collide, or both replies arrive where
-return delays or clocks differ. Another master's packets come unasked.
-"""
+"""Requests that receive until the line is quiet: they show servos with one ID, or other masters."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""Fingerprint: the settings in a servo's EEPROM that say how its joint is mounted and protected.
-
-A zero or a direction that another program changes while torque is off leaves a servo that replies
-as before and moves its joint to another angle.
-"""
+"""Fingerprint: EEPROM settings of a servo that determine zero, direction and limits of a joint."""
 
 from collections.abc import Mapping
 

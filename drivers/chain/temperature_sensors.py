@@ -1,7 +1,6 @@
-"""Temperature sensors: whether what they measure can be the motors' heat.
+"""Temperature sensors: whether their readings follow the heat of the motors.
 
-A dead sensor reads 0, or never changes. The motor then gets hot without a warning, so the run
-reports it.
+A dead sensor reads 0, or never changes.
 """
 
 import math

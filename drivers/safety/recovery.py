@@ -1,11 +1,8 @@
 """Recovery: the reaction to a line or a servo that goes away during a run.
 
-The servos hold by themselves: their watchdogs stop them where they are, torque on. The recovery
-opens the port again, compares the chain with its earlier state, and goes on from its present pose;
-but only if the run's policy, or an operator, allows it.
-
-A servo that an overload has shut down can be brought back in the same way, if the run allows it: it
-is rebooted first. No other alarm is recovered from.
+The watchdogs hold the servos meanwhile. The recovery opens the port again, compares the chain with
+its earlier state, and continues from the present pose if the policy or an operator permits it. A
+servo that an overload has shut down is rebooted first, if the run permits it.
 """
 
 import math

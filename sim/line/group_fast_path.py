@@ -1,9 +1,8 @@
 """Group fast path: the two packets of a control cycle for all servos at once.
 
 A slice of the control tables and one CRC pass give the same bytes as
-``sim.line.instruction_handler`` does servo by servo (a test compares them), at a cost that hardly
-grows with the number of servos. Stuffing, a missing ID, a silent servo and other special cases are
-left to the handler.
+``sim.line.instruction_handler``, which handles all special cases (stuffing, a missing ID, a silent
+servo).
 """
 
 from abc import ABC, abstractmethod

@@ -1,7 +1,7 @@
-"""A twin: a second body, put where the robot is, on which motion is tried before it is made.
+"""A twin: a second simulated body at the robot's pose, on which a motion is tried first.
 
-Its joints are driven to their goals as servos drive them, without a bus. It is stepped twice as
-coarsely as the body that it foretells.
+Its joints have motors like those of servos, without a bus. Its steps are twice as long as those of
+the robot.
 """
 
 import mujoco

@@ -1,7 +1,7 @@
 """The body's shade on the ground, as flat dark patches under the sun.
 
-MuJoCo's shadow maps need half of a software renderer's time. Drawn by OSMesa, they also leave out
-everything less than half a metre above the ground: all of a snake.
+MuJoCo's shadow maps need half of a software renderer's time. With OSMesa they also omit everything
+below half a metre.
 """
 
 import mujoco
