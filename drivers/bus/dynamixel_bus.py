@@ -180,10 +180,7 @@ class DynamixelBus:
 
         A servo that refuses a block is asked register by register.
 
-        Args:
-            servo_id: ID of the servo.
-            names: the registers.
-            optional: registers that a firmware may lack; missing from the result, or 0.
+        ``optional`` registers, which a firmware may lack, are missing from the result, or 0.
 
         Raises:
             ControlTableError: no such register.
@@ -262,11 +259,7 @@ class DynamixelBus:
     def write_verified(self, servo_id: int, name: str, value: int, *, kept: bool = False) -> None:
         """Write a register if it differs, and read it back: EEPROM wears out, and writes get lost.
 
-        Args:
-            servo_id: ID of the servo.
-            name: the register.
-            value: as it is in the register.
-            kept: write as ``write_kept`` does.
+        With ``kept`` it writes as ``write_kept`` does.
 
         Raises:
             BusError: it does not read back as written.

@@ -44,11 +44,7 @@ class LineReservation:
     def came_twice(self, free_s: float, request_s: float, reply_s: float) -> bool:
         """Whether a reply that is complete now cannot be that to the last request.
 
-        Args:
-            free_s: when the request will have left, on the clock.
-            request_s: how long it is on the line.
-            reply_s: how long the reply is.
-
+        ``free_s`` is the time at which the request will have left.
         """
         late_s = self._clock.now_s() - free_s - reply_s
         return self._paced and late_s < -(1.0 - _LEAST_SHARE) * (request_s + reply_s)

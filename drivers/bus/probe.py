@@ -57,12 +57,7 @@ def probe(
 ) -> Probe:
     """Ping ``servo_id`` several times, or read from it, each time until the line is quiet.
 
-    Args:
-        port: the line.
-        servo_id: ID of the servo.
-        requests: how often.
-        latency_s: how long adapter and driver may hold bytes back, at most.
-        block: first and last register of a block to read; None: ping.
+    ``block`` is the first and the last register to read; None: ping.
 
     Raises:
         PortError: the port is gone.
@@ -102,14 +97,7 @@ def probe_with(
 ) -> Probe:
     """Send a request several times, each time until the line is quiet, in any protocol.
 
-    Args:
-        port: the line.
-        servo_id: ID of the servo.
-        requests: how often.
-        packet: the request.
-        reply_bytes: length of one reply.
-        wait_s: time for servo, adapter and driver besides the wire.
-        new_parser: makes a parser of replies.
+    ``wait_s`` is the time for servo, adapter and driver besides the wire.
 
     Raises:
         PortError: the port is gone.

@@ -45,15 +45,7 @@ class Protocol1Block:
         *,
         latency_s: float = 0.003,
     ) -> None:
-        """Prepare; nothing is sent.
-
-        Args:
-            port: a line with these servos.
-            servo_ids: IDs in the order of the values.
-            register: the same for all of them.
-            latency_s: time for servo and adapter besides the wire.
-
-        """
+        """Prepare; nothing is sent."""
         self.counters = CycleCounters()
         self._port, self._ids, self._register = port, tuple(servo_ids), register
         address, size = register.address, register.size

@@ -45,11 +45,7 @@ class GoalCheck:
     def __init__(self, labels: Sequence[str], cycle: GroupCycle, kind: str = "<i4") -> None:
         """Prepare the read.
 
-        Args:
-            labels: J names for the messages.
-            cycle: group read of Goal Position.
-            kind: type of the register's numbers, ``<u2`` on Protocol 1.0.
-
+        ``kind`` is the type of the register's numbers, ``<u2`` on Protocol 1.0.
         """
         self._labels, self._kind = labels, kind
         self.cycle = cycle

@@ -54,16 +54,8 @@ class LivenessCheck:
     ) -> None:
         """Prepare the reads.
 
-        Args:
-            bus: the servos' bus.
-            robot: their robot.
-            configured: values of RAM registers as they were set, by joint.
-            fingerprints: values of EEPROM registers at the start, by joint.
-            watchdog_ticks: Bus Watchdog(98) as it was armed; None: the servos have none.
-            goals: reads the goals back.
-            fast: begin with fast sync reads.
-            rad_per_position: returns the unit of a joint's position.
-
+        ``configured`` has RAM registers, ``fingerprints`` EEPROM registers, by joint.
+        ``watchdog_ticks`` is None if the servos have no watchdog.
         """
         self._bus, self._robot, self._goals = bus, robot, goals
         self._rad_per_position = rad_per_position

@@ -102,11 +102,7 @@ def inspect(
 ) -> Inspection:
     """Read identity and state of every servo of the robot, or of some; changes nothing.
 
-    Args:
-        bus: where they are.
-        robot: whose they are.
-        servo_ids: only these; None is all.
-        replies: to pings that have been sent to them just now; None: they are pinged.
+    ``servo_ids`` None: all. ``replies`` are those to pings that were just sent; None: ping.
 
     Raises:
         BusError: one that replied to its ping does not reply to the rest, or refuses.
@@ -191,13 +187,8 @@ def configure(
 ) -> dict[int, ServoSettings]:
     """Torque off, then every setting that the chain relies on, each read back.
 
-    Args:
-        bus: where the servos are.
-        robot: the settings.
-        units: of its joints.
-        joints: only these; None is all.
-        on_event: gets a line for each setting that another program has left behind, and for each
-            unusual setting that stays.
+    ``joints`` None: all. ``on_event`` gets a line for each setting that another program has left
+    behind, and for each unusual setting that stays.
 
     Returns:
         The settings of each joint's servo.

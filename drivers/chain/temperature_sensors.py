@@ -33,10 +33,7 @@ class TemperatureSensors:
     def __init__(self, joint_names: Sequence[str], stall_current_a: Floats) -> None:
         """Start without a reading.
 
-        Args:
-            joint_names: J names for the messages.
-            stall_current_a: (J,) current at full output and at rest; infinite if it is not known.
-
+        ``stall_current_a`` (J,) is the current at full output and at rest; infinite if unknown.
         """
         self._names, self._stall_a = joint_names, stall_current_a
         joints = len(joint_names)

@@ -21,15 +21,7 @@ class TorqueOff:
     """Switches torque off, then the watchdogs."""
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, clock: Clock, watchdog_s: float) -> None:
-        """Prepare; nothing is sent.
-
-        Args:
-            bus: the servos' bus.
-            robot: their robot.
-            clock: the port's clock.
-            watchdog_s: time after which an armed watchdog stops a servo, for the messages.
-
-        """
+        """Prepare; nothing is sent."""
         self._bus, self._robot, self._clock = bus, robot, clock
         self._watchdog_s = watchdog_s
 

@@ -103,10 +103,8 @@ class Recovery(Generic[C]):
     ) -> JointState | None:
         """Hold, wait, compare, ask, go on; None if it must not or cannot go on.
 
-        Args:
-            reason: of the interruption.
-            believed_rad: (J,) where the joints were when their readings could last be believed.
-            stopped: called while waiting; returns a reason to give up, or None.
+        ``believed_rad`` (J,) are the last believed angles. ``stopped`` is called while waiting; it
+        returns a reason to give up, or None.
 
         Raises:
             ChainError: no servo shows that this is the same robot, and nobody can be asked.
@@ -128,11 +126,8 @@ class Recovery(Generic[C]):
     ) -> JointState | None:
         """Hold, reboot the servo of a joint, compare, go on; None if it must not or cannot go on.
 
-        Args:
-            joint: its servo has been shut down by an overload, and nothing else is wrong.
-            reason: in words.
-            believed_rad: as in ``recover``.
-            stopped: called while waiting; returns a reason to give up, or None.
+        An overload must be the only fault of ``joint``. The other arguments are those of
+        ``recover``.
 
         Raises:
             DriverError: it broke again while going on.

@@ -60,13 +60,7 @@ class GroupRead(ABC):
     def decoded(self, table: Bytes, request: GroupReadRequest, data: Bytes, error: Bytes) -> int:
         """Return the result of ``drivers.protocol.frames`` for these replies in one piece.
 
-        Args:
-            table: of the servos.
-            request: the request that the host expects.
-            data: (N, length) filled with the values that are read, unless the replies are
-                irregular.
-            error: (N,) filled likewise.
-
+        Fills ``data`` (N, length) and ``error`` (N,), unless the replies are irregular.
         """
         if not self._gapless:
             return IRREGULAR

@@ -29,11 +29,7 @@ class SplitPlant:
     def __init__(self, plant: Plant, motors: Sequence[MotorModel], real: Sequence[int]) -> None:
         """Prepare; the shafts that follow are limp until the first ``follow``.
 
-        Args:
-            plant: the whole body, J shafts.
-            motors: of the J servos.
-            real: places of the shafts that follow.
-
+        ``plant`` has J shafts; ``real`` are the places of the shafts that follow.
         """
         self._plant = plant
         self._real = np.array(sorted(real), np.intp)

@@ -34,13 +34,7 @@ class PlantTwin:
     ) -> None:
         """Put it where the robot is, moving as the robot did since ``dt_s`` ago.
 
-        Args:
-            before: the head's pose ``dt_s`` ago.
-            now: the head's pose.
-            before_rad: (J,) joints ``dt_s`` ago.
-            now_rad: (J,) joints.
-            dt_s: more than 0.
-
+        ``before_rad`` and ``now_rad`` are (J,); ``dt_s`` is more than 0.
         """
         self._plant.set_state(_qpos(before, before_rad), _qpos(now, now_rad), dt_s)
 

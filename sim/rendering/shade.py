@@ -27,13 +27,7 @@ def add_shade(
 ) -> None:
     """Append one patch per link to a scene that was just updated and has enough free geoms.
 
-    Args:
-        scene: the scene that is drawn next.
-        links_m: (L, 3) centres of the links.
-        forward: (L, 3) their axes.
-        robot: length and radius of the body.
-        ground: None on a plane.
-
+    ``links_m`` (L, 3) are the centres of the links, ``forward`` (L, 3) their axes.
     """
     place, normal = _on_ground(links_m, ground)
     place = place + LIFT_M * normal
