@@ -1,7 +1,7 @@
-"""Rotations, and which way is up from rates and accelerations: an IMU's own filter, or the host's.
+"""Rotations, and attitude from rates and accelerations.
 
-A complementary filter on rotations: rates are integrated, and at rest the measured acceleration
-says where up is. About the vertical nothing corrects it: the heading drifts with the gyro's bias.
+A complementary filter on rotations: it integrates rates, and corrects roll and pitch by the
+acceleration at rest. The heading drifts with the gyro's bias.
 (R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear complementary filters on the special orthogonal
 group", IEEE Transactions on Automatic Control 53, 2008, without its estimate of the bias.)
 """

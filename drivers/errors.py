@@ -14,9 +14,8 @@
     ├── ControlTableError (InputError)  unknown servo model, register or unit
     └── BudgetError (InputError)   the cycle does not fit the wire
 
-The last four say which input of the user cannot be used, one line a fault; the command line prints
-the lines and ends with exit code 2. A ``ChainFault`` also carries its ``FaultCause``: nobody
-has to search the text.
+The last four state the faults of the user's input, one line each; the command line prints them and
+ends with exit code 2. A ``ChainFault`` also contains its ``FaultCause``.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """An IMU on the simulated line: its registers, filled from the motion of a link.
 
-Readings are those between two looks at the device: the mean rate, exactly the turn that the link
-has made, and the mean acceleration. To both a constant bias and noise are added; from them the
-device's own filter, where it has one, finds its attitude, so that heading drifts as the bias says.
+Readings are the mean rate (exactly the turn of the link) and the mean acceleration since the last
+request, with a constant bias and noise. The device's filter, if any, computes the attitude from
+them.
 """
 
 from collections.abc import Callable

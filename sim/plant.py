@@ -1,4 +1,4 @@
-"""The seam between servos and mechanics.
+"""The interface between servos and mechanics.
 
 Servos (``sim.servo``) own a ``ServoDrive``: one array per quantity, one entry per joint, written
 when registers change. A ``Plant`` (``sim.physics``, or a bench of bare shafts) owns the shafts,

@@ -215,12 +215,7 @@ def plain_reads_text(
 ) -> str:
     """Return the report that fast reads were given up.
 
-    Args:
-        budget: of plain reads.
-        rate_hz: rate of the control cycles; None: unknown.
-        failures: fast reads that failed in a row.
-        ports: those that gave up; empty for a bus with one port.
-
+    ``budget`` is that of plain reads. ``ports`` are those that gave up; empty for one port.
     """
     line = f"fast sync reads given up after {failures} failures in a row, plain from now on"
     if ports:

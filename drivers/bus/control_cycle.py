@@ -1,16 +1,11 @@
 """The control cycle on the wire: goals to all servos, the state block from all of them.
 
-Rules, each against something that happens on real buses:
-
-- Servos reply to a group read in turn, each after the one before. Those behind a silent servo stay
-  silent as well, so a silent servo is asked last from then on and costs only its own value.
-- After anything but a complete clean reply the line is drained until quiet.
-- A reply older than its request is never taken for new. Draining alone cannot promise that, because
-  an adapter may stall for longer. So after a failure the request asks for a length of which no
-  reply is pending (``pending_replies``), and a late reply is dropped for its wrong length.
-- A reply that came twice is known: it is there sooner than it can have crossed the line, or there
-  is more on the line than was asked for.
-- Fast reads that keep failing are given up for plain ones, where damage ends with its packet.
+- In a group read the servos behind a silent one stay silent, so requests list a silent servo last.
+- After an incomplete or damaged reply the cycle discards all bytes until the line is quiet.
+- An adapter may stall for longer than that. After a failure, requests therefore have a length of
+  which no reply is pending (``pending_replies``), and a late reply has the wrong length.
+- A repeated reply arrives sooner than the line could carry it, or adds surplus bytes.
+- After repeated failures plain reads replace fast ones: there, damage affects only one packet.
 """
 
 from __future__ import annotations
@@ -42,10 +37,11 @@ _MISSED_LIMIT = 3
 """Missed reads in a row after which a silent servo is ignored in the choice of the length."""
 _KEPT_REQUESTS = 64
 SPIN_S = 40e-6
-"""About how late Linux wakes a program; polling for longer costs more CPU than it saves time."""
+"""Typical delay with which Linux wakes a program."""
 SPIN_FROM_BAUD = 3_000_000
-"""Below it a program sleeps until the bytes arrive: polling is half of a read's CPU time, and
-saves 10 us of a cycle that has 4 ms on the wire at 1 Mbaud."""
+"""Lowest baud rate at which a cycle polls: at 1 Mbaud polling is half of a read's CPU time, and
+saves
+10 us of 4 ms."""
 
 
 @dataclass(slots=True)
@@ -93,9 +89,9 @@ class ControlCycle:
             pending: pending replies of this port, shared by all who send requests on it; None: only
                 this cycle does.
             line: reservation of this port's line, shared in the same way.
-            spin_s: on a device, sleep until this long before the reply should be complete. Then
-                poll without sleeping, at most twice as long: shorter cycles, more CPU. 0: always
-                sleep. None: ``SPIN_S`` from ``SPIN_FROM_BAUD`` upwards, 0 below it.
+            spin_s: on a device, poll from this time before the expected end of the reply, for at
+                most twice the time. 0: always sleep. None: ``SPIN_S`` from ``SPIN_FROM_BAUD``
+                upwards, else 0.
 
         """
         self._port = port

@@ -1,15 +1,8 @@
 """The DYNAMIXEL bus: pings, registers, reboots, and the group codecs of a chain.
 
-Defects of dynamixel-sdk 4.1.0 that are avoided here:
-
-- The SDK never stuffs what it sends, and its unstuffing is not the inverse of stuffing. It treats a
-status packet with an error and without data as success, and the CRC of a short packet as data.
-  So registers are read and written by our own strict codec; the SDK pings and reboots only.
-- An exception in the port leaves the SDK's port busy for ever: it is freed again.
-- A broadcast ping waits 0.8 s for 252 servos: ``find`` pings the expected ones. The SDK's ping
-  polls without sleeping meanwhile, and does not report damaged replies: ``drivers.bus.probe`` does.
-
-The control cycle does not go through the SDK: see ``drivers.bus.control_cycle``.
+dynamixel-sdk pings and reboots. Its defects (docs/reference/sdk-defects.md) are avoided:
+``drivers.bus.register_io`` reads and writes registers, ``drivers.bus.probe`` pings all servos, and
+an exception in a port leaves the port free.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -185,14 +178,9 @@ class DynamixelBus:
     ) -> dict[str, int]:
         """Values of many registers by one request for the block in which they lie.
 
-        Bytes between them are read as well; several requests are sent only if these are many. A
-        servo that refuses a block is asked register by register.
+        A servo that refuses a block is asked register by register.
 
-        Args:
-            servo_id: ID of the servo.
-            names: the registers.
-            optional: those of them that a firmware may lack; they are left out where it says so,
-                and 0 where it says nothing of it.
+        ``optional`` registers, which a firmware may lack, are missing from the result, or 0.
 
         Raises:
             ControlTableError: no such register.
@@ -271,11 +259,7 @@ class DynamixelBus:
     def write_verified(self, servo_id: int, name: str, value: int, *, kept: bool = False) -> None:
         """Write a register if it differs, and read it back: EEPROM wears out, and writes get lost.
 
-        Args:
-            servo_id: ID of the servo.
-            name: the register.
-            value: as it is in the register.
-            kept: write as ``write_kept`` does.
+        With ``kept`` it writes as ``write_kept`` does.
 
         Raises:
             BusError: it does not read back as written.

@@ -57,13 +57,5 @@ class FastPathPort(Protocol):
         *,
         latency_s: float,
     ) -> FastPath | None:
-        """Prepare the packets; None where all must go through the port's own calls.
-
-        Args:
-            goals: the sync write of ``write``.
-            request: the group read.
-            line: of the port.
-            latency_s: how long adapter and driver may hold bytes back, at most.
-
-        """
+        """Prepare the packets; None where all must go through the port's own calls."""
         ...

@@ -1,8 +1,8 @@
 """The bus of Feetech servos: ``DynamixelBus`` with Feetech's packets.
 
 Register values are those of the table: the bus converts byte order, signs and alarms. A servo
-forgets registers of the EEPROM area at power-off if they were written while Lock was 1. So a run
-never wears the EEPROM; ``write_kept`` unlocks for one write.
+forgets EEPROM registers at power-off that were written while Lock was 1; ``write_kept`` unlocks for
+one write.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -108,16 +108,8 @@ class FeetechCycle(ControlCycle):
     ) -> None:
         """Prepare the packets.
 
-        Args:
-            port: the line.
-            ids: servos, in the order of all arrays here.
-            facts: their model.
-            span: address and length of the block on the wire.
-            convert: makes the returned block (N, n) of the block on the wire (N, length).
-            latency_s: how long adapter and driver may hold bytes back, at most.
-            pending: pending replies of this port.
-            line: reservation of this port's line.
-
+        ``span`` is address and length of the block on the wire. ``convert`` makes the returned
+        block (N, n) of it (N, length).
         """
         self._facts, self._convert, self._clock = facts, convert, port.clock
         super().__init__(
@@ -209,10 +201,7 @@ class FeetechSingleReads(FeetechCycle):
 def state_convert(facts: ServoModel, first: str) -> tuple[tuple[int, int], Convert]:
     """Span of the state block on the wire, and its conversion to the layout of Protocol 2.0.
 
-    Args:
-        facts: the model.
-        first: Present Current, or Present Load.
-
+    ``first`` is Present Current, or Present Load.
     """
     rows = [facts.registers[name] for name in (first, "Present Velocity", "Present Position")]
     address = min(row.address for row in rows)

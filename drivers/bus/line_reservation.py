@@ -1,8 +1,7 @@
-"""Until when a line carries what was sent on it: no reply begins before.
+"""Time until which a line carries the bytes that were sent: no reply begins earlier.
 
-A write returns long before its bytes have left. The time of a reply counts from when the line is
-free, also if another request is still on it. A reply that is complete before it can have crossed
-the line is an older one that came twice.
+A write returns before its bytes have left. A reply that is complete before it can have crossed the
+line is a copy of an older one.
 """
 
 import numpy as np
@@ -45,11 +44,7 @@ class LineReservation:
     def came_twice(self, free_s: float, request_s: float, reply_s: float) -> bool:
         """Whether a reply that is complete now cannot be that to the last request.
 
-        Args:
-            free_s: when the request will have left, on the clock.
-            request_s: how long it is on the line.
-            reply_s: how long the reply is.
-
+        ``free_s`` is the time at which the request will have left.
         """
         late_s = self._clock.now_s() - free_s - reply_s
         return self._paced and late_s < -(1.0 - _LEAST_SHARE) * (request_s + reply_s)

@@ -1,10 +1,7 @@
-"""Replies that were requested and did not arrive: they may still arrive, and must not pass for new.
+"""Requested replies that did not arrive: they may still arrive, and must not count as new.
 
-A status packet carries the servo's ID and its length, but not the request. So a reply is known to
-belong to the present request only if no older request with a reply of that length is pending. For
-each servo this remembers the pending lengths, for as long as a reply can be late. A request then
-asks for a length that is not pending (a few bytes more than needed), and a reply of a pending
-length is not believed.
+A status packet contains the servo's ID and its length, but not the request. A reply therefore
+belongs to the present request only if no older request for that length is pending.
 """
 
 from collections.abc import Iterable
@@ -12,7 +9,7 @@ from collections.abc import Iterable
 from snakewalk.drivers.clock import Clock
 
 HORIZON_S = 0.5
-"""Longest lateness considered (ours); the state goes stale, and the run stops, long before."""
+"""Largest delay of a reply (ours)."""
 SPARE_LENGTHS = 16
 
 

@@ -1,8 +1,4 @@
-"""Requests that receive until the line is quiet, which shows more than one strict reply.
-
-Servos with the same ID reply at the same time. Their bytes collide, or both replies arrive where
-return delays or clocks differ. Another master's packets come unasked.
-"""
+"""Requests that receive until the line is quiet: they show servos with one ID, or other masters."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -61,12 +57,7 @@ def probe(
 ) -> Probe:
     """Ping ``servo_id`` several times, or read from it, each time until the line is quiet.
 
-    Args:
-        port: the line.
-        servo_id: ID of the servo.
-        requests: how often.
-        latency_s: how long adapter and driver may hold bytes back, at most.
-        block: first and last register of a block to read; None: ping.
+    ``block`` is the first and the last register to read; None: ping.
 
     Raises:
         PortError: the port is gone.
@@ -106,14 +97,7 @@ def probe_with(
 ) -> Probe:
     """Send a request several times, each time until the line is quiet, in any protocol.
 
-    Args:
-        port: the line.
-        servo_id: ID of the servo.
-        requests: how often.
-        packet: the request.
-        reply_bytes: length of one reply.
-        wait_s: time for servo, adapter and driver besides the wire.
-        new_parser: makes a parser of replies.
+    ``wait_s`` is the time for servo, adapter and driver besides the wire.
 
     Raises:
         PortError: the port is gone.

@@ -1,7 +1,7 @@
 """Group reads and writes of one register on a bus of Protocol 1.0 servos.
 
-Protocol 1.0 has no sync read, and an AX-12A has no bulk read. So each servo is asked by a READ of
-its own. Goals leave in one SYNC WRITE, to which no servo replies.
+Each servo gets its own READ, because an AX-12A has neither sync read nor bulk read. Goals are one
+SYNC WRITE.
 """
 
 from collections.abc import Sequence
@@ -45,15 +45,7 @@ class Protocol1Block:
         *,
         latency_s: float = 0.003,
     ) -> None:
-        """Prepare; nothing is sent.
-
-        Args:
-            port: a line with these servos.
-            servo_ids: IDs in the order of the values.
-            register: the same for all of them.
-            latency_s: time for servo and adapter besides the wire.
-
-        """
+        """Prepare; nothing is sent."""
         self.counters = CycleCounters()
         self._port, self._ids, self._register = port, tuple(servo_ids), register
         address, size = register.address, register.size
@@ -106,8 +98,7 @@ class Protocol1Block:
     def _ask(self, k: int) -> Packet1 | None:
         """Ask one servo; its intact reply, or None.
 
-        After a reply that did not come the line is drained until it is quiet, so that a late one
-        is not taken for the reply to the next request.
+        After a missing reply it discards all bytes until the line is quiet.
         """
         port = self._port
         if not self._is_quiet:

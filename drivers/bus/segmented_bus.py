@@ -1,8 +1,8 @@
 """The bus of a chain whose segments are on ports of their own: one transaction a port and cycle.
 
-Requests begin on all ports before a reply is awaited on any, so that a cycle lasts as long as that
-of the longest segment. A fault of one port is reported with its name, and ends the cycle of all.
-Commands to all servos, such as torque off, go to every port that is there, whatever the others do.
+Requests begin on all ports before the bus waits for a reply. A fault of one port ends the cycle of
+all; its error names the port. Commands to all servos, such as torque off, go to every port that
+works.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -42,13 +42,7 @@ def chain_settings(
 ) -> tuple[ChainSetting, ...]:
     """Settings of one joint's servo, in the order in which they are written.
 
-    Args:
-        robot: limits and gains.
-        units: of its joints.
-        joint: index of the joint.
-        goal_pwm: the servo's PWM Limit(36): a Goal PWM(100) that another program left below it
-            would weaken the joint.
-
+    ``goal_pwm`` is the servo's PWM Limit(36).
     """
     low, high = units.limits_raw[joint]
     pitch = robot.all_axes[joint] == "p"

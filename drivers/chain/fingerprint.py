@@ -1,8 +1,4 @@
-"""Fingerprint: the settings in a servo's EEPROM that say how its joint is mounted and protected.
-
-A zero or a direction that another program changes while torque is off leaves a servo that replies
-as before and moves its joint to another angle.
-"""
+"""Fingerprint: EEPROM settings of a servo that determine zero, direction and limits of a joint."""
 
 from collections.abc import Mapping
 
@@ -24,15 +20,7 @@ def fingerprint_of(registers: Mapping[str, int]) -> dict[str, int]:
 
 
 def register_change(name: str, before: int, now: int, rad_per_position: float) -> str:
-    """A change of one register in words, with its effect on the joint.
-
-    Args:
-        name: the register.
-        before: its value as it was.
-        now: its value as it is.
-        rad_per_position: unit of the joint's position.
-
-    """
+    """A change of one register in words, with its effect on the joint."""
     text = f"{name} is {now}, was {before}"
     if name == "Homing Offset":
         moved_rad = (now - before) * abs(rad_per_position)

@@ -87,11 +87,6 @@ class FingerprintFile:
 
         Registers that the chain sets from the robot's file are not compared, only stored.
 
-        Args:
-            robot: the servos' robot.
-            fingerprints: as found, by servo ID.
-            rad_per_position: unit of the positions.
-
         Returns:
             Lines to report.
 

@@ -1,8 +1,7 @@
 """Goal check: whether each servo holds the goal that was sent to it.
 
-Servos do not reply to a sync write. So Goal Position(116; 30 on Protocol 1.0) is read back and
-compared with the goal that was sent last before the read. A difference counts once more only after
-another goal was sent.
+Servos do not reply to a sync write, so Goal Position(116; 30 on Protocol 1.0) is read back. A
+difference counts again only after another goal was sent.
 """
 
 from collections import deque
@@ -19,8 +18,7 @@ from snakewalk.drivers.errors import BusError
 
 FOREIGN_READS, OWN_READS = 2, 4
 """Reads in a row that differ and end a run: with a goal that was never sent, and with an older goal
-of this run, which a lost write leaves behind (ours). A line that loses one packet in twenty loses
-four writes in a row once in 160,000 reads."""
+of this run (ours). A line that loses 5 % of its packets loses four writes once in 160,000 reads."""
 _SECOND_MASTER = "another program writes goals (a second master)"
 _LOST_TO_ALL = "no servo has the newest goals: the line or the adapter loses what is written"
 _REMEMBERED = 256
@@ -50,11 +48,7 @@ class GoalCheck:
     def __init__(self, labels: Sequence[str], cycle: GroupCycle, kind: str = "<i4") -> None:
         """Prepare the read.
 
-        Args:
-            labels: J names for the messages.
-            cycle: group read of Goal Position.
-            kind: type of the register's numbers, ``<u2`` on Protocol 1.0.
-
+        ``kind`` is the type of the register's numbers, ``<u2`` on Protocol 1.0.
         """
         self._labels, self._kind = labels, kind
         self.cycle = cycle

@@ -41,10 +41,7 @@ class IdentifiedRead:
     def positions_and_goals(self, reads: int, *, ask_again: bool = False) -> tuple[Floats, Floats]:
         """(J,) angles, rad, and (J,) raw goals; NaN for a joint whose servo does not identify.
 
-        Args:
-            reads: how often all servos are asked.
-            ask_again: ask the remaining servos one by one; a servo may refuse to be read across
-                registers that it lacks.
+        With ``ask_again`` it asks the remaining servos one by one.
 
         Raises:
             BusError: a servo that is asked alone does not reply.

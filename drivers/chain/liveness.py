@@ -1,8 +1,7 @@
-"""Liveness: whether servos hold torque, watchdog, settings and goals as they were written.
+"""Liveness: whether servos have torque, watchdog, settings and goals as they were written.
 
-A servo that has rebooted replies as before, limp and with the settings of its EEPROM. Another
-program may write goals, or change a zero. So registers are read again, one at a time, and compared
-with the values that they must have.
+A servo may have rebooted, or another program may have written to it. Registers are therefore read
+again, one at a time.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,18 +28,16 @@ SLOW_EVERY = 16
 """Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
 _GOALS_AT, _TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT = 2, 5, 8, 10, 13
 _SHAPING_AT, _FINGERPRINT_AT = (3, 11), (6, 9, 14)
-"""Cycles of a round in which registers are read, one each: a cycle never has two more reads than
-its own, so that the wire budget of every cycle is the same."""
+"""Cycles of a round in which registers are read, at most one in each."""
 _CHECKED_AT = frozenset(
     {_TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT, *_SHAPING_AT, *_FINGERPRINT_AT}
 )
 
 
 class LivenessCheck:
-    """Whether servos hold torque, watchdog, settings and goals as they were written.
+    """Reads one register of all servos at a time, and compares it.
 
-    One group read of one register at a time. Servos that do not reply are not judged; the check is
-    made again in the next cycle that has time for it.
+    A check is repeated in the next cycle with time for it if servos did not reply.
     """
 
     def __init__(
@@ -57,16 +54,8 @@ class LivenessCheck:
     ) -> None:
         """Prepare the reads.
 
-        Args:
-            bus: the servos' bus.
-            robot: their robot.
-            configured: values of RAM registers as they were set, by joint.
-            fingerprints: values of EEPROM registers at the start, by joint.
-            watchdog_ticks: Bus Watchdog(98) as it was armed; None: the servos have none.
-            goals: reads the goals back.
-            fast: begin with fast sync reads.
-            rad_per_position: returns the unit of a joint's position.
-
+        ``configured`` has RAM registers, ``fingerprints`` EEPROM registers, by joint.
+        ``watchdog_ticks`` is None if the servos have no watchdog.
         """
         self._bus, self._robot, self._goals = bus, robot, goals
         self._rad_per_position = rad_per_position
@@ -96,7 +85,7 @@ class LivenessCheck:
     def check_goals(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Read the goals back, once in a round and if they differed; the group read, if made.
 
-        It comes before the goals of its cycle: after them it would find those of this program only.
+        Call it before the goals of the cycle are sent.
 
         Raises:
             BusError: a servo holds another goal.

@@ -17,13 +17,7 @@ class LostReplies:
         self._complete, self._any, self._reported = True, True, False
 
     def update(self, read: int, joints: int) -> str | None:
-        """Count a read; returns a line for the user the first time that there is a reason.
-
-        Args:
-            read: number of joints that were read.
-            joints: number of all joints.
-
-        """
+        """Count a read; returns a line for the user the first time that there is a reason."""
         self._reads += 1
         is_complete, is_any = read == joints, read > 0
         if self._complete and not is_complete:

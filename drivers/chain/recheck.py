@@ -66,14 +66,8 @@ def recheck(
 ) -> Recheck:
     """Compare model, firmware, alarm, torque, settings and position with their earlier values.
 
-    Args:
-        bus: where the servos are.
-        robot: whose they are.
-        units: of its joints.
-        before: as found at the start; None: nothing to compare with.
-        configured: values of RAM registers as they were set, by joint.
-        fingerprints: values of EEPROM registers at the start, by joint.
-        believed_rad: (J,) where the joints were when their readings could last be believed.
+    ``before`` and ``fingerprints`` are from the start; ``configured`` has RAM registers by joint.
+    ``believed_rad`` (J,) are the last believed angles.
 
     Raises:
         BusError: a servo stops answering meanwhile.

@@ -51,8 +51,7 @@ _FIRST_READS = 5
 _HOLD_READS = 2
 """Reads in which the servos may report their positions before they hold (ours)."""
 STILL_RAD = 0.1
-"""A joint that is read farther from where it was just set to hold is not the one that holds
-(ours)."""
+"""Largest distance of a joint from the position that it holds; farther is another joint (ours)."""
 
 
 class ServoChain:
@@ -75,7 +74,7 @@ class ServoChain:
 
         Args:
             bus: servos of the robot's models.
-            robot: ids, limits, gains.
+            robot: IDs, limits, gains.
             watchdog_s: after this time without an instruction the servos stop by themselves.
             rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
             fingerprint_file: compared with the servos at each ``enable``; None: not compared.
@@ -196,13 +195,12 @@ class ServoChain:
     def resume(self, found: Recheck) -> JointState:
         """Go on after an interruption: torque that is on stays on, nothing moves.
 
-        A joint that is elsewhere than ``found``, or whose servo does not identify itself, is not
-        resumed: two servos with one ID reply in turn. Servos that lost their torque or their
-        settings (rebooted) are set up again. The others get their watchdog cleared and, right
-        behind it, goal = present.
+        Servos that lost torque or settings are set up again. For the others the watchdog is
+        cleared, and the goal becomes the present position.
 
         Raises:
-            ChainError: ``found`` forbids it.
+            ChainError: ``found`` has a fault, a joint has moved since, or a servo does not
+                identify itself.
             BusError: a servo does not do what an instruction asks; torque is off again then.
             PortError: the port is gone.
 
@@ -253,8 +251,7 @@ class ServoChain:
     def hold(self) -> None:
         """Set the goals to where the joints are.
 
-        A joint keeps its goal if its servo does not report its position and its identity in one
-        reply: it does not reply, or two servos have one ID, or IDs were exchanged.
+        A joint keeps its goal if its servo does not report position and identity in one reply.
 
         Raises:
             PortError: the port is gone.
@@ -329,8 +326,8 @@ class ServoChain:
     def read(self) -> JointState:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
 
-        Where no joint could be read nothing else is asked: that is put off to the next call. If
-        nobody has called ``check_servos`` since the last read, this one does.
+        If no joint was read, the other requests wait for the next call. Calls ``check_servos`` if
+        it was not called since the last read.
 
         Raises:
             BusError: a servo holds another goal than the one sent to it; raised by
@@ -406,8 +403,7 @@ class ServoChain:
     def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> bool:
         """Make a check; return whether all servos were read.
 
-        An alarm that switches a servo off may come between the group read and the check; then the
-        alarm is the reason for the findings of the check.
+        If an alarm switched a servo off between group read and check, the error states the alarm.
         """
         if not self._armed or self._readings.alert:
             return False

@@ -23,12 +23,7 @@ def limit_currents(
 ) -> dict[int, Mapping[str, int]]:
     """Lower Goal Current of all joints, and read it back.
 
-    Args:
-        bus: the servos' bus.
-        robot: their robot.
-        units: of its joints.
-        configured: values of RAM registers as they were set, by joint.
-        current_a: (J,) wanted; a joint whose limit is lower keeps its own.
+    ``current_a`` is (J,); a joint with a lower limit keeps it.
 
     Returns:
         ``configured`` with the new currents.

@@ -1,7 +1,7 @@
-"""Start-up: the checks and settings that turn unknown servos into a chain that holds its pose.
+"""Start-up: checks and settings of servos before torque.
 
-The order avoids what users of such buses report: goals not synced before torque-on, return delays
-of 500 us a servo, alarms from before, turn counts lost at a reboot.
+It covers goals that differ from positions, return delays of 500 us, old alarms and lost turn
+counts.
 """
 
 import math
@@ -43,8 +43,7 @@ SHAPING_SETTINGS = (
 )
 """Those that another program would change, and a reboot would not."""
 IDENTITY = "Velocity I Gain"
-"""Holds which joint a servo is, while it runs: no register of position control, in RAM, and reset
-by a change of mode. A servo that is given another ID keeps it, one that reboots does not."""
+"""Stores the joint number: in RAM, unused by position control, reset by a change of mode."""
 _REPORTED = (
     *("Firmware Version", "Hardware Error Status", "Return Delay Time", "Operating Mode"),
     *("Torque Enable", "Present Temperature", "Present Input Voltage"),
@@ -103,11 +102,7 @@ def inspect(
 ) -> Inspection:
     """Read identity and state of every servo of the robot, or of some; changes nothing.
 
-    Args:
-        bus: where they are.
-        robot: whose they are.
-        servo_ids: only these; None is all.
-        replies: to pings that have been sent to them just now; None: they are pinged.
+    ``servo_ids`` None: all. ``replies`` are those to pings that were just sent; None: ping.
 
     Raises:
         BusError: one that replied to its ping does not reply to the rest, or refuses.
@@ -192,13 +187,8 @@ def configure(
 ) -> dict[int, ServoSettings]:
     """Torque off, then every setting that the chain relies on, each read back.
 
-    Args:
-        bus: where the servos are.
-        robot: the settings.
-        units: of its joints.
-        joints: only these; None is all.
-        on_event: gets a line for each setting that another program has left behind, and for each
-            unusual setting that stays.
+    ``joints`` None: all. ``on_event`` gets a line for each setting that another program has left
+    behind, and for each unusual setting that stays.
 
     Returns:
         The settings of each joint's servo.
@@ -359,8 +349,8 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
 
     Returns the replies to pings of the robot's servos.
 
-    At level 0 a servo replies to pings only, at level 1 to pings and reads. Necessary writes are
-    sent without waiting for a reply, and only to servos of the robot's model.
+    At level 0 a servo replies to pings only, at level 1 to pings and reads. Only servos of the
+    robot's model are written to.
     """
     found = bus.find(robot.servo_ids)
     right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]

@@ -1,4 +1,4 @@
-"""Temperature sensors: whether what they measure can be the motors' heat.
+"""Temperature sensors: whether their readings follow the heat of the motors.
 
 A dead sensor reads 0, never changes, or jumps. The motor then gets hot without a warning, so the
 run reports it.
@@ -38,10 +38,7 @@ class TemperatureSensors:
     def __init__(self, joint_names: Sequence[str], stall_current_a: Floats) -> None:
         """Start without a reading.
 
-        Args:
-            joint_names: J names for the messages.
-            stall_current_a: (J,) current at full output and at rest; infinite if it is not known.
-
+        ``stall_current_a`` (J,) is the current at full output and at rest; infinite if unknown.
         """
         self._names, self._stall_a = joint_names, stall_current_a
         joints = len(joint_names)

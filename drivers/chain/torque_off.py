@@ -12,8 +12,7 @@ from snakewalk.drivers.protocol.registers import WATCHDOG
 _GROUP_ROUNDS = 8
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _ASK_S = 1.0
-"""How long servos that do not confirm are asked one by one, s (ours): longer than a line may be
-disturbed before the state is stale, and some tenths of a second more."""
+"""How long servos that do not confirm are asked one by one, s (ours)."""
 _PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
 """How long torque off waits for a port that is gone, and the time between tries, s (ours)."""
 
@@ -22,24 +21,16 @@ class TorqueOff:
     """Switches torque off, then the watchdogs."""
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, clock: Clock, watchdog_s: float) -> None:
-        """Prepare; nothing is sent.
-
-        Args:
-            bus: the servos' bus.
-            robot: their robot.
-            clock: the port's clock.
-            watchdog_s: time after which an armed watchdog stops a servo, for the messages.
-
-        """
+        """Prepare; nothing is sent."""
         self._bus, self._robot, self._clock = bus, robot, clock
         self._watchdog_s = watchdog_s
 
     def send(self) -> None:
         """Switch torque off on every servo, also where others fail, and then the watchdogs.
 
-        Servos that do not confirm it in a group read are asked one by one, repeatedly for a limited
-        time: their watchdogs may be disarmed. If one of several ports is gone, the servos on the
-        other ports are off before it is waited for.
+        Servos that do not confirm it in a group read are asked one by one for a limited time. If
+        one of several ports is gone, the servos on the others are off before the wait for it
+        begins.
 
         Raises:
             BusError: servos did not confirm; their watchdog stays armed and stops them.

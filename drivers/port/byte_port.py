@@ -1,8 +1,7 @@
-"""The byte port: the seam below the protocol, where metal and simulation are exchanged.
+"""The byte port: the interface of a serial device, and of a simulated line.
 
-The port offers what the DYNAMIXEL SDK's packet handlers call (the SDK's own method names,
-milliseconds), and what the control cycle needs (seconds, deadlines). So one object serves both, and
-the code above it cannot distinguish hardware from simulation.
+It has the methods that the DYNAMIXEL SDK's packet handlers call (SDK names, milliseconds), and
+those of the control cycle (seconds, deadlines).
 """
 
 # ruff: noqa: N802 - the SDK chose the names
@@ -13,8 +12,7 @@ from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
 
 DRAIN_LIMIT_S = 0.1
-"""How long a line that does not fall quiet is drained, at most (ours): a stray byte now and then
-must not hold a read for ever. The parser skips the remaining noise."""
+"""Longest time for which bytes of a line that does not become quiet are discarded (ours)."""
 
 
 class SdkPort(Protocol):
@@ -50,9 +48,8 @@ class SdkPort(Protocol):
     def readPort(self, length: int) -> bytes:
         """Up to ``length`` bytes that have arrived by now; never waits for more to come.
 
-        The SDK spins on this until ``isPacketTimeout``. On a simulated line, where only waiting
-        moves time, a call that returns nothing moves the clock to the next byte, or to the
-        time-out if none comes.
+        The SDK repeats this until ``isPacketTimeout``. On a simulated line, a call that returns
+        nothing moves the clock to the next byte, or to the time-out.
         """
         ...
 
@@ -94,7 +91,7 @@ class BytePort(SdkPort, Protocol):
     def paced(self) -> bool:
         """Whether on the clock bytes need the time of the baud rate.
 
-        They do on a wire; not on a pseudo-terminal, and nobody knows behind a network.
+        False on a pseudo-terminal, and on a network.
         """
         ...
 
@@ -116,8 +113,7 @@ class BytePort(SdkPort, Protocol):
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Throw bytes away until none has come for ``quiet_s``; the number thrown away.
 
-        Ends after ``quiet_s + DRAIN_LIMIT_S`` on a line that does not fall quiet. Waits ``quiet_s``
-        at least, so that a late reply cannot be taken for that to the next request.
+        Waits at least ``quiet_s``, and at most ``quiet_s + DRAIN_LIMIT_S``.
         """
         ...
 

@@ -21,8 +21,7 @@ from snakewalk.drivers.port.serial_port import SerialPort
 NETWORK_LATENCY_S: Final = 0.1
 """How late a reply may be besides its wire time: a local network and its server (ours)."""
 _POLL_S: Final = 0.001
-"""How long a read waits at a time. It stays the same while the port is open: a server of RFC 2217
-would have to set up its line again at each change."""
+"""Time-out of each read; constant, because a server of RFC 2217 would set up its line again."""
 _FIXED: Final = ("socket://",)
 """URLs that carry no baud rate: that of the far end stays what it is."""
 _TO_A_HOST: Final = ("socket", "rfc2217")

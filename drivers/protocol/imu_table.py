@@ -131,12 +131,8 @@ def _rotation(halves: bytes) -> Floats | None:
 def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Floats) -> bytes:
     """The same block as the device shows it; values beyond its range are cut off.
 
-    Args:
-        imu: the device.
-        rate_rad_s: (3,) in its axes.
-        force_m_s2: (3,) specific force in its axes.
-        rotation: (3, 3) its axes in the world.
-
+    ``rate_rad_s`` (3,) and ``force_m_s2`` (3,) are in the device's axes; ``rotation`` (3, 3) are
+    these axes in the world.
     """
     if imu.gyro_range_dps is None or imu.acceleration_range_g is None:
         vector = rotations().from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")

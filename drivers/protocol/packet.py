@@ -160,9 +160,9 @@ def fast_head(parts_bytes: int) -> bytes:
 def encode_fast(parts: Iterable[tuple[int, int, bytes]], parts_bytes: int | None = None) -> bytes:
     """Common reply of servos to a fast sync or bulk read, from ``parts`` (error, ID, data).
 
-    It is one status packet from the broadcast ID that the servos write one after the other: each
-    adds error, ID, data, and the CRC of *everything* on the wire so far, earlier CRCs included. It
-    is not stuffed. ``parts_bytes`` is the announced length where servos are missing at the end.
+    The servos write one status packet in turn: each adds error, ID, data, and the CRC of all bytes
+    so far, earlier CRCs included. It is not stuffed. ``parts_bytes`` is the announced length if
+    servos are missing at the end.
     """
     bodies = [bytes((error, servo_id)) + data for error, servo_id, data in parts]
     announced = sum(len(body) + 2 for body in bodies) if parts_bytes is None else parts_bytes

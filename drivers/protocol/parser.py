@@ -19,9 +19,8 @@ _FIXED = 7  # header, id and length field, in front of the bytes that the length
 class PacketParser:
     """Cuts a byte stream into packets; other bytes are skipped and counted.
 
-    After a wrong length or CRC the search continues one byte behind the false header, so a damaged
-    packet never hides the good one that follows. Memory is bounded by one longest packet plus the
-    bytes fed at once.
+    After a wrong length or CRC the search continues one byte behind the header, so a damaged packet
+    does not hide the next one. Memory is bounded by the longest packet plus the bytes fed at once.
     """
 
     def __init__(self, max_length: int = 4096) -> None:

@@ -1,8 +1,8 @@
 """Meaning of register values in all series of Protocol 2.0: modes, alarm bits, common units.
 
 Differences between models are in their files (``config/servos``). A model without a current sensor
-has Present Load in place of Present Current, the share of full output. The host rejects a model
-with an unknown unit of current: a current of unknown scale must not look like zero, or safe.
+has Present Load, the share of full output, in place of Present Current. The host rejects a model
+with an unknown unit of current.
 """
 
 import math
@@ -72,8 +72,8 @@ class ServoUnits:
     rad_per_position: float
     rad_s_per_velocity: float
     a_per_current: float
-    """Ampere of one unit of Present Current. Without a sensor: the stall current's share in a unit
-    of Present Load, that is what the motor would draw at rest; while it turns it draws less."""
+    """Ampere of one unit of Present Current. Without a sensor: of one unit of Present Load at
+    rest."""
     measures_current: bool
     full_pwm: int
     """Goal PWM of full output."""

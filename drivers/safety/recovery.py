@@ -1,11 +1,8 @@
 """Recovery: the reaction to a line or a servo that goes away during a run.
 
-The servos hold by themselves: their watchdogs stop them where they are, torque on. The recovery
-opens the port again, compares the chain with its earlier state, and goes on from its present pose;
-but only if the run's policy, or an operator, allows it.
-
-A servo that an overload has shut down can be brought back in the same way, if the run allows it: it
-is rebooted first. No other alarm is recovered from.
+The watchdogs hold the servos meanwhile. The recovery opens the port again, compares the chain with
+its earlier state, and continues from the present pose if the policy or an operator permits it. A
+servo that an overload has shut down is rebooted first, if the run permits it.
 """
 
 import math
@@ -108,10 +105,8 @@ class Recovery(Generic[C]):
     ) -> JointState | None:
         """Hold, wait, compare, ask, go on; None if it must not or cannot go on.
 
-        Args:
-            reason: of the interruption.
-            believed_rad: (J,) where the joints were when their readings could last be believed.
-            stopped: called while waiting; returns a reason to give up, or None.
+        ``believed_rad`` (J,) are the last believed angles. ``stopped`` is called while waiting; it
+        returns a reason to give up, or None.
 
         Raises:
             ChainError: no servo shows that this is the same robot, and nobody can be asked.
@@ -137,11 +132,8 @@ class Recovery(Generic[C]):
     ) -> JointState | None:
         """Hold, reboot the servo of a joint, compare, go on; None if it must not or cannot go on.
 
-        Args:
-            joint: its servo has been shut down by an overload, and nothing else is wrong.
-            reason: in words.
-            believed_rad: as in ``recover``.
-            stopped: called while waiting; returns a reason to give up, or None.
+        An overload must be the only fault of ``joint``. The other arguments are those of
+        ``recover``.
 
         Raises:
             DriverError: it broke again while going on.

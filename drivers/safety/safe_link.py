@@ -34,8 +34,7 @@ from snakewalk.drivers.types import JointCommand, JointState
 RESTART_S = 2.0
 """After a servo's reboot the goals' rate grows for this time until it is the limit again (ours)."""
 _OFF_TRIES = 3
-"""Reads after a trip that repeat a torque off that was not confirmed (ours): each may last as long
-as the trip's own did."""
+"""Reads after a trip that repeat an unconfirmed torque off (ours)."""
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 """SIGQUIT is Ctrl-\\. SIGTSTP is Ctrl-Z: a program that is stopped cannot switch torque off, and
 the watchdogs would leave the servos holding with torque on."""
@@ -46,23 +45,15 @@ class SafeLink:
 
     It latches on a veto, on an error of the link below, on ``request_stop``, or when
     ``stop_requested`` (called at each read and write) returns a reason. Then torque goes off,
-    ``tripped`` contains the reason, and ``write`` raises. ``read`` goes on, for the log, and
-    requests a few times more a torque off that was not confirmed. Only ``reset`` by an operator and
-    a new ``enable`` let it move again. Inside the context SIGTERM, SIGINT, SIGHUP, SIGQUIT and
-    SIGTSTP unwind the program through the exit, but for SIGHUP where it is ignored, as under nohup;
-    if it is killed, the servos' bus watchdog stops them.
+    ``tripped`` contains the reason, and ``write`` raises. ``read`` still works, and repeats an
+    unconfirmed torque off a few times. Only ``reset`` by an operator and a new ``enable`` permit
+    motion. Inside the context SIGTERM, SIGINT, SIGHUP (unless ignored), SIGQUIT and SIGTSTP leave
+    the program through the exit.
 
-    With a ``recovery`` it does not latch at once when the line or a servo goes away. The chain
-    holds, and goes on from its current position if the policy of the recovery allows it. If the
-    recovery may reboot a servo that an overload has shut down, the same applies to that servo,
-    slowly.
-
-    With a ``hold`` a trip with a valid state holds with low currents for a while before torque goes
-    off. This applies after a joint that does not follow, and after
-    ``request_stop(..., may_hold=True)``, which is then the effect of the first Ctrl-C.
-    ``is_holding`` is true meanwhile, and ``read`` ends it in time.
-
-    A ``stop_output`` is activated if torque off is not confirmed.
+    With a ``recovery`` the chain holds when the line or a servo goes away, and continues if the
+    policy permits it. With a ``hold``, a joint that does not follow and ``request_stop(...,
+    may_hold=True)`` (the first Ctrl-C) hold with low currents before torque goes off;
+    ``is_holding`` is then true. A ``stop_output`` is activated if torque off is not confirmed.
     """
 
     def __init__(

@@ -1,8 +1,7 @@
 """The stop button: a small private file through which another program latches a run's safe link.
 
-A program that moves servos makes one and keeps it locked. The lock is gone when the program is, and
-an unlocked file is not a button. It is mapped into memory, so that looking at it in every cycle
-costs no call of the system, and who presses it can never delay the run.
+A program that moves servos makes one, locks it and maps it into memory. An unlocked file is not a
+button. Reading it needs no system call, and pressing it cannot delay the run.
 
 Layout: a byte that is 1 once pressed, and a byte that is 1 once the run has ended. Then come the
 name of the person who pressed it and the end of the run (length and text each), and a description

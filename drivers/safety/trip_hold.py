@@ -1,8 +1,7 @@
 """Hold on a trip: a lifted or climbing body holds with low currents before its torque goes off.
 
-It holds only after a trip with a valid state and a running host: a joint that does not follow, or
-an operator's stop. A bad state, an alarm, heat, the supply, the bus and a stop button switch torque
-off at once, also while the body holds.
+It holds only after a joint that does not follow, or an operator's stop. All other reasons switch
+torque off at once, also while the body holds.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,9 @@
 """Alarms of a servo of Protocol 1.0: a blocked shaft, heat, a supply out of range.
 
-An alarm is a bit of the error byte of every answer while its cause lasts. Alarms in the mask of
-Shutdown(18) also set Torque Limit(34) to 0 and switch the torque off. They stay until the cause is
-gone and Torque Limit is set to another value, or until the power comes back. (e-manual, AX-12A,
-Alarm Shutdown, Torque Limit; Protocol 1.0, Error.)
+An alarm is a bit of the error byte of every reply while its cause lasts. Alarms in the mask of
+Shutdown(18) also set Torque Limit(34) to 0 and switch the torque off, until the cause has ended and
+Torque Limit is set again, or until power-on. (e-manual, AX-12A, Alarm Shutdown, Torque Limit;
+Protocol 1.0, Error.)
 """
 
 from collections.abc import Callable, Mapping

@@ -1,8 +1,7 @@
 """Decoder of Protocol 1.0 into words, packet by packet, with the registers of one model.
 
-A status packet looks like an instruction packet. A packet with the ID of the last instruction and
-the length of its reply is decoded as the reply. So an instruction without a reply that is repeated
-at once looks like one with a reply.
+A status packet looks like an instruction packet: a packet with the ID of the last instruction and
+the length of its reply is decoded as the reply.
 """
 
 from collections.abc import Iterator

@@ -1,9 +1,8 @@
 """Group fast path: the two packets of a control cycle for all servos at once.
 
 A slice of the control tables and one CRC pass give the same bytes as
-``sim.line.instruction_handler`` does servo by servo (a test compares them), at a cost that hardly
-grows with the number of servos. Stuffing, a missing ID, a silent servo and other special cases are
-left to the handler.
+``sim.line.instruction_handler``, which handles all special cases (stuffing, a missing ID, a silent
+servo).
 """
 
 from abc import ABC, abstractmethod
@@ -61,13 +60,7 @@ class GroupRead(ABC):
     def decoded(self, table: Bytes, request: GroupReadRequest, data: Bytes, error: Bytes) -> int:
         """Return the result of ``drivers.protocol.frames`` for these replies in one piece.
 
-        Args:
-            table: of the servos.
-            request: the request that the host expects.
-            data: (N, length) filled with the values that are read, unless the replies are
-                irregular.
-            error: (N,) filled likewise.
-
+        Fills ``data`` (N, length) and ``error`` (N,), unless the replies are irregular.
         """
         if not self._gapless:
             return IRREGULAR

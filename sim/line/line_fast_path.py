@@ -1,7 +1,7 @@
 """The regular control cycle on a simulated line: a group read without queues and parsers.
 
-The bytes are those of the wire, checked by the servos and by the host as always. Faults, taps,
-stuffing, two packets under way and other special cases are left to the wire.
+The bytes are those of the wire, which handles all special cases (faults, taps, stuffing, two
+packets under way).
 """
 
 from typing import Protocol

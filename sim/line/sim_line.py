@@ -146,11 +146,8 @@ class SimLine(Wire):
     def finish(self, request: GroupReadRequest, data: Bytes, error: Bytes, limit_s: float) -> int:
         """Receive the reply to the request of ``begin``; the clock moves to its end.
 
-        Args:
-            request: the group read.
-            data: (N, length) filled, unless the reply is irregular.
-            error: (N,) filled likewise.
-            limit_s: until when it is awaited.
+        Fills ``data`` (N, length) and ``error`` (N,), unless the reply is irregular. Waits until
+        ``limit_s``.
 
         Returns:
             Result of ``drivers.protocol.frames``; ``IRREGULAR`` if ``read_until`` has to read the

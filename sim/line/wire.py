@@ -1,12 +1,9 @@
 """The wire: a half-duplex bus as a byte port that owns simulated time.
 
 A byte lasts ten bit times. An instruction is executed when its last byte has arrived, and replies
-come after the servos' return delays. Nothing happens by itself: written bytes are executed when the
-host reads, waits, or writes again. Only reads and time-outs move the clock, as far as needed. So a
-run needs no thread and no sleep, and repeats bit for bit.
-
-The names of the public methods are those of the SDK's ``PortHandler``, on which the SDK is
-duck-typed, widened to ``drivers.port.byte_port.BytePort``.
+come after the servos' return delays. Written bytes are executed when the host reads, waits, or
+writes again. Only reads and time-outs move the clock. Implements the SDK's ``PortHandler`` and
+``drivers.port.byte_port.BytePort``.
 """
 
 # ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port.byte_port` describes them

@@ -1,14 +1,11 @@
 """The robot and its ground as a MuJoCo model.
 
-The head link floats, the others hang behind it, so MuJoCo's order of bodies and joints is ours. So
-it is with legs: they are written behind the rest of the spine, and MuJoCo counts depth first. A leg
-meets the ground with its foot, a ball under MuJoCo's own friction, and passes through all else.
-A link meets the ground with its belly: a capsule along it, or a ball, or two capsules as rails.
-On a height field each capsule is two balls, and every ball has tangent planes of its own
-(``sim.physics.tangent_planes``).
-Contacts are frictionless (``condim`` 1); friction is added by ``sim.physics.friction``, since
-MuJoCo's own cone knows no direction along a body. Links that are not neighbours touch each other,
-without friction.
+MuJoCo's order of bodies and joints is ours: the head floats, the other links follow, then the legs.
+A leg touches the ground only with its foot, a ball under MuJoCo's own friction. A link touches it
+with its belly: a capsule, a ball, or two capsules as rails. On a height field each capsule is two
+balls with tangent planes (``sim.physics.tangent_planes``). These contacts are frictionless
+(``condim`` 1), and ``sim.physics.friction`` adds friction. Links that are not neighbours touch each
+other, without friction.
 """
 
 import math
@@ -29,8 +26,8 @@ from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES
 STOP_MARGIN_RAD = 0.1
 """The mechanical stop is this far beyond the limit that a plan may use."""
 NOTCH = 0.6
-"""Most of a radius that two capsules at a straight joint may end short of it, each: then the notch
-between them is a fifth of the radius deep."""
+"""Largest gap between a capsule and a straight joint, in radii: the notch is a fifth of one
+deep."""
 CONTACT_TIME_S = 0.015
 """Time constant of the contact spring; MuJoCo needs at least two steps. Sinks 0.03 mm under the
 body's weight."""
@@ -78,8 +75,8 @@ def straight_part_m(length_m: float, radius_m: float) -> float:
     """Length of the straight part of a link's capsule belly.
 
     On a plane a capsule has two contacts, at the ends of this part. At ``length / sqrt(3)`` they
-    are the Gauss points of a load that is even along the link: forces and yaw torques of sliding
-    are those of the whole line. A slender link's is longer, so that the notches stay shallow.
+    are the Gauss points of an even load. It is longer for a slender link, so that notches stay
+    shallow.
     """
     return max(length_m / math.sqrt(3.0), length_m - 2.0 * NOTCH * radius_m)
 
@@ -87,8 +84,8 @@ def straight_part_m(length_m: float, radius_m: float) -> float:
 def belly_points_m(robot: RobotConfig, link: int) -> Floats:
     """(C, P, 3) centres, about a link's, of P balls in a row in each of its C capsules.
 
-    The first and the last are the ends of the straight part; between them there are more only if
-    the notches would be deeper than three tenths of the radius. C is 0 for a link without a belly.
+    More than two only if the notches would be deeper than 0.3 of the radius. C is 0 for a link
+    without a belly.
     """
     shape, radius_m = robot.link_shapes[link], robot.link_radii_m[link]
     if shape in ("ball", "none"):
@@ -137,9 +134,8 @@ def load_fault(text: str) -> str | None:
 def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
     """Fill in the elevations, which the text leaves out, and make all links equally soft.
 
-    MuJoCo makes a contact the softer the easier its body moves: of a chain that lies flat the ends
-    would carry half and the middle one and a half times their weight. That alone moves the speed
-    under isotropic friction by 14 %.
+    In MuJoCo a contact is softer if its body moves more easily. The ends of a flat chain would
+    carry 0.5 of their weight and the middle 1.5: 14 % of speed under isotropic friction.
     """
     borne = [k for k in range(1, model.nbody) if not _is_between_axes(model, k)]
     model.body_invweight0[1:] = model.body_invweight0[borne].mean(axis=0)

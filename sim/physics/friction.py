@@ -2,10 +2,9 @@
 
 The ellipse has the half axes ``mu_along N`` and ``mu_across N``. For a sliding velocity (v_a, v_c),
 maximum dissipation gives the force ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge* ``s =
-hypot(mu_a v_a, mu_c v_c)``. Friction backward may differ: then the forces fill two half ellipses
-with one axis across. They meet with one tangent, so the set is convex, and the dissipation is
-greatest on the half that opposes the sliding. Near rest each component is held to a share of the
-force that would stop the link within the step, so a link comes to rest without chatter at any step.
+hypot(mu_a v_a, mu_c v_c)``. If friction backward differs, the forces fill two half ellipses with
+one axis across. Near rest each component is limited to a share of the force that would stop the
+link within the step.
 """
 
 import math
@@ -40,9 +39,9 @@ def stop_share(centre_m: Floats, radius_m: float) -> float:
 
     Times its mass over the step this is the drag that stops the link, N s/m.
 
-    A straight body can also roll, which makes each contact three times lighter than its link (``1 +
-    r^2 / (r^2 / 2)``, solid cylinder). A bent one cannot, because the links off its axis resist:
-    their mean square distance from it, seen from above, adds to the ``r^2 / 2``.
+    A straight body can also roll, so the effective mass at a contact is a third of the link's (``1
+    + r^2 / (r^2 / 2)``, solid cylinder). In a bent body the mean square distance of the links from
+    its axis, seen from above, adds to the ``r^2 / 2``.
     """
     links = len(centre_m)
     x = y = xx = xy = yy = 0.0

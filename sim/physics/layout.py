@@ -1,8 +1,7 @@
 """The private interface of MuJoCo: the memory of ``mjData`` and C functions by address.
 
-Nothing else in snakewalk reads them. The arrays of ``mjData`` never move, except those of the
-contact solver, which each step lays out again. The offsets come from the description of the C
-structures in the mujoco package. ``step_layout`` checks them once per process.
+The arrays of ``mjData`` never move, except those of the contact solver. The offsets come from the
+description of the C structures in the mujoco package. ``step_layout`` checks them once per process.
 """
 
 import contextlib

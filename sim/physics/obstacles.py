@@ -1,7 +1,6 @@
 """Pole, pipe, pegs and walls in the model, and how a coiled body is put at the first two.
 
-Bodies touch them with MuJoCo's own cone (``condim`` 3), since an isotropic friction knows no
-direction along a body. The floor keeps the anisotropic friction of ``sim.physics.friction``.
+Bodies touch them with MuJoCo's own isotropic friction (``condim`` 3).
 """
 
 import math
@@ -78,8 +77,8 @@ def place_at_obstacle(
 ) -> bool:
     """Place a coiled body round the world's pole, or any body in its pipe, head up, at rest.
 
-    The coil is opened, or drawn together, until it just touches: the servos close it. Returns
-    False, and does nothing, where there is neither pole nor pipe, or a pole and no coil.
+    The coil is opened or closed until it just touches. Returns False, and does nothing, without
+    pole and pipe, or with a pole and no coil.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).

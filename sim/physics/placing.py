@@ -32,9 +32,9 @@ def place(
 ) -> None:
     """Place the body with its head above ``start_m``; ends at rest, with its contact forces.
 
-    On a height field the pitch joints are bent so that the links follow the ground. Then the body
-    is lowered until it first touches, and settles, strongly damped, with the joints held; the head
-    is free to sink and lean, but not to slide or turn.
+    On a height field the pitch joints bend so that the links follow the ground. Then the body is
+    lowered until it touches, and settles with strong damping and constant joints; the head may sink
+    and lean, but not slide or turn.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
@@ -121,7 +121,7 @@ def _pose(
 def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
     """Fit height, lean and pitch joints to the ground under the links: Gauss-Newton on clearances.
 
-    Not on the elevation under a link: its belly bridges a trench and rests on a step's edge.
+    Clearances are those of the bellies, which bridge a trench and rest on the edge of a step.
     """
     model, data = m.model, m.data
     free = np.array([2, 3, 4, *(6 + j for j in robot.pitch_joints)])

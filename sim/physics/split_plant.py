@@ -22,18 +22,14 @@ _INPUTS = 9
 class SplitPlant:
     """The shafts of ``plant`` that simulated servos turn; implements ``sim.plant.Plant``.
 
-    The others are drawn to where ``follow`` says that they were measured, by strong motors: their
-    weight, contacts and friction act on the simulated ones, and nothing acts back on the real ones.
+    Strong motors move the others to the angles of ``follow``: their weight, contacts and friction
+    act on the simulated ones, and nothing acts on the real ones.
     """
 
     def __init__(self, plant: Plant, motors: Sequence[MotorModel], real: Sequence[int]) -> None:
         """Prepare; the shafts that follow are limp until the first ``follow``.
 
-        Args:
-            plant: the whole body, J shafts.
-            motors: of the J servos.
-            real: places of the shafts that follow.
-
+        ``plant`` has J shafts; ``real`` are the places of the shafts that follow.
         """
         self._plant = plant
         self._real = np.array(sorted(real), np.intp)

@@ -1,7 +1,7 @@
-"""A twin: a second body, put where the robot is, on which motion is tried before it is made.
+"""A twin: a second simulated body at the robot's pose, on which a motion is tried first.
 
-Its joints are driven to their goals as servos drive them, without a bus. It is stepped twice as
-coarsely as the body that it foretells.
+Its joints have motors like those of servos, without a bus. Its steps are twice as long as those of
+the robot.
 """
 
 import mujoco
@@ -34,13 +34,7 @@ class PlantTwin:
     ) -> None:
         """Put it where the robot is, moving as the robot did since ``dt_s`` ago.
 
-        Args:
-            before: the head's pose ``dt_s`` ago.
-            now: the head's pose.
-            before_rad: (J,) joints ``dt_s`` ago.
-            now_rad: (J,) joints.
-            dt_s: more than 0.
-
+        ``before_rad`` and ``now_rad`` are (J,); ``dt_s`` is more than 0.
         """
         self._plant.set_state(_qpos(before, before_rad), _qpos(now, now_rad), dt_s)
 

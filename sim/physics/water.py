@@ -6,9 +6,9 @@ principle of G. I. Taylor, Proc. R. Soc. A 214, 1952). Per metre of a body of ra
 
     across: 1/2 rho C_D 2 r |v_n| v_n        along: 1/2 rho C_F pi r |v_t| v_t
 
-``v_n`` is a vector across the link: its size, not each component's, enters. A link is dragged at
-the two Gauss points of its length, which is exact for the drag of a cubic in the place, so turning
-links are braked too. Added mass is left out: MuJoCo's bodies weigh the same in all directions.
+``v_n`` is a vector across the link. Drag acts at the two Gauss points of a link's length, so it
+also brakes turning links. Added mass is not modelled: MuJoCo's bodies weigh the same in all
+directions.
 """
 
 import math

@@ -74,16 +74,8 @@ def render_film(
 ) -> int:
     """Write an MP4 (H.264 where PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,).
 
-    Args:
-        robot: the recorded robot.
-        world: where.
-        ground: its height field, None if flat.
-        time_s: increasing, s.
-        qpos: ``MujocoPlant.qpos`` at these times; of a free look, (T, 7 L).
-        path: of the film; its folder exists.
-        style: how it is drawn.
-        marks: objects that are drawn on the ground.
-        on_frame: called with (frames done, of) after each.
+    ``time_s`` increases. ``qpos`` are ``MujocoPlant.qpos``; of a free look, (T, 7 L). ``on_frame``
+    is called with (frames done, of) after each.
 
     Returns:
         Number of frames.

@@ -21,8 +21,7 @@ class OffscreenError(InputError):
 class Offscreen:
     """A frame buffer of one model; use it as a context manager, or ``close`` it.
 
-    Several may be open at once. OpenGL draws into, and deletes from, whichever context is current,
-    so each makes its own current before it does either, also when it is collected unclosed.
+    Several may be open at once: each makes its OpenGL context current before it draws or deletes.
 
     Raises:
         OffscreenError: neither OSMesa nor EGL works.

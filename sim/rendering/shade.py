@@ -1,8 +1,8 @@
 """The body's shade on the ground under the sun.
 
-MuJoCo's shadow maps need half of a software renderer's time. Drawn by OSMesa, they also leave out
-everything less than half a metre above the ground: all of a snake. A film draws one soft shadow
-(``SoftShade``). The simulated overhead camera draws a flat dark patch per link (``add_shade``).
+MuJoCo's shadow maps need half of a software renderer's time. With OSMesa they also omit everything
+below half a metre. A film draws one soft shadow (``SoftShade``). The simulated overhead camera
+draws a flat dark patch per link (``add_shade``).
 """
 
 import mujoco
@@ -133,13 +133,7 @@ def add_shade(
 ) -> None:
     """Append one patch per link to a scene that was just updated and has enough free geoms.
 
-    Args:
-        scene: the scene that is drawn next.
-        links_m: (L, 3) centres of the links.
-        forward: (L, 3) their axes.
-        robot: length and radius of the body.
-        ground: None on a plane.
-
+    ``links_m`` (L, 3) are the centres of the links, ``forward`` (L, 3) their axes.
     """
     place, normal = _on_ground(links_m, ground)
     place = place + LIFT_M * normal

@@ -89,11 +89,7 @@ class StereoView:
     ) -> tuple[Image, Image]:
         """(H, W, 3) left and right pictures, with the sensors' noise, without the robot.
 
-        Args:
-            at_m: of the left camera.
-            heading_rad: where it looks, seen from above.
-            tilt_rad: of its axis, downwards.
-
+        ``at_m`` is the left camera; ``heading_rad`` is seen from above, ``tilt_rad`` downwards.
         """
         c, s = math.cos(heading_rad), math.sin(heading_rad)
         return self.taken([CameraFrame(np.array(at_m), tilted(tilt_rad, _level(c, s)))])
@@ -103,10 +99,7 @@ class StereoView:
     ) -> tuple[Image, Image]:
         """(H, W, 3) left and right pictures of a left camera that moves while it exposes.
 
-        Args:
-            frames: where it is, one instant after the other: the picture is their mean.
-            qpos: (7 + J,) of the robot, which is in the picture then.
-
+        ``frames`` are successive poses; the picture is their mean. ``qpos`` is (7 + J,).
         """
         option = mujoco.MjvOption()
         option.geomgroup[1] = int(qpos is not None)  # the robot's skin

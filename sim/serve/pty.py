@@ -1,11 +1,9 @@
 """A pseudo-terminal with simulated servos behind it, in real time: a serial port for any client.
 
-The clock handed in is real time; ``pace`` times that is mirrored on the line's simulated clock
-whenever the server runs. Bytes that a client writes to ``path`` go onto the line, and replies are
-returned when their bytes have arrived. If the server stalls (a busy machine, or physics slower than
-real time), simulated time pauses, so that servos never age by a second between two bytes. A client
-that sets a baud rate retunes the line to it, so servos at another are silent; one that sets none is
-taken to have the line's.
+The line's simulated clock advances by ``pace`` times real time. Bytes that a client writes to
+``path`` go onto the line, and replies are returned when their bytes have arrived. If the server
+stalls (a busy machine, or physics slower than real time), simulated time pauses. If a client sets a
+baud rate, servos at another rate are silent.
 """
 
 import fcntl
@@ -28,12 +26,11 @@ from snakewalk.sim.line.wire import Wire
 IDLE_S = 0.02
 """How often physics catches up while no client talks."""
 SPIN_S = 1e-3
-"""Shorter waits are done without sleep: on a busy machine a sleeper is woken 10 ms late."""
+"""Shorter waits poll: on a busy machine a sleep may end 10 ms late."""
 LATE_S = 0.1
 """Real time that one step may make up for; the rest is left out."""
 PACE_MAX = 1000.0
-"""A step then makes up for 100 simulated seconds; one that nobody waits for to its end looks at no
-client and at no end of serving (ours)."""
+"""Largest factor of time (ours): a step then lasts 100 simulated seconds."""
 CHUNK_BYTES = 4096
 _SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUDS if hasattr(termios, f"B{baud}")}
 _OUTPUT_SPEED = 5
@@ -56,8 +53,8 @@ _LOGGER = logging.getLogger("snakewalk")
 class PtyServer:
     """Serves ``line`` at ``path`` from construction until ``close``; use it in a ``with``.
 
-    ``link`` is a symbolic link that always leads to the device, also after it has vanished and come
-    back under another name.
+    ``link`` is a symbolic link that always leads to the device, even if the name of the device
+    changes.
 
     Raises:
         InputError: ``link`` is taken, by a file or by a server that runs; ``pace`` is not

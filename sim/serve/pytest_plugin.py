@@ -4,10 +4,9 @@
         bus = servo_bus("1-6:XL330-M288")      # or servo_bus() for four XM430-W350
         my_driver.open(bus.path)               # a real serial device, in real time
 
-``bus.line`` is the same bus as a port object for the DYNAMIXEL SDK in simulated time: no thread, no
-sleep, the same every time. Registers by name: ``bus["Goal Position"]``; ``bus.set`` and
-``bus.load`` change registers and torques. The report of a failed test states how late the bus was
-served.
+``bus.line`` is the same bus as a port object for the DYNAMIXEL SDK in simulated time. Registers by
+name: ``bus["Goal Position"]``; ``bus.set`` and ``bus.load`` change registers and torques. The
+report of a failed test states the delay of the bus.
 """
 
 from collections.abc import Callable, Generator, Iterator

@@ -25,12 +25,10 @@ class Exchange:
 
 
 class RecordedLine(Wire):
-    """A line on which nobody is: it answers a packet as the recording does.
+    """A line without servos: it answers a packet as the recording does.
 
-    Packets are looked for from the last one that was found on, and then from the beginning, so that
-    a client that goes through the recording gets its replies in order. A write is compared by servo
-    and address only, so a client that writes other values gets the reply of the recorded ones.
-    Packets that the recording lacks get no reply.
+    It searches a packet from the last match to the end, and then from the beginning. For a write it
+    compares servo and address only. Packets that the recording lacks get no reply.
     """
 
     def __init__(self, exchanges: Sequence[Exchange], baud: int = 1_000_000) -> None:
