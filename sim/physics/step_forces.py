@@ -206,7 +206,7 @@ def _through_teeth(shafts: Shafts, j: int, pressed_n_m: float, step_s: float) ->
     gear, rotor = shafts.gears.terms[:, j], shafts.gears.rotor[:, j]
     inertia = (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
     if rotor[SIDE] != 0.0:
-        kick_n_m = inertia * rotor[KICK] / step_s
+        kick_n_m = float(inertia * rotor[KICK] / step_s)
         rotor[KICK] = 0.0
         return pressed_n_m + kick_n_m
     motors = shafts.motors

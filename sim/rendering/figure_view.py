@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model
@@ -83,7 +83,7 @@ class FigureView:
         return self._screen.draw(scene, caption).copy()
 
 
-def _normals(corners_m: Floats, faces: Floats) -> Floats:
+def _normals(corners_m: Floats, faces: Ints) -> Floats:
     """(V, 3) means of the faces around each corner, by area."""
     a, b, c = (corners_m[faces[:, k]] for k in range(3))
     face = np.cross(b - a, c - a)

@@ -53,7 +53,7 @@ def leg_joints_m(
     towards = _KNEE_UP * frame.up + side * frame.left if pair.knee == "out" else frame.ahead
     if pair.knee != "out" and not ahead:
         towards = -towards
-    joints = _triangle(root_m, toe_m - foot, towards, *_parts(pair, length_m, air))
+    joints = triangle_m(root_m, toe_m - foot, towards, *_parts(pair, length_m, air))
     if pair.foot > 0.0:
         joints.append(joints[-1] + foot)
     return np.stack(joints, axis=1)
@@ -93,7 +93,7 @@ def _parts(
     return [length_m * pair.blade * plain], length_m * pair.upper, third
 
 
-def _triangle(
+def triangle_m(
     root_m: Floats,
     end_m: Floats,
     towards: Floats,
@@ -101,7 +101,19 @@ def _triangle(
     middle_m: float,
     third: list[Complexes],
 ) -> list[Floats]:
-    """Joints (T, 3) from the root to the end of the third part."""
+    """Joints (T, 3) of a leg in its plane, from the root to the end of the third part.
+
+    Args:
+        root_m: (T, 3)
+        end_m: (T, 3) where the third part ends, or the middle segment if there is none.
+        towards: (T, 3) directions to which the first joint points, not along the leg.
+        first: segments (T,) before the middle one, as complex numbers in the plane.
+        middle_m: length of the segment between the two rigid parts.
+        third: segments (T,) after it, parallel to the first ones.
+
+    A leg that is too short is stretched towards its end; one that cannot fold enough is folded.
+
+    """
     way = end_m - root_m
     far = np.linalg.norm(way, axis=-1)
     down = way / np.maximum(far, 1e-12)[:, None]

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.legged.leg import knees_m
+from snakewalk.controller.animals.legged.leg import triangle_m
 from snakewalk.controller.animals.people.feet import Feet, FeetLaw, FootParameters, feet
 from snakewalk.controller.animals.people.skeleton import (
     ABDUCTION_RAD,
@@ -199,7 +199,7 @@ def _hips(skeleton: PersonSkeleton, pelvis: Floats) -> Floats:
     """(T, 2, 3) hips, from the pelvis."""
     rest = skeleton.joint_m
     local = rest[[INDEX["left thigh"], INDEX["right thigh"]]] - rest[INDEX["pelvis"]]
-    return np.einsum("tij,kj->tki", pelvis, local)
+    return np.asarray(np.einsum("tij,kj->tki", pelvis, local))
 
 
 def _pelvis(
@@ -258,11 +258,11 @@ def _joints(skeleton: PersonSkeleton, pelvis_m: Floats, turn: Floats, ankle_m: F
         front[:, k] = front[:, parent[k]] + turn[:, parent[k]] @ offset
         if k in (INDEX["left thigh"], INDEX["right thigh"]):
             side = 0 if k == INDEX["left thigh"] else 1
-            knee, ankle = knees_m(
-                front[:, k], ankle_m[:, side],
-                np.full(frames, skeleton.length_m[k]), np.full(frames, skeleton.length_m[k + 1]),
-                np.broadcast_to([1.0, 0.0, 0.0], (frames, 3)),
-            )  # fmt: skip
+            thigh = np.full(frames, skeleton.length_m[k], np.complex128)
+            ahead = np.broadcast_to([1.0, 0.0, 0.0], (frames, 3))
+            _, knee, ankle = triangle_m(
+                front[:, k], ankle_m[:, side], ahead, [thigh], float(skeleton.length_m[k + 1]), []
+            )
             front[:, k + 1], front[:, k + 2] = knee, ankle
             turn[:, k] = _hanging(knee - front[:, k])
             turn[:, k + 1] = _hanging(ankle - knee)

@@ -44,6 +44,6 @@ def worn_mesh(person: Person, mesh: Mesh) -> Rig:
 
 def _facing(place: Floats, normals: Floats, surface: Mesh) -> Ints:
     """(V,) the nearest corner of a surface whose normal is within 80 degrees of the given one."""
-    found = cKDTree(surface.vertices).query(place, k=_TRIED)[1]
+    found = np.asarray(cKDTree(surface.vertices).query(place, k=_TRIED)[1], np.int64)
     agree = np.einsum("vkx,vx->vk", surface.normals[found], normals) > _AGREE
     return np.asarray(found[np.arange(len(place)), agree.argmax(axis=1)])
