@@ -3,8 +3,8 @@
 On the ground a foot goes back at the speed of the trunk. In the air it goes forward by one stride
 over the ground, as a share ``I(p, q)`` of the time in the air, the regularised incomplete beta
 function. ``p = q = 2`` is the cubic of ``footfall.swing``, ``p = q = 3`` that of least jerk; other
-values leave sooner or land later. A model with one fixed shape takes the slow start of another
-shape for contact: by up to 0.14 of a cycle. All feet share one shape, because a single foot of a
+values leave sooner or land later. A model with one fixed shape counts the slow start of another
+shape as contact: up to 0.14 of a cycle. All feet share one shape, because a single foot of a
 noisy track hardly determines it.
 """
 

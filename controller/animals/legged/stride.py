@@ -156,30 +156,17 @@ def measure_stride(
     # a foot on the ground is still: relative to the smoothed trunk it goes evenly
     ahead = _over(beside, travel) - np.nanmean(_over(girdle - middle[:, None], travel), axis=0)
     side = travel[:, None, 0] * beside[..., 1] - travel[:, None, 1] * beside[..., 0]
+    side = np.full_like(side, np.nan) if from_side else side
     phase = time_s * frequency_hz
-    seen = np.isfinite(ahead)
-    if seen.sum(axis=0).min() < _FEWEST_FRAMES:
-        raise InputError(
-            f"a foot is seen in {int(seen.sum(axis=0).min())} frames; expected six or more"
-        )
-    fitted, shape = fit_contacts(
-        [phase[seen[:, k]] for k in range(4)], [ahead[seen[:, k], k] for k in range(4)], stride
-    )
+    fitted, shape = _fitted(phase, ahead, stride)
     first = fitted[0].down
     found = []
     for k, one in enumerate(fitted):
-        on = ((phase - one.down) % 1.0 < one.duty) & np.isfinite(side[:, k])
-        found.append(
-            Foot(
-                one.duty,
-                _spread(phase, ahead[:, k], stride, one, shape),
-                (one.down - first) % 1.0,
-                stride * one.duty,
-                one.ahead,
-                float("nan") if from_side else float(np.abs(np.median(side[on, k]))),
-                one.residual,
-            )
-        )
+        on = (phase - one.down) % 1.0 < one.duty
+        spread = _spread(phase, ahead[:, k], stride, one, shape)
+        aside = float(np.abs(_median(side[on, k])))
+        down, long = (one.down - first) % 1.0, stride * one.duty
+        found.append(Foot(one.duty, spread, down, long, one.ahead, aside, one.residual))
     at = float(places[front]), float(places[hind])
     turned, lifts = (float("nan"), float("nan")), (float("nan"), float("nan"))
     if from_side:
@@ -190,6 +177,25 @@ def measure_stride(
         1.0 / frequency_hz, float(cycles), stride, length, at, turned,
         (found[0], found[1], found[2], found[3]), phase - first, ahead, shape, lifts,
     )  # fmt: skip
+
+
+def _fitted(
+    phase: Floats, ahead: Floats, stride: float
+) -> tuple[list[Contact], tuple[float, float]]:
+    """Contacts of feet (T, 4), NaN where not seen, and the shape of their ways in the air."""
+    seen = np.isfinite(ahead)
+    fewest = int(seen.sum(axis=0).min())
+    if fewest < _FEWEST_FRAMES:
+        raise InputError(f"a foot is seen in {fewest} frames; expected six or more")
+    each = range(ahead.shape[1])
+    return fit_contacts(
+        [phase[seen[:, k]] for k in each], [ahead[seen[:, k], k] for k in each], stride
+    )
+
+
+def _median(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _lifts(fitted: list[Contact], phase: Floats, height: Floats) -> tuple[float, float]:
