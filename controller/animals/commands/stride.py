@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
+from snakewalk.controller.animals.legged.animal_stride import VIEWS, Names, measure_animal
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (
@@ -38,7 +38,7 @@ from snakewalk.controller.track.readers.load import load_keypoints
 def stride(
     keypoints: Annotated[
         Path,
-        typer.Argument(help="file of keypoints seen from above: SLEAP, DeepLabCut, QTM or C3D"),
+        typer.Argument(help="file of keypoints: SLEAP, DeepLabCut, QTM or C3D"),
     ],
     spine: Annotated[str, typer.Option(help="A,B,C: keypoints along the spine, head first")],
     girdles: Annotated[
@@ -59,6 +59,13 @@ def stride(
     length_m: Annotated[
         float | None, typer.Option(help="length of the spine in metres; default: the file's scale")
     ] = None,
+    view: Annotated[
+        str,
+        typer.Option(
+            help="view of the camera: above; or side, on level ground",
+            autocompletion=completion.words(*VIEWS),
+        ),
+    ] = "above",
     rate: Rate = None,
     min_score: MinScore = None,
     individual: Individual = None,
@@ -76,7 +83,7 @@ def stride(
     if picture is not None:
         check_picture(picture)
     held = load_keypoints(keypoints, rate, min_score, choice_of(individual, None, plane))
-    made = measure_animal(held, names, animal, output.stem, length_m)
+    made = measure_animal(held, names, animal, output.stem, length_m, view)
     with atomic_write(output) as part:
         part.write_text(made.text(), encoding="utf-8")
     if picture is not None:

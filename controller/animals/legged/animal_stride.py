@@ -14,6 +14,8 @@ from snakewalk.controller.animals.legged.prototype import LEGS
 from snakewalk.controller.animals.legged.stride import Foot, Stride, measure_stride
 from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypoints
 
+VIEWS = ("above", "side")
+"""Views of a camera on an animal."""
 _FEWEST_POINTS = 3
 _HEAD = """An animal by the stride of a tracked one; height, knees and skin are those of {like}.
   snakewalk synthesise jacksboro-traverse --animal {name}.toml --film
@@ -83,7 +85,8 @@ class MeasuredAnimal:
             "duty_sd": {leg: _rounded(foot.duty_sd) for leg, foot in self._feet()},
             "comes_down_cycles": {leg: round(foot.down, 3) for leg, foot in self._feet()},
             "fit_rms_body_lengths": {leg: round(foot.residual, 4) for leg, foot in self._feet()},
-            "girdle_turn_rad": [round(turn, 3) for turn in found.turn_rad],
+            "girdle_turn_rad": [_rounded(turn) for turn in found.turn_rad],
+            "lift_body_lengths": [_rounded(lift) for lift in found.lift],
         }
 
     def _feet(self) -> "zip[tuple[str, Foot]]":
@@ -91,21 +94,29 @@ class MeasuredAnimal:
 
 
 def measure_animal(
-    keypoints: Keypoints, names: Names, like: str, name: str, length_m: float | None
+    keypoints: Keypoints,
+    names: Names,
+    like: str,
+    name: str,
+    length_m: float | None,
+    view: str = "above",
 ) -> MeasuredAnimal:
     """Measure the stride of a tracked animal.
 
     Args:
-        keypoints: all of one animal's, seen from above.
+        keypoints: all of one animal's.
         names: which of them are what.
         like: animal whose other figures are taken.
         name: of the new one.
         length_m: of the spine; None: by the file's scale, else as long as the other one.
+        view: above or side.
 
     Raises:
-        InputError: no such keypoint, or no stride can be measured.
+        InputError: no such keypoint or view, or no stride can be measured.
 
     """
+    if view not in VIEWS:
+        raise InputError(f"--view {view}: choose {' or '.join(VIEWS)}")
     other = read_animal(like)
     if length_m is not None and not (np.isfinite(length_m) and length_m > 0.0):
         raise InputError(f"--length-m {length_m:g}: must be a positive number of metres")
@@ -115,7 +126,7 @@ def measure_animal(
     girdles = names.spine.index(names.girdles[0]), names.spine.index(names.girdles[1])
     count = len(names.spine)
     try:
-        found = measure_stride(places[:, :count], places[:, count:], girdles, rate_hz)
+        found = measure_stride(places[:, :count], places[:, count:], girdles, rate_hz, view)
     except InputError as error:
         raise InputError(f"{keypoints.file}: {error}") from None
     if length_m is None:

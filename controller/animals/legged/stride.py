@@ -1,27 +1,31 @@
 """The stride of a tracked animal: statistics of its joints over one cycle ([KP] 4.2.2).
 
-Every figure is that of a motion model fitted to the tracks. A foot's way over the trunk is that of
-``footfall.swing``, so its contact is found without a threshold on its speed. A girdle's turn is the
-wave, at the frequency of the feet, that the headings of the spine's segments share.
+Every figure is that of a motion model fitted to the tracks. ``contact_fit`` finds contacts without
+a threshold on a foot's speed. A girdle's turn is the wave, at the frequency of the feet, that the
+headings of the spine's segments share.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from snakewalk.config.animal import AnimalConfig
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.legged.contact_fit import (
+    Contact,
+    duty_of_cycle,
+    fit_contacts,
+    step,
+)
 from snakewalk.controller.animals.legged.prototype import spine_shares
-from snakewalk.controller.gaits.footfall import swing
+from snakewalk.controller.gaits.footfall import lift
 from snakewalk.controller.gaits.wave import TURN
 
 FEWEST_CYCLES = 2.0
 _FEWEST_FRAMES = 6
 """Fewest frames of a cycle."""
-_PLACES = 24
 _MOST_HZ = 0.3
 """Share of the frame rate: the highest frequency of the search."""
 
@@ -41,7 +45,7 @@ class Foot:
     ahead: float
     """Middle of a step, ahead of its girdle, body lengths."""
     side: float
-    """Distance from the line of travel on the ground, body lengths."""
+    """Distance from the line of travel on the ground, body lengths; NaN from the side."""
     residual: float
     """RMS of the fit along the way, body lengths."""
 
@@ -60,13 +64,17 @@ class Stride:
     at: tuple[float, float]
     """Places of the girdles along the spine: front, hind."""
     turn_rad: tuple[float, float]
-    """Turn of the girdles, to either side."""
+    """Turn of the girdles, to either side; NaN from the side."""
     feet: tuple[Foot, Foot, Foot, Foot]
     """In the order of ``LEGS``."""
     phase: Floats
     """(T,) cycles since the front left foot first came down."""
     ahead: Floats
-    """(T, 4) of the feet ahead of their girdles, body lengths; NaN where not seen."""
+    """(T, 4) of the feet ahead of their girdles' mean places, body lengths; NaN where not seen."""
+    shape: tuple[float, float]
+    """p and q of the way of the feet in the air (``contact_fit``)."""
+    lift: tuple[float, float]
+    """Heights of a step of the front and the hind feet, body lengths; NaN from above."""
 
     def of(self, animal: AnimalConfig, name: str, source: str, length_m: float) -> AnimalConfig:
         """Return an animal with this motion; other figures come from ``animal``."""
@@ -85,25 +93,31 @@ class Stride:
 
     def _pair(self, k: int) -> dict[str, float]:
         left, right = self.feet[2 * k], self.feet[2 * k + 1]
-        return {
+        measured = {
+            "foot_side": 0.5 * (left.side + right.side),
+            "turn_rad": self.turn_rad[k],
+            "lift": self.lift[k],
+        }
+        return {name: round(value, 4) for name, value in measured.items() if np.isfinite(value)} | {
             "at": round(self.at[k], 4),
             "duty": round(float(np.clip(0.5 * (left.duty + right.duty), 0.11, 0.94)), 3),
             "left": round(left.down % 1.0, 3) % 1.0,
             "right": round(right.down % 1.0, 3) % 1.0,
-            "foot_side": round(0.5 * (left.side + right.side), 4),
             "foot_ahead": round(0.5 * (left.ahead + right.ahead), 4),
-            "turn_rad": round(self.turn_rad[k], 4),
         }
 
 
-def measure_stride(spine: Floats, feet: Floats, girdles: tuple[int, int], rate_hz: float) -> Stride:
-    """Measure the stride of an animal seen from above.
+def measure_stride(
+    spine: Floats, feet: Floats, girdles: tuple[int, int], rate_hz: float, view: str = "above"
+) -> Stride:
+    """Measure the stride of an animal seen from above, or from its side on level ground.
 
     Args:
-        spine: (T, P, 2) points along it in plan, head first, to the right and upwards, in any unit.
+        spine: (T, P, 2) points along it, head first, to the right and upwards, in any unit.
         feet: (T, 4, 2) in the order of ``LEGS``; NaN where one was not seen, as of the spine.
         girdles: indices of the spine's points at the front and the hind legs.
         rate_hz: frames a second.
+        view: above; or side, which shows heights of steps, and no turns and places to the side.
 
     Raises:
         InputError: fewer than two cycles, too few frames in one, or an animal that does not walk.
@@ -113,6 +127,12 @@ def measure_stride(spine: Floats, feet: Floats, girdles: tuple[int, int], rate_h
     spine, feet = _bridged(spine, time_s), np.asarray(feet, float)
     length = float(np.median(np.linalg.norm(np.diff(spine, axis=1), axis=-1).sum(axis=1)))
     spine, feet = spine / length, feet / length
+    mean = np.linalg.norm(np.diff(spine, axis=1), axis=-1).mean(axis=0)
+    places = np.concatenate([[0.0], np.cumsum(mean)]) / mean.sum()
+    from_side = view == "side"
+    height = feet[..., 1].copy()
+    if from_side:
+        spine, feet = (np.where([True, False], points, 0.0 * points) for points in (spine, feet))
     front, hind = girdles
     girdle = spine[:, [front, front, hind, hind]]
     rough = _smoothed(spine[:, front] - spine[:, hind], max(3, len(spine) // 4))
@@ -132,40 +152,68 @@ def measure_stride(spine: Floats, feet: Floats, girdles: tuple[int, int], rate_h
     if stride < 0.05:
         raise InputError(f"{stride:.3f} body lengths a cycle: the animal does not walk")
     travel = _unit(_smoothed(np.gradient(middle, axis=0), 3))
-    along, beside = feet - girdle, feet - middle[:, None]
-    ahead = _over(along, travel)
+    beside = feet - middle[:, None]
+    # a foot on the ground is still: relative to the smoothed trunk it goes evenly
+    ahead = _over(beside, travel) - np.nanmean(_over(girdle - middle[:, None], travel), axis=0)
     side = travel[:, None, 0] * beside[..., 1] - travel[:, None, 1] * beside[..., 0]
+    side = np.full_like(side, np.nan) if from_side else side
     phase = time_s * frequency_hz
-    fitted = [_fit(phase, ahead[:, k], stride) for k in range(4)]
-    first = fitted[0][1]
+    fitted, shape = _fitted(phase, ahead, stride)
+    first = fitted[0].down
     found = []
-    for k, (duty, down, offset, residual) in enumerate(fitted):
-        on = ((phase - down) % 1.0 < duty) & np.isfinite(side[:, k])
-        found.append(
-            Foot(
-                duty,
-                _spread(phase, ahead[:, k], stride, down),
-                (down - first) % 1.0,
-                stride * duty,
-                offset,
-                float(np.abs(np.median(side[on, k]))),
-                residual,
-            )
-        )
-    mean = np.linalg.norm(np.diff(spine, axis=1), axis=-1).mean(axis=0)
-    places = np.concatenate([[0.0], np.cumsum(mean)]) / mean.sum()
+    for k, one in enumerate(fitted):
+        on = (phase - one.down) % 1.0 < one.duty
+        spread = _spread(phase, ahead[:, k], stride, one, shape)
+        aside = float(np.abs(_median(side[on, k])))
+        down, long = (one.down - first) % 1.0, stride * one.duty
+        found.append(Foot(one.duty, spread, down, long, one.ahead, aside, one.residual))
     at = float(places[front]), float(places[hind])
-    turned = _turns(spine, travel, phase, places, at)
+    turned, lifts = (float("nan"), float("nan")), (float("nan"), float("nan"))
+    if from_side:
+        lifts = _lifts(fitted, phase, height)
+    else:
+        turned = _turns(spine, travel, phase, places, at)
     return Stride(
         1.0 / frequency_hz, float(cycles), stride, length, at, turned,
-        (found[0], found[1], found[2], found[3]), phase - first, ahead,
+        (found[0], found[1], found[2], found[3]), phase - first, ahead, shape, lifts,
     )  # fmt: skip
+
+
+def _fitted(
+    phase: Floats, ahead: Floats, stride: float
+) -> tuple[list[Contact], tuple[float, float]]:
+    """Contacts of feet (T, 4), NaN where not seen, and the shape of their ways in the air."""
+    seen = np.isfinite(ahead)
+    fewest = int(seen.sum(axis=0).min())
+    if fewest < _FEWEST_FRAMES:
+        raise InputError(f"a foot is seen in {fewest} frames; expected six or more")
+    each = range(ahead.shape[1])
+    return fit_contacts(
+        [phase[seen[:, k]] for k in each], [ahead[seen[:, k], k] for k in each], stride
+    )
+
+
+def _median(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
+def _lifts(fitted: list[Contact], phase: Floats, height: Floats) -> tuple[float, float]:
+    """Heights of a step of the front and the hind feet, from heights (T, 4)."""
+    found = []
+    for k, one in enumerate(fitted):
+        seen = np.isfinite(height[:, k])
+        rise = lift((phase[seen] - one.down) % 1.0, one.duty)
+        basis = np.stack([np.ones_like(rise), rise], axis=-1)
+        found.append(float(np.linalg.lstsq(basis, height[seen, k], rcond=None)[0][1]))
+    front, hind = 0.5 * (found[0] + found[1]), 0.5 * (found[2] + found[3])
+    return max(front, 0.0), max(hind, 0.0)
 
 
 def model_ahead(stride: Stride, foot: int, phase: Floats) -> Floats:
     """Fitted way of a foot ahead of its girdle, body lengths, at cycles after the first foot."""
     one = stride.feet[foot]
-    return one.ahead + 0.5 * one.step * swing((phase - one.down) % 1.0, one.duty)
+    return one.ahead + step((phase - one.down) % 1.0, stride.stride, one.duty, stride.shape)
 
 
 def _bridged(points: Floats, time_s: Floats) -> Floats:
@@ -207,44 +255,15 @@ def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
     return float(minimize_scalar(unexplained, bounds=bounds, method="bounded").x)
 
 
-def _fit(phase: Floats, ahead: Floats, stride: float) -> tuple[float, float, float, float]:
-    """Duty, touch-down of the foot in cycles, middle of its step, RMS of the residual."""
-    seen = np.isfinite(ahead)
-    if seen.sum() < _FEWEST_FRAMES:
-        raise InputError(f"a foot is seen in {int(seen.sum())} frames; expected six or more")
-    at, way = phase[seen], ahead[seen]
-
-    def left(duty: float, down: float) -> tuple[float, float]:
-        model = 0.5 * stride * duty * swing((at - down) % 1.0, duty)
-        offset = float(np.mean(way - model))
-        return float(np.sqrt(np.mean((way - model - offset) ** 2))), offset
-
-    grid = np.meshgrid(np.arange(0.2, 0.9, 0.05), np.arange(_PLACES) / _PLACES, indexing="ij")
-    duties, downs = (values.reshape(-1, 1) for values in grid)
-    off = way - 0.5 * stride * duties * swing((at - downs) % 1.0, duties)
-    best = int(np.argmin(off.var(axis=1)))
-
-    def cost(x: Any) -> float:  # scipy's stubs know no array of floats here
-        return left(float(np.clip(x[0], 0.12, 0.93)), float(x[1]))[0]
-
-    found = minimize(
-        cost,
-        np.array([duties[best, 0], downs[best, 0]]),
-        method="Nelder-Mead",
-        options={"xatol": 1e-5, "fatol": 1e-9},
-    )
-    duty, down = float(np.clip(found.x[0], 0.12, 0.93)), float(found.x[1]) % 1.0
-    residual, offset = left(duty, down)
-    return duty, down, offset, residual
-
-
-def _spread(phase: Floats, ahead: Floats, stride: float, down: float) -> float:
+def _spread(
+    phase: Floats, ahead: Floats, stride: float, like: Contact, shape: tuple[float, float]
+) -> float:
     """Standard deviation of the duty of single cycles, each begun when the foot comes down."""
     each = []
-    for cycle in range(int(np.ceil(phase[0] - down)), int(np.floor(phase[-1] - down))):
-        one = (phase - down >= cycle) & (phase - down < cycle + 1) & np.isfinite(ahead)
+    for cycle in range(int(np.ceil(phase[0] - like.down)), int(np.floor(phase[-1] - like.down))):
+        one = (phase - like.down >= cycle) & (phase - like.down < cycle + 1) & np.isfinite(ahead)
         if one.sum() >= _FEWEST_FRAMES:
-            each.append(_fit(phase[one], ahead[one], stride)[0])
+            each.append(duty_of_cycle(phase[one], ahead[one], stride, like, shape))
     return float(np.std(each, ddof=1)) if len(each) > 2 else float("nan")
 
 

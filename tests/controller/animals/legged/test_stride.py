@@ -1,11 +1,14 @@
 """The stride of a tracked animal: planted figures come back through the camera's pixels."""
 
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from snakewalk.config.animal import AnimalConfig
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load
 from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
@@ -43,10 +46,78 @@ def test_planted_figures_come_back(name: str, frames: int, seed: int) -> None:
         assert foot.duty == pytest.approx(pair.duty, abs=0.03)
         assert abs((foot.down - down + 0.5) % 1.0 - 0.5) < 0.025
         assert foot.side == pytest.approx(pair.foot_side, abs=0.006)
-        assert foot.ahead == pytest.approx(pair.foot_ahead, abs=0.006)
+        assert foot.ahead == pytest.approx(pair.foot_ahead, abs=0.008)
         assert foot.residual < 3.0 * NOISE
     for turn, pair in zip(found.turn_rad, animal.leg_pairs, strict=True):
         assert turn == pytest.approx(pair.turn_rad, abs=0.03)
+
+
+SWINGS: dict[str, Callable[[Floats], Floats]] = {
+    "cubic": lambda air: air**2 * (3.0 - 2.0 * air),
+    "least jerk": lambda air: air**3 * (10.0 - 15.0 * air + 6.0 * air**2),
+    "cycloid": lambda air: air - np.sin(2.0 * np.pi * air) / (2.0 * np.pi),
+    "lands late": lambda air: 1.0 - (1.0 - air**1.6) ** 2,
+}
+"""Ways of a foot over the ground during its time in the air: 0 to 1."""
+_STRIDE, _DOWN = 0.5, (0.0, 0.5, 0.25, 0.75)
+
+
+def walker(
+    swing: str, duty: tuple[float, float], noise: float, seed: int, frames: int = 30
+) -> tuple[Floats, Floats, Floats]:
+    """Return spine (T, 5, 2), feet (T, 4, 2) and their heights (T, 4) of ten cycles on a line."""
+    cycles = np.arange(10 * frames) / frames + 0.13
+    rng = np.random.default_rng(seed)
+    places = np.array([0.0, 0.2, 0.45, 0.7, 1.0])
+    spine = np.zeros((len(cycles), 5, 2))
+    spine[..., 0] = _STRIDE * cycles[:, None] - places
+    feet, height = np.zeros((len(cycles), 4, 2)), np.zeros((len(cycles), 4))
+    for k, down in enumerate(_DOWN):
+        since = cycles - down
+        air = np.clip((since % 1.0 - duty[k // 2]) / (1.0 - duty[k // 2]), 0.0, 1.0)
+        way = np.floor(since) + SWINGS[swing](air) + down + 0.5 * duty[k // 2]
+        feet[:, k, 0] = _STRIDE * way - places[1 if k < 2 else 3]
+        feet[:, k, 1] = 0.1 * (1.0 if k % 2 == 0 else -1.0)
+        height[:, k] = 0.06 * np.sin(np.pi * air) ** 2
+    spine, feet = (points + rng.normal(0.0, noise, points.shape) for points in (spine, feet))
+    return spine, feet, height + rng.normal(0.0, noise, height.shape)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_contact_is_known_to_a_fiftieth_of_a_cycle(seed: int) -> None:
+    """One fixed shape of the way in the air was 0.05 to 0.14 wrong for two of these four."""
+    swing = list(SWINGS)[seed % 4]
+    duty = ((0.45, 0.5), (0.5, 0.53), (0.63, 0.66), (0.72, 0.75), (0.6, 0.5))[seed % 5]
+    spine, feet, _ = walker(swing, duty, 0.002, seed)
+    found = measure_stride(spine, feet, (1, 3), 30.0)
+    assert found.cycle_s == pytest.approx(1.0, rel=0.002)
+    assert found.stride == pytest.approx(_STRIDE, rel=0.005)
+    for k, foot in enumerate(found.feet):
+        assert foot.duty == pytest.approx(duty[k // 2], abs=0.02)
+        off = foot.down - _DOWN[k]
+        assert abs((off + 0.5) % 1.0 - 0.5) < 0.02
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_view_from_the_side_gives_contact_and_height_of_a_step(mirrored: bool) -> None:
+    """On level ground, to either side; places and turns to the side are not seen."""
+    spine, feet, height = walker("cubic", (0.63, 0.66), 0.002, 3)
+    spine[..., 1] += [0.9, 0.8, 0.75, 0.75, 0.7]
+    feet[..., 1] = height
+    feet[40:60, 1] = np.nan  # behind another leg
+    if mirrored:
+        spine, feet = spine * [-1.0, 1.0], feet * [-1.0, 1.0]
+    found = measure_stride(spine, feet, (1, 3), 30.0, view="side")
+    for k, foot in enumerate(found.feet):
+        assert foot.duty == pytest.approx((0.63, 0.66)[k // 2], abs=0.02)
+        assert np.isnan(foot.side)
+    length = np.hypot(*np.diff(spine.mean(axis=0), axis=0).T).sum()
+    assert found.lift == pytest.approx((0.06 / length, 0.06 / length), rel=0.05)
+    goat = read_animal("goat")
+    mine = found.of(goat, "mine", "a film", 1.0)
+    assert [pair.foot_side for pair in mine.leg_pairs] == [0.052, 0.052]  # not measured
+    assert mine.leg_pairs[0].lift == pytest.approx(0.06 / length, rel=0.05)
+    assert mine.leg_pairs[0].turn_rad == goat.leg_pairs[0].turn_rad
 
 
 def test_what_is_no_walk_is_told() -> None:
@@ -133,6 +204,7 @@ def test_files_as_trackers_write_them_give_the_stride(
         ("--girdles", "neck,FL", "expected two names of the spine"),
         ("--feet", "FL,FR,HL", "expected four other names: front left"),
         ("--feet", "FL,FR,HL,paw", "it has no paw; it has nose, neck"),
+        ("--view", "below", "choose above or side"),
         ("--animal", "nosuch", "no such animal; shipped are goat, lizard"),
     ],
 )
