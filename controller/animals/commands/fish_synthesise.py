@@ -32,9 +32,7 @@ def synthesise(
     postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
     through: Annotated[
         list[str] | None,
-        typer.Option(
-            help="control point X,Y or X,Y,Z from the start, x along the head; may be repeated"
-        ),
+        typer.Option(help="control point X,Y or X,Y,Z; may be repeated"),
     ] = None,
     seconds: Annotated[
         float,
@@ -43,6 +41,20 @@ def synthesise(
     seed: Annotated[int, typer.Option(min=0, help="seed of the random order")] = 0,
     radius: Annotated[
         float, typer.Option(min=0.01, help="radius of a control point in body lengths")
+    ] = 0.1,
+    start: Annotated[
+        str, typer.Option(help="place and direction in degrees of the first posture: X,Y,DEGREES")
+    ] = "0,0,0",
+    tank: Annotated[
+        str | None, typer.Option(help="walls to keep away from: XMIN,YMIN,XMAX,YMAX")
+    ] = None,
+    avoid: Annotated[
+        list[Path] | None,
+        typer.Option(help="track of another fish to keep away from; may be repeated"),
+    ] = None,
+    apart: Annotated[
+        float,
+        typer.Option(min=0.0, help="least distance from walls and other fish in body lengths"),
     ] = 0.5,
     limit: Annotated[
         float,
@@ -86,7 +98,7 @@ def synthesise(
     options = SynthesisOptions(
         through=_points(through or []), seconds=seconds, seed=seed, radius=radius, limit_s=limit,
         mirror=mirror, within_deg=within, merge_deg=merge, reference=reference, blend_s=blend,
-        robot=robot,
+        robot=robot, tank=_tank(tank), start=_start(start), avoid=tuple(avoid or ()), apart=apart,
     )  # fmt: skip
     check_npz(output)
     made = synthesise_motion(load_postures(postures), options)
@@ -111,4 +123,28 @@ def _points(words: list[str]) -> list[tuple[float, ...]]:
         found.append(point)
     if len({len(point) for point in found}) > 1:
         raise InputError("--through: give the height of all control points, or of none")
+    return found
+
+
+def _tank(word: str | None) -> tuple[float, float, float, float] | None:
+    """Return the walls of ``--tank``."""
+    if word is None:
+        return None
+    x0, y0, x1, y1 = _numbers("--tank", word, 4, "XMIN,YMIN,XMAX,YMAX, as in -2,-2,6,4")
+    return x0, y0, x1, y1
+
+
+def _start(word: str) -> tuple[float, float, float]:
+    """Return place and direction of ``--start``."""
+    x, y, head_deg = _numbers("--start", word, 3, "X,Y,DEGREES, as in 1,0.5,90")
+    return x, y, head_deg
+
+
+def _numbers(option: str, word: str, count: int, form: str) -> list[float]:
+    try:
+        found = [float(part) for part in word.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != count or not all(map(math.isfinite, found)):
+        raise InputError(f"{option} {word}: give {form}")
     return found

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
@@ -18,6 +19,8 @@ from snakewalk.controller.animals.fish.segments import (
     commonest_posture,
     segment_motion,
 )
+from snakewalk.controller.animals.fish.steering import steered
+from snakewalk.controller.animals.fish.surroundings import Surroundings
 from snakewalk.controller.animals.fish.synthesis import (
     PieceSequence,
     compose,
@@ -30,6 +33,9 @@ from snakewalk.controller.animals.fish.synthesis import (
 )
 from snakewalk.controller.kinematics.retarget import Retarget
 
+_CAPTURE = 0.5
+"""Distance from a control point, in body lengths, from which the way is bent to it (ours)."""
+
 
 @dataclass(frozen=True, slots=True)
 class SynthesisOptions:
@@ -39,8 +45,16 @@ class SynthesisOptions:
     """X, Y or X, Y, Z; all alike."""
     seconds: float = 20.0
     seed: int = 0
-    radius: float = 0.5
-    """Body lengths."""
+    radius: float = 0.1
+    """Distance at which a control point is passed, body lengths."""
+    tank: tuple[float, float, float, float] | None = None
+    """Lowest x and y, highest x and y of the walls; None: no walls."""
+    avoid: tuple[Path, ...] = ()
+    """Motions of other fish, made by ``fish synthesise``."""
+    apart: float = 0.5
+    """Least distance from walls and other fish, body lengths."""
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Place and direction in degrees of the first posture."""
     limit_s: float = 120.0
     mirror: bool = False
     within_deg: float = 4.0
@@ -62,6 +76,16 @@ class SynthesisFacts:
     joins_without_rule: int
     reached_s: list[float]
     robot: str
+    reached_within: list[float] | None = None
+    """Distance from each control point, body lengths."""
+    steered_deg: float | None = None
+    """Largest change of direction by which the way was bent to the control points."""
+    pieces_too_close: int | None = None
+    """Segments that come nearer to walls or fish than asked, as no other choice was left."""
+    wall_distance: float | None = None
+    """Smallest distance of the body from the walls; below 0 it is outside."""
+    fish_distance: float | None = None
+    """Smallest distance between the heads of this and other fish."""
     join_step_deg: float | None = None
     """Largest joint step where one piece ends and the next begins; None with one piece."""
     join_step_blended_deg: float | None = None
@@ -103,18 +127,34 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
     robot = load_robot(options.robot)
     segments = _segments(source, options)
     pieces = piece_graph(source, segments, mirror=options.mirror)
+    around = _surroundings(source, options)
+    reached: dict[str, object] = {}
     if options.through:
-        points = np.array(options.through)
-        radius = options.radius * source.length
-        sequence = sequence_through(pieces, points, radius=radius, limit_s=options.limit_s)
+        points, radius = np.array(options.through), options.radius * source.length
+        sequence = sequence_through(
+            pieces, points, radius=0.5 * radius, limit_s=options.limit_s,
+            capture=max(_CAPTURE * source.length, radius), around=around,
+        )  # fmt: skip
+        found = steered(
+            compose(pieces, sequence, options.blend_s, around.start),
+            points,
+            sequence.reached_at,
+            0.5 * radius,
+        )
+        reached = {
+            "reached_s": [round(at / pieces.rate_hz, 2) for at in found.reached_at],
+            "reached_within": [round(float(off) / source.length, 4) for off in found.distance],
+            "steered_deg": round(float(np.degrees(found.turn_rad)), 1),
+        }
+        composed = found.motion
     else:
-        sequence = random_sequence(pieces, options.seconds, np.random.default_rng(options.seed))
+        rng = np.random.default_rng(options.seed)
+        sequence = random_sequence(pieces, options.seconds, rng, around)
+        composed = compose(pieces, sequence, options.blend_s, around.start)
     motion = replace(
-        compose(pieces, sequence, options.blend_s),
-        name=f"{source.name}, put together anew",
-        source=source.source,
+        composed, name=f"{source.name}, put together anew", source=source.source,
         licence=source.licence,
-    )
+    )  # fmt: skip
     retarget = Retarget(robot)
     joints = joint_motion(pieces, sequence, retarget, options.blend_s)
     kinds = Counter(str(segment.kind) for segment in segments)
@@ -124,9 +164,13 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         pieces_used=len(sequence.order),
         seconds=round((motion.frames - 1) / motion.rate_hz, 2),
         joins_without_rule=sequence.forced,
-        reached_s=[round(at, 2) for at in sequence.reached_s],
+        reached_s=[],
         robot=robot.name,
+        pieces_too_close=sequence.crowded if around.any else None,
+        wall_distance=_rounded(around.wall_distance(motion)),
+        fish_distance=_rounded(around.fish_distance(motion)),
     )
+    facts = replace(facts, **reached)
     if motion.height is not None and motion.pitch_rad is not None:
         facts = replace(
             facts, height_range=_range(motion.height), pitch_range_deg=_range(
@@ -158,6 +202,38 @@ def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment
         raise InputError(f"--reference {options.reference}: straight or commonest")
     segmentation = Segmentation(within_rad=within, merge_rad=float(np.radians(options.merge_deg)))
     return segment_motion(source, segmentation, reference)
+
+
+def _surroundings(source: Postures, options: SynthesisOptions) -> Surroundings:
+    """Return walls and fish in the recording's unit.
+
+    Raises:
+        InputError: a tank without inside, or one that does not hold the start.
+
+    """
+    tank = None
+    if options.tank is not None:
+        tank = np.array(options.tank).reshape(2, 2)
+        if not ((tank[0] < options.start[:2]) & (tank[1] > options.start[:2])).all():
+            raise InputError(
+                "--tank: the fish does not start inside; give XMIN,YMIN,XMAX,YMAX, or --start"
+            )
+    others = []
+    for file in options.avoid:
+        held, _ = read_arrays(file, {"base", "rate_hz"})
+        if set(held) != {"base", "rate_hz"}:
+            raise InputError(f"{file}: is not a track of snakewalk fish synthesise; make one")
+        base, rate_hz = np.asarray(held["base"], float), float(held["rate_hz"])
+        time_s = np.arange(len(base)) / rate_hz
+        even = np.arange(0.0, time_s[-1] + 1e-9, 1.0 / source.rate_hz)
+        others.append(np.column_stack([np.interp(even, time_s, base[:, k]) for k in (0, 1)]))
+    x, y, head_deg = options.start
+    start = x, y, float(np.radians(head_deg))
+    return Surroundings(tank, tuple(others), options.apart * source.length, start)
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)
 
 
 def _steps(parts: list[Floats]) -> Floats:

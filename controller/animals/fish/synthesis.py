@@ -15,12 +15,18 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.fish.piece_graph import PieceGraph, placed
 from snakewalk.controller.animals.fish.postures import Postures, tangents
+from snakewalk.controller.animals.fish.surroundings import OPEN_WATER, Surroundings
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.kinematics.smoothstep import quintic
 
 BLEND_S = 0.25
+STEERED = 0.2
+"""Largest part of the distance swum by which a way is bent to a control point (ours)."""
 _BEAM = 40
+_BEAM_EACH = 3
 _DEPTH = 5
+_LOOK, _LOOK_BEAM = 5, 6
+"""Pieces that a random motion looks ahead in a tank, and sequences that it compares."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +38,10 @@ class PieceSequence:
     """Joins that no rule permits, made because nothing else was left."""
     reached_s: tuple[float, ...] = ()
     """When each control point was reached."""
+    reached_at: tuple[int, ...] = ()
+    """Frame of the motion at that time."""
+    crowded: int = 0
+    """Pieces that come too near to a wall or another fish, as no other choice was left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,23 +55,95 @@ class _Node:
     samples: int
     forced: int
     reached_at: tuple[int, ...]
+    way: float = 0.0
+    """Distance swum since the last control point."""
+    crowded: int = 0
+    """Pieces that come too near to a wall or another fish."""
+    clearance: float = np.inf
+    """Distance from walls and fish of the last piece, and of the place ahead of its end."""
 
     @property
     def last(self) -> int:
         return self.order[-1]
 
 
-def random_sequence(pieces: PieceGraph, seconds: float, rng: np.random.Generator) -> PieceSequence:
-    """Follow permitted pieces, each as likely as the other, for at least ``seconds``."""
-    every = range(len(pieces.pieces))
-    order = [int(rng.choice(sorted(pieces.lasting) or list(every)))]
-    lasts, forced = _seconds(pieces, order[0]), 0
-    while lasts < seconds:
-        choice, by_rule = pieces.next(order[-1])
-        forced += not by_rule
-        order.append(int(rng.choice(choice)))
-        lasts += _seconds(pieces, order[-1])
-    return PieceSequence(tuple(order), forced)
+@dataclass(frozen=True, slots=True)
+class _Aim:
+    """Control points, the distance to come within, and the surroundings."""
+
+    points: Floats
+    radius: float
+    around: Surroundings
+    capture: float = 0.0
+
+    def nearest(self, path: Floats, way: Floats, point: int) -> int | None:
+        """Index of the place of a path at which a point is reached; None: not on this path."""
+        missing = self.points[point] - path
+        off = np.linalg.norm(missing, axis=1)
+        near = np.flatnonzero(off <= self.radius)
+        if len(near) or self.capture <= 0.0:
+            return int(near[0]) if len(near) else None
+        aside = np.hypot(missing[:, 0], missing[:, 1])
+        reached = (aside <= self.capture) & (off <= STEERED * way)
+        near = np.flatnonzero(reached)
+        return int(near[np.argmin(off[near])]) if len(near) else None
+
+
+def random_sequence(
+    pieces: PieceGraph,
+    seconds: float,
+    rng: np.random.Generator,
+    around: Surroundings = OPEN_WATER,
+) -> PieceSequence:
+    """Follow permitted pieces, each as likely as the other, for at least ``seconds``.
+
+    In a tank, or among other fish, a piece is drawn again while it, or every sequence of
+    ``_LOOK`` pieces that is found after it, comes too near.
+    """
+    aim = _Aim(np.zeros((0, 2)), 0.0, around)
+    node = _begin(around, 2)
+    while not node.order or node.samples / pieces.rate_hz < seconds:
+        choice, by_rule = _choice(pieces, node)
+        if not around.any:
+            node = _take(pieces, node, int(rng.choice(choice)), by_rule, aim)
+            continue
+        drawn = [_take(pieces, node, int(k), by_rule, aim) for k in rng.permutation(choice)]
+        node = _first_free(pieces, drawn, node.crowded, aim)
+    return PieceSequence(node.order, node.forced, crowded=node.crowded)
+
+
+def _begin(around: Surroundings, dimensions: int) -> _Node:
+    """Return the empty sequence at the start."""
+    x, y, head_rad = around.start
+    return _Node((), np.array([x, y, 0.0][:dimensions]), head_rad, 0, 0, ())
+
+
+def _first_free(pieces: PieceGraph, drawn: list[_Node], crowded: int, aim: _Aim) -> _Node:
+    """Return the first sequence that can go on without coming too near; else the best one."""
+    ends = []
+    for one in drawn:
+        if one.crowded > crowded:
+            ends.append((one.crowded, -one.clearance))
+            continue
+        ends.append(_escape(pieces, one, aim))
+        if ends[-1][0] == crowded:
+            return one
+    return drawn[min(range(len(ends)), key=ends.__getitem__)]
+
+
+def _escape(pieces: PieceGraph, node: _Node, aim: _Aim) -> tuple[int, float]:
+    """Crowded pieces of the best sequence of ``_LOOK`` more pieces, and its clearance, negative."""
+    beam = [node]
+    for _ in range(_LOOK):
+        grown = [
+            _take(pieces, one, k, by_rule, aim)
+            for one in beam
+            for choice, by_rule in [_choice(pieces, one)]
+            for k in choice
+        ]
+        grown.sort(key=lambda one: (one.crowded, -one.clearance))
+        beam = grown[:_LOOK_BEAM]
+    return beam[0].crowded, -beam[0].clearance
 
 
 def sequence_through(
@@ -71,6 +153,8 @@ def sequence_through(
     radius: float,
     limit_s: float = 120.0,
     depth: int = _DEPTH,
+    capture: float = 0.0,
+    around: Surroundings = OPEN_WATER,
 ) -> PieceSequence:
     """Swim through control points in order, from the origin along x.
 
@@ -86,6 +170,9 @@ def sequence_through(
         radius: how near is near enough.
         limit_s: for all points together.
         depth: pieces to look ahead; 1 is the printed rule.
+        capture: a point is also reached within this distance if ``steered`` can bend the way to it:
+            the missing distance is less than ``STEERED`` of the distance swum. 0: no steering.
+        around: walls and fish to keep away from.
 
     Raises:
         InputError: a point was not reached in time, or heights of a film that has none.
@@ -97,8 +184,8 @@ def sequence_through(
             "a control point has a height, but these postures have none: they are matched from "
             "above alone; give X,Y, or match the film with --side"
         )
-    begin = _Node((), np.zeros(dimensions), 0.0, 0, 0, ())
-    here = begin
+    aim = _Aim(points, radius, around, capture)
+    here = _begin(around, dimensions)
     while len(here.reached_at) < len(points):
         if here.samples / pieces.rate_hz > limit_s:
             point = ",".join(f"{value:g}" for value in points[len(here.reached_at)])
@@ -108,19 +195,26 @@ def sequence_through(
                 f"{limit_s:g} s: the segments turn from {min(turns):.0f} to {max(turns):.0f} "
                 "degrees; give a larger --radius, other points, or --mirror"
             )
-        here = _ahead(pieces, here, points, radius, depth)
-    reached = tuple(k / pieces.rate_hz for k in here.reached_at)
-    return PieceSequence(here.order, here.forced, reached)
+        here = _ahead(pieces, here, aim, depth)
+    reached_s = tuple(k / pieces.rate_hz for k in here.reached_at)
+    return PieceSequence(here.order, here.forced, reached_s, here.reached_at, here.crowded)
 
 
-def compose(pieces: PieceGraph, sequence: PieceSequence, blend_s: float = BLEND_S) -> Postures:
+def compose(
+    pieces: PieceGraph,
+    sequence: PieceSequence,
+    blend_s: float = BLEND_S,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Postures:
     """Put the pieces end to end; angles, direction and path are blended at every junction.
+
+    ``start`` is the place and the direction, in radians, of the first posture.
 
     A film with a side view also gives height, which continues from piece to piece, and pitch.
     """
     parts = [pieces.pieces[k] for k in sequence.order]
     base, head = [], []
-    origin, direction = np.zeros(2), 0.0
+    origin, direction = np.array(start[:2]), start[2]
     for part in parts:
         base.append(placed(part.base, origin, direction))
         head.append(part.head_rad + direction)
@@ -150,33 +244,41 @@ def junctions(pieces: PieceGraph, sequence: PieceSequence) -> list[int]:
     return [int(at) for at in np.cumsum(lengths[:-1])]
 
 
-def _seconds(pieces: PieceGraph, piece: int) -> float:
-    return (len(pieces.pieces[piece].head_rad) - 1) / pieces.rate_hz
-
-
-def _ahead(pieces: PieceGraph, here: _Node, points: Floats, radius: float, depth: int) -> _Node:
+def _ahead(pieces: PieceGraph, here: _Node, aim: _Aim, depth: int) -> _Node:
     """Return the first piece of the best sequence found."""
     reached = len(here.reached_at)
     beam, best, first = [here], None, len(here.order)
     for level in range(depth):
         grown = [
-            _take(pieces, node, k, by_rule, points, radius)
+            _take(pieces, node, k, by_rule, aim)
             for node in beam
             for choice, by_rule in [_choice(pieces, node)]
             for k in choice
         ]
-        grown.sort(key=lambda node: _cost(node, points))
-        beam = grown[:_BEAM]
-        if best is None or _cost(beam[0], points) < _cost(best, points):
+        grown.sort(key=lambda node: _cost(node, aim))
+        beam = _diverse(grown, first) if aim.around.any else grown[:_BEAM]
+        if best is None or _cost(beam[0], aim) < _cost(best, aim):
             best = beam[0]
-        if level + 1 < depth and len(beam[0].reached_at) > reached:
+        if level + 1 < depth and len(beam[0].reached_at) > reached and not aim.around.any:
             break
     if best is None:
         raise ValueError("depth must be 1 or more")
+    if aim.around.any:  # a free sequence of full length shows that the fish can go on
+        best = beam[0]
     node = here
     for k in best.order[first : first + 1]:
-        node = _take(pieces, node, k, _is_by_rule(pieces, node, k), points, radius)
+        node = _take(pieces, node, k, _is_by_rule(pieces, node, k), aim)
     return node
+
+
+def _diverse(grown: list[_Node], first: int) -> list[_Node]:
+    """Keep the best sequences of each next piece: the shortest ways may all meet another fish."""
+    place = {id(node): k for k, node in enumerate(grown)}
+    kept: dict[int, list[_Node]] = {}
+    for node in grown:
+        kept.setdefault(node.order[first], []).append(node)
+    few = [node for nodes in kept.values() for node in nodes[:_BEAM_EACH]]
+    return sorted(few, key=lambda node: place[id(node)])
 
 
 def _choice(pieces: PieceGraph, node: _Node) -> tuple[list[int], bool]:
@@ -189,39 +291,59 @@ def _is_by_rule(pieces: PieceGraph, node: _Node, piece: int) -> bool:
     return not node.order or piece in pieces.permitted(node.last)
 
 
-def _take(
-    pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, points: Floats, radius: float
-) -> _Node:
+def _take(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim) -> _Node:
     part = pieces.pieces[piece]
     path = placed(part.base, node.base[:2], node.head_rad)
     if len(node.base) == 3 and part.rise is not None:
         path = np.column_stack([path, node.base[2] + part.rise[:, 0]])
+    step = np.diff(path[:, :2], axis=0)
+    way = node.way + np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
     reached, at = node.reached_at, 1
-    while len(reached) < len(points):
-        near = np.flatnonzero(np.linalg.norm(path[at:] - points[len(reached)], axis=1) <= radius)
-        if not len(near):
+    while len(reached) < len(aim.points):
+        found = aim.nearest(path[at:], way[at:], len(reached))
+        if found is None:
             break
-        at += int(near[0])
-        reached = (*reached, node.samples + at)
+        at += found
+        missing = aim.points[len(reached)] - path[at]
+        if np.linalg.norm(missing) > aim.radius:  # from here on the motion is steered through it
+            path[at:] += missing
+        reached, way = (*reached, node.samples + at), way - way[at]
+    crowded, clearance, head_rad = False, np.inf, node.head_rad + float(part.head_rad[-1])
+    if aim.around.any:
+        clearance = aim.around.clearance(path, node.samples)
+        crowded = clearance < aim.around.apart
+        clearance = min(
+            clearance, aim.around.ahead(path[-1], head_rad, node.samples + len(path) - 1)
+        )
     return replace(
         node,
         order=(*node.order, piece),
         base=path[-1],
-        head_rad=node.head_rad + float(part.head_rad[-1]),
+        head_rad=head_rad,
         samples=node.samples + len(path) - 1,
         forced=node.forced + (not by_rule),
         reached_at=reached,
+        way=float(way[-1]),
+        crowded=node.crowded + crowded,
+        clearance=clearance,
     )
 
 
-def _cost(node: _Node, points: Floats) -> tuple[int, float]:
-    """More points first, then nearer to the next one; after the last, sooner."""
+def _cost(node: _Node, aim: _Aim) -> tuple[int, int, float]:
+    """Fewest crowded pieces, more points, then nearer to the next one; after the last, sooner."""
+    points = aim.points
     if len(node.reached_at) == len(points):
-        return -len(points), float(node.reached_at[-1])
+        return node.crowded, -len(points), float(node.reached_at[-1])
     away = points[len(node.reached_at)] - node.base
+    if aim.capture > 0.0 and len(away) == 3:
+        away[2] = np.sign(away[2]) * max(abs(away[2]) - STEERED * node.way, 0.0)
     far = float(np.linalg.norm(away))
     off = float(np.abs(np.angle(np.exp(1j * (np.arctan2(away[1], away[0]) - node.head_rad)))))
-    return -len(node.reached_at), far + 0.2 * far * off + 1e-3 * node.samples
+    return (
+        node.crowded,
+        -len(node.reached_at),
+        far + 0.2 * far * off + 1e-3 * node.samples,
+    )
 
 
 def fading(step: Floats, slope: Floats, duration: float, time: Floats) -> Floats:

@@ -88,7 +88,9 @@ def test_synthesised_motion_is_a_recording(tmp_path: Path) -> None:
         "-o", tmp_path / "t.npz", "--picture", tmp_path / "way.png",
     )  # fmt: skip
     assert len(made["reached_s"]) == 2  # type: ignore[arg-type]
-    assert made["join_step_blended_deg"] < made["join_step_deg"]  # type: ignore[operator]
+    # one frame of the motion itself turns a joint by up to 2.5 degrees
+    assert made["join_step_blended_deg"] < 2.5  # type: ignore[operator]
+    assert max(made["reached_within"]) <= 0.1  # type: ignore[call-overload]
     assert (tmp_path / "way.png").read_bytes().startswith(PNG)
     track = load_track(str(tmp_path / "t.npz"))
     assert track.frames > 60
