@@ -136,8 +136,8 @@ def require_upright(stand: CameraStand) -> None:
     if abs(roll_deg) > MOST_ROLL_DEG:
         lower = "right" if roll_deg < 0.0 else "left"
         raise InputError(
-            f"stereo: the ground's {lower} side is lower by {abs(roll_deg):.1f} degrees, by its own "
-            "slope or by a rolled camera; state the stand (--height, --tilt, --roll), or use "
+            f"stereo: the ground's {lower} side is lower by {abs(roll_deg):.1f} degrees, by its "
+            "own slope or by a rolled camera; state the stand (--height, --tilt, --roll), or use "
             "--level-ground"
         )
 
