@@ -102,7 +102,9 @@ def rendered(world_name: str, seed: int, given: bool) -> View:
     seen = np.ones(left.shape[:2], bool)
     pair = RectifiedPair(left, right, seen, FOCAL_PX, centre, 0.0, BASELINE_M, np.eye(3))
     stand = CameraStand(HEIGHT_M, tilt, 0.0)
-    found = stereo_ground(pair, 128, SPACING_M, ERROR_M, stand if given else None, FAR_M)
+    found = stereo_ground(
+        pair, 128, SPACING_M, ERROR_M, stand if given else None, FAR_M, is_level=True
+    )
     field, c, s = found.elevation, np.cos(heading), np.sin(heading)
     level = stand.world_from_camera()
     turned = found.stand.world_from_camera() @ level.T  # to the map's frame

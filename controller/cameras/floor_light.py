@@ -47,7 +47,7 @@ def banded_floor(image: Image, floor: Image) -> Image:
     if step.max(initial=0.0) < _BANDS:
         return floor
     rows = light.reshape(-1, *(1,) * (floor.ndim - 1))
-    return np.clip(np.rint(floor * rows), 0.0, 255.0).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(floor * rows), 0.0, 255.0), dtype=np.uint8)
 
 
 def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:

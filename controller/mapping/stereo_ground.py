@@ -17,6 +17,8 @@ from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 DISPARITY_ERROR_PX: Final = 0.3
 """Standard error that is assumed for a disparity (ours): the median on a real pair is 0.15 px."""
+MOST_ROLL_DEG: Final = 3.0
+"""A camera is set up upright to about this angle (ours): a larger roll may be a slope."""
 _TRIALS: Final = 300
 _SAMPLE: Final = 20_000
 """Points that a plane is searched in."""
@@ -77,6 +79,8 @@ def stereo_ground(
     error_m: float,
     stand: CameraStand | None = None,
     far_m: float = np.inf,
+    *,
+    is_level: bool = False,
 ) -> StereoGround:
     """Map the ground that a pair of pictures shows.
 
@@ -88,9 +92,11 @@ def stereo_ground(
             ``distance * DISPARITY_ERROR_PX / disparity``, is more.
         stand: height, tilt and roll of the camera; None fits a plane to the visible points.
         far_m: points farther ahead, level, are left out.
+        is_level: the visible plane is level, also if it is tilted sideways against the camera.
 
     Raises:
-        InputError: no ground is found, or nothing is near enough for the error.
+        InputError: no ground is found, its vertical is not known, or nothing is near enough for
+            the error.
 
     """
     disparity, used, expected_m = seen_points(pair, count, error_m)
@@ -102,6 +108,8 @@ def stereo_ground(
     fitted = stand is None
     if stand is None:
         stand = fit_ground(used, expected_m)
+        if not is_level:
+            require_upright(stand)
     world = used @ stand.world_from_camera().T
     world[:, 2] += stand.height_m
     world = world[world[:, 0] <= far_m]
@@ -115,6 +123,23 @@ def stereo_ground(
         float(np.isfinite(disparity).sum()) / seen,
         len(world) / seen,
     )
+
+
+def require_upright(stand: CameraStand) -> None:
+    """Reject a fitted stand that rolls: pictures alone do not show whether the ground does.
+
+    Raises:
+        InputError: the ground tilts sideways against the camera.
+
+    """
+    roll_deg = float(np.degrees(stand.roll_rad))
+    if abs(roll_deg) > MOST_ROLL_DEG:
+        lower = "right" if roll_deg < 0.0 else "left"
+        raise InputError(
+            f"stereo: the ground's {lower} side is lower by {abs(roll_deg):.1f} degrees, by its "
+            "own slope or by a rolled camera; state the stand (--height, --tilt, --roll), or use "
+            "--level-ground"
+        )
 
 
 def seen_points(pair: RectifiedPair, count: int, error_m: float) -> tuple[Floats, Floats, Floats]:

@@ -45,6 +45,12 @@ Tilt = Annotated[
 Roll = Annotated[
     float, typer.Option(help="rotation about its axis in degrees; positive: right side down")
 ]
+LevelGround = Annotated[
+    bool,
+    typer.Option(
+        "--level-ground", help="accept a fitted ground as level, however the camera is rolled"
+    ),
+]
 Disparities = Annotated[
     int, typer.Option(min=16, max=2048, help="largest disparity to try in pixels")
 ]
@@ -77,6 +83,7 @@ def stereo(
     height: Height = None,
     tilt: Tilt = None,
     roll: Roll = 0.0,
+    level_ground: LevelGround = False,
     disparities: Disparities = 128,
     spacing: SampleSpacing = 0.03,
     error: Error = 0.03,
@@ -100,6 +107,8 @@ def stereo(
     )
     check_fill(fill, faults)
     faults += _stand_faults(height, tilt, roll)
+    if level_ground and height is not None:
+        faults.append("--level-ground fits the ground; leave out --height, --tilt and --roll")
     if unit not in _UNITS_M:
         faults.append(f"--unit {unit}: is unknown; use one of {', '.join(_UNITS_M)}")
     if faults:
@@ -111,8 +120,9 @@ def stereo(
     if height is not None and tilt is not None:
         stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))
     made = stereo_ground.stereo_ground(
-        pair, disparities, spacing / scale, error, stand, math.inf if far is None else far
-    )
+        pair, disparities, spacing / scale, error, stand, math.inf if far is None else far,
+        is_level=level_ground,
+    )  # fmt: skip
     seen = made.elevation
     placed = replace(
         seen, z_m=scale * seen.z_m, spacing_m=spacing, x0_m=scale * seen.x0_m,
@@ -154,7 +164,7 @@ def _stand_words(made: "StereoGround") -> list[str]:
 
 
 def _how(made: "StereoGround") -> str:
-    return "fitted to the points" if made.fitted else "given"
+    return "fitted to the points, which are taken for level ground" if made.fitted else "given"
 
 
 def _facts(made: "StereoGround") -> dict[str, object]:

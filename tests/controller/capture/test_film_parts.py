@@ -1,5 +1,6 @@
 """Long films: captured in parts, with bounded memory, and continued after an interruption."""
 
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -110,3 +111,22 @@ def test_a_part_without_the_animal_has_no_points() -> None:
     assert captured.used[:10].all()
     assert captured.used[28:].all()
     assert not captured.used[10:28].any()
+
+
+def test_frames_of_finished_parts_do_not_stay_in_memory() -> None:
+    """The second half of a film keeps no more frames alive than the first."""
+    ground = empty(SCENE)
+    detector = replace(make_detector([ground], ground), polarity=Polarity.DARK)
+    images = list(film(SCENE))[:24]
+    parts = FilmParts(30.0, len(images), "film", part_frames=4)
+    frames: list[weakref.ref[DeepImage]] = []
+    alive = []
+    for image in images:
+        shown = image.copy()
+        frames.append(weakref.ref(shown))
+        parts.add(shown, detector.detect(shown))
+        del shown
+        alive.append(sum(one() is not None for one in frames))
+    half = len(alive) // 2
+    assert max(alive[half:]) <= max(alive[:half]) <= 8
+    assert len(parts.finished) >= 3

@@ -7,7 +7,12 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
-from snakewalk.controller.mapping.stereo_ground import CameraStand, fit_ground, stereo_ground
+from snakewalk.controller.mapping.stereo_ground import (
+    CameraStand,
+    fit_ground,
+    require_upright,
+    stereo_ground,
+)
 from snakewalk.sim.rendering.stereo_view import StereoView
 
 
@@ -26,6 +31,28 @@ def test_a_stand_is_fitted_to_a_plane_with_a_wall_and_noise(tilt: float, roll: f
     assert found.height_m == pytest.approx(0.7, abs=0.003)
     assert found.tilt_rad == pytest.approx(tilt, abs=0.003)
     assert found.roll_rad == pytest.approx(roll, abs=0.003)
+
+
+def slope(side_deg: float) -> CameraStand:
+    """Return the stand fitted to a ground that rises to the left of an upright camera."""
+    rng = np.random.default_rng(8)
+    ahead, side = rng.uniform(0.5, 3.0, 3000), rng.uniform(-1.0, 1.0, 3000)
+    ground = np.column_stack([ahead, side, np.tan(np.radians(side_deg)) * side])
+    camera = (ground - [0.0, 0.0, 0.7]) @ CameraStand(0.7, 0.4, 0.0).world_from_camera()
+    return fit_ground(camera + rng.normal(0.0, 0.003, camera.shape), np.full(3000, 0.003))
+
+
+@pytest.mark.parametrize(("side_deg", "lower"), [(7.3, "right"), (-7.3, "left")])
+def test_a_fitted_stand_that_rolls_is_rejected_as_a_slope_looks_alike(
+    side_deg: float, lower: str
+) -> None:
+    with pytest.raises(InputError, match=f"{lower} side is lower.*--height, --tilt, --roll"):
+        require_upright(slope(side_deg))
+
+
+def test_a_fitted_stand_over_nearly_level_ground_is_accepted() -> None:
+    require_upright(slope(1.0))
+    require_upright(slope(-1.0))
 
 
 def test_points_without_a_ground_have_no_stand() -> None:
