@@ -9,6 +9,7 @@ import random
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,9 @@ PAGE = "bus-faults.md"
 WRONG_RAD = 0.1
 """A joint this much farther from its goal than before the fault is wrong (ours)."""
 _DETECTORS = {
+    "all the time, though": "motion sensors",
+    "not continued": "recheck after the pause",
+    "come and gone": "alert without an error",
     "not believed": "impossible motion",
     "no servo turns so fast": "impossible motion",
     "temperature and voltage not read": "age of the state",
@@ -160,6 +164,9 @@ def try_scenario(scenario: Scenario, folder: Path) -> Result:
     for each in plan:
         each["at_s"] += AT_S
     FaultPlayer(bench.line, FaultPlan.model_validate({"seed": 1, "fault": plan}))
+    if scenario.on_line is not None:
+        begin = partial(scenario.on_line, bench.line)
+        bench.line.firmware.events.schedule(began_s, begin)
     sound, after, irregular = [], [], []
     counted_before = list[int]()
 

@@ -7,8 +7,8 @@ ground may hold a current-limited joint off its goal for long, but then its serv
 the current that it is allowed.
 
 The current is evidence at small errors, too: a motor whose output stage works draws current as soon
-as its joint is off the goal and slow. If it draws next to none, the output stage is dead. A velocity
-sensor may be dead as well, so a joint is also slow if its positions are.
+as its joint is off the goal and slow. If it draws next to none, the output stage is dead. A
+velocity sensor may be dead as well, so a joint is also slow if its positions are.
 """
 
 import math
