@@ -67,6 +67,7 @@ _DETECTORS = {
     "for too long": "current limit",
     "fast sync reads given up": "lost replies",
     "no servo was read": "lost replies",
+    "after the time-out": "late replies",
     "not read for": "age of the state",
     "without a packet": "age of the state",
     "port": "port",
