@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from benchmarks import odd_servos as odd
 from snakewalk.drivers.safety.recovery import Policy
 from snakewalk.sim.line.sim_line import SimLine
 
@@ -26,6 +27,8 @@ class Scenario:
     """A run should go on without a word."""
     between_runs: Callable[[SimLine], None] | None = None
     """Changes the servos between two runs that share a fingerprint file."""
+    on_line: Callable[[SimLine], None] | None = None
+    """Begins a fault of servos or adapter that no fault file has."""
 
 
 def _one(name: str, kind: str, **keys: Any) -> Scenario:
@@ -55,6 +58,19 @@ def _off(name: str, register: str, value: int) -> Scenario:
         [{"kind": "brown_out", "ids": [3], "for_s": 0.3}, change],
         policy="resume",
     )
+
+
+_TEMPERATURE = "Present Temperature"
+
+
+def _reading(register: str, value: int | None = None) -> dict[str, Any]:
+    return {"kind": "reading", "ids": [3], "register": register, "value": value}
+
+
+def _again(kind: str, every_s: float, for_s: float, **keys: Any) -> list[dict[str, Any]]:
+    """A fault that comes back for 6 s."""
+    times = range(round(6.0 / every_s))
+    return [{"kind": kind, "at_s": every_s * k, "for_s": for_s, **keys} for k in times]
 
 
 _NOISE = [
@@ -167,4 +183,114 @@ _ANOTHER = [
     Scenario("direction changed between two runs", (), between_runs=_set("Drive Mode", 1)),
     Scenario("Shutdown = 0 between two runs", (), between_runs=_set("Shutdown", 0)),
 ]
-SCENARIOS = (*_NOISE, *_SLOW, *_SERVOS, *_BUS, *_WRITES, *_SENSORS, *_ANOTHER)
+_CONSTANT = (
+    ("current", 0),
+    ("current", 186),
+    ("current", -700),
+    ("velocity", 0),
+    ("velocity", 100),
+)
+FURTHER = [
+    *(
+        Scenario(
+            f"`reading`: {name} always {value}",
+            [_reading(f"Present {name.title()}", value)],
+            load_n_m=0.6,
+        )
+        for name, value in _CONSTANT
+    ),
+    Scenario(
+        "`reading`: velocity always 100, and `no_output`, small amplitude (0.18 rad)",
+        [_reading("Present Velocity", 100), {"kind": "no_output", "ids": [3]}],
+        amplitude_rad=0.18,
+    ),
+    Scenario(
+        "`reading`: current, velocity and position constant",
+        [_reading(f"Present {name}") for name in ("Current", "Velocity", "Position")],
+    ),
+    _one("`reading`: temperature 60 C", "reading", ids=[3], register=_TEMPERATURE, value=60),
+    _one("`reading`: temperature 255 C", "reading", ids=[3], register=_TEMPERATURE, value=255),
+    Scenario("`alert` that comes and goes", _again("alert", 0.1, 0.03, ids=[3])),
+    Scenario("`supply` at 9.7 V for 0.15 s, every 0.4 s", _again("supply", 0.4, 0.15, volts=9.7)),
+    Scenario("`stall` of 0.06 s, every 0.2 s", _again("stall", 0.2, 0.06)),
+    _one("`stall` of 10 s", "stall", for_s=10.0),
+    Scenario(
+        "torque off for 10 ms, by another program, once",
+        [_write("Torque Enable", 0), _write("Torque Enable", 1, at_s=0.01)],
+        is_harmless=True,
+    ),
+    Scenario(
+        "torque off for 10 ms, by another program, every 50 ms",
+        [
+            _write("Torque Enable", on, ALL, at_s=0.05 * k + 0.01 * on)
+            for k in range(100)
+            for on in (0, 1)
+        ],
+    ),
+    Scenario(
+        "`reboot`, and torque on by another program after 3 ms",
+        [{"kind": "reboot", "ids": [3]}, _write("Torque Enable", 1, at_s=0.003)],
+    ),
+    Scenario(
+        "Goal PWM 0 for 30 ms, by another program, every 40 ms",
+        [
+            _write("Goal PWM", value, at_s=0.04 * k + late_s)
+            for k in range(100)
+            for value, late_s in ((0, 0.0), (885, 0.03))
+        ],
+    ),
+    _written("Operating Mode", 4),
+    _written("Status Return Level", 0),
+    _written("Return Delay Time", 250, ALL),
+    _written("Baud Rate", 1),
+    _written("Max Position Limit", 1700),
+    _one("`exchange` for 0.03 s", "exchange", id=2, takes=4, for_s=0.03),
+    *(
+        Scenario(
+            f"{name} changed behind a port that vanished; policy resume",
+            [{"kind": "port", "for_s": 0.3}, _write(name, value, at_s=0.1)],
+            policy="resume",
+        )
+        for name, value in (
+            ("Max Position Limit", 2100),
+            ("Model Number", 1060),
+            ("Firmware Version", 12),
+        )
+    ),
+]
+
+
+def _odd(name: str, action: odd.Action, **keys: Any) -> Scenario:
+    return Scenario(name, (), on_line=action, **keys)
+
+
+BY_HAND = [
+    _odd("goals accepted two cycles late", odd.late_goals),
+    _odd("goals with reversed bytes", odd.swapped_goals),
+    _odd("goals that reach no servo", odd.lost_goals),
+    _odd("echo of 5% of all requests", odd.echo(0.05)),
+    _odd("echo of all requests", odd.echo(1.0)),
+    _odd("3% of all replies with two bytes exchanged", odd.reordered_bytes),
+    _odd("plain replies in the wrong order", odd.reordered_packets),
+    _odd("baud rate that drifts: up to 60% of all replies damaged", odd.drifting_baud),
+    _odd("adapter latency that grows from 1 to 16 ms", odd.growing_latency),
+    _odd("data of another servo", odd.foreign_data),
+    _odd("data of another address", odd.other_block),
+    _odd("position off by a turn", odd.jumping_turn(1)),
+    _odd("position off by a turn in one of seven reads", odd.jumping_turn(7)),
+    _odd("position constant while the joint moves", odd.frozen_in_motion),
+    _odd("current with the wrong sign", odd.wrong_sign_of_current, load_n_m=0.6),
+    _odd("encoder that slips by 0.15 rad", odd.slipped_zero(0.15)),
+    _odd(
+        "encoder that slips by 0.1 rad per minute",
+        odd.slipped_zero(0.1, 65, 60.0),
+        cycles=3000,
+    ),
+    _odd("gears that transmit 30% of the torque", odd.weak_motor(0.3), load_n_m=0.6),
+    _odd("broken gears", odd.weak_motor(1e-6)),
+]
+"""Faults that no fault file has: ``odd_servos`` plays them."""
+SCENARIOS = (
+    *(*_NOISE, *_SLOW, *_SERVOS, *_BUS, *_WRITES, *_SENSORS, *_ANOTHER),
+    *(*FURTHER, *BY_HAND),
+)

@@ -9,6 +9,7 @@ import random
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,9 @@ PAGE = "bus-faults.md"
 WRONG_RAD = 0.1
 """A joint this much farther from its goal than before the fault is wrong (ours)."""
 _DETECTORS = {
+    "all the time, though": "motion sensors",
+    "not continued": "recheck after the pause",
+    "come and gone": "alert without an error",
     "not believed": "impossible motion",
     "no servo turns so fast": "impossible motion",
     "temperature and voltage not read": "age of the state",
@@ -63,6 +67,7 @@ _DETECTORS = {
     "for too long": "current limit",
     "fast sync reads given up": "lost replies",
     "no servo was read": "lost replies",
+    "after the time-out": "late replies",
     "not read for": "age of the state",
     "without a packet": "age of the state",
     "port": "port",
@@ -160,6 +165,9 @@ def try_scenario(scenario: Scenario, folder: Path) -> Result:
     for each in plan:
         each["at_s"] += AT_S
     FaultPlayer(bench.line, FaultPlan.model_validate({"seed": 1, "fault": plan}))
+    if scenario.on_line is not None:
+        begin = partial(scenario.on_line, bench.line)
+        bench.line.firmware.events.schedule(began_s, begin)
     sound, after, irregular = [], [], []
     counted_before = list[int]()
 

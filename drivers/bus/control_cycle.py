@@ -57,6 +57,8 @@ class CycleCounters:
     """Older replies that had come twice, and were dropped."""
     drained_bytes: int = 0
     fast_given_up: int = 0
+    late_bytes: int = 0
+    """Bytes that arrived after the time-out of their read."""
 
 
 class ControlCycle:
@@ -285,6 +287,8 @@ class ControlCycle:
     def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
         """Send a request; until when its reply is awaited."""
         packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
+        if self._failed_in_a_row:  # what arrives now is of an older request
+            self.counters.late_bytes += self._port.getBytesAvailable()
         self._port.clearPort()
         byte_s = self._byte_s
         free_s = self._line.reserve(len(packet) * byte_s)
@@ -376,4 +380,6 @@ class ControlCycle:
         if not responded.all():
             first = int(np.argmin(responded))  # those behind it could not respond
             self._order = (*order[:first], *order[first + 1 :], order[first])
-        self.counters.drained_bytes += self._port.drain_until_quiet(self._latency_s)
+        drained = self._port.drain_until_quiet(self._latency_s)
+        self.counters.drained_bytes += drained
+        self.counters.late_bytes += drained * timed_out

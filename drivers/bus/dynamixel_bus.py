@@ -376,10 +376,12 @@ class DynamixelBus:
 
     def _check_result(self, result: int, servo_id: int, what: str) -> None:
         if result != sdk.COMM_SUCCESS:
-            reason = self._sdk.getTxRxResult(result).removeprefix("[TxRxResult] ")
-            raise NoAnswerError(
-                f"servo {servo_id}: {what}: {reason} at {self.port.getBaudRate()} baud"
-            )
+            reason = self._sdk.getTxRxResult(result).removeprefix("[TxRxResult] ").rstrip("!")
+            if result == sdk.COMM_RX_TIMEOUT:
+                reason = "no answer"
+            baud = self.port.getBaudRate()
+            find = "; find it with snakewalk scan" if what == "ping" else ""
+            raise NoAnswerError(f"servo {servo_id}: {what}: {reason} at {baud} baud{find}")
 
 
 def _blocks(registers: Iterable[Register]) -> list[list[Register]]:

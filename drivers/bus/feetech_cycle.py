@@ -184,7 +184,7 @@ class FeetechSingleReads(FeetechCycle):
     def finish_read(self) -> GroupReadReply:
         """Ask each servo."""
         replies = [each.read() for each in self._singles]
-        for name in ("timeouts", "unclean", "copies", "drained_bytes"):
+        for name in ("timeouts", "unclean", "copies", "drained_bytes", "late_bytes"):
             total = sum(getattr(each.counters, name) for each in self._singles)
             setattr(self.counters, name, total)
         return GroupReadReply(

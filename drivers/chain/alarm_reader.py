@@ -9,6 +9,8 @@ from snakewalk.drivers.errors import BusError
 
 _ALERT_READS = 3
 """Reads in a row with an alert, but without an alarm in register 70, that end a run (ours)."""
+_FLAPPING = 10
+"""Alerts of a joint that come and go, after which it is reported a second and last time (ours)."""
 
 
 class AlarmReader:
@@ -18,10 +20,13 @@ class AlarmReader:
         self._bus, self._robot, self._readings = bus, robot, readings
         self._counts: dict[int, int] = {}
         """Reads in a row in which a joint had an alert, but no alarm."""
+        self._alerts: dict[int, int] = {}
+        """Times that such an alert of a joint has begun."""
 
     def clear(self) -> None:
         """Forget the alerts so far."""
         self._counts.clear()
+        self._alerts.clear()
 
     def update(self, alerted: Collection[int]) -> list[str]:
         """Read the alarms of joints whose newest reply carries an alert; returns lines to report.
@@ -49,7 +54,16 @@ class AlarmReader:
             self._readings.dismiss_alert(joint)
         if count > 1:
             return None
-        return (
-            f"{self._robot.joint_label(joint)}: its status packet carries an alert, but Hardware "
-            "Error Status reads 0; it is read again before the run ends"
-        )
+        alerts = self._alerts[joint] = self._alerts.get(joint, 0) + 1
+        name = self._robot.joint_label(joint)
+        if alerts == 1:
+            return (
+                f"{name}: its status packet carries an alert, but Hardware Error Status reads 0; "
+                "it is read again before the run ends"
+            )
+        if alerts == _FLAPPING:
+            return (
+                f"{name}: its alert has come and gone {alerts} times without an alarm; later ones "
+                "are not reported; stop the run and check its supply and its firmware"
+            )
+        return None

@@ -7,6 +7,10 @@ LOSS_READS, LOSSES = 100, 4
 computer that stalls for a while, is one loss."""
 
 
+LATE_READS = 3
+"""This many reads whose reply arrived after the time-out show a slow adapter (ours)."""
+
+
 class LostReplies:
     """Counts losses; reports a bad line once in a run."""
 
@@ -15,20 +19,40 @@ class LostReplies:
         """Numbers of the reads at which a loss began."""
         self._reads = 0
         self._complete, self._any, self._reported = True, True, False
+        self._late: deque[int] = deque()
+        """Numbers of the reads before which bytes arrived late."""
+        self._late_bytes = 0
 
-    def update(self, read: int, joints: int) -> str | None:
-        """Count a read; returns a line for the user the first time that there is a reason."""
+    def update(self, read: int, joints: int, late_bytes: int = 0) -> str | None:
+        """Count a read; returns a line for the user the first time that there is a reason.
+
+        Args:
+            read: number of joints that were read.
+            joints: number of all joints.
+            late_bytes: number of bytes so far that arrived after the time-out of their read.
+
+        """
         self._reads += 1
+        if late_bytes > self._late_bytes:
+            self._late.append(self._reads)
+        self._late_bytes = late_bytes
         is_complete, is_any = read == joints, read > 0
         if self._complete and not is_complete:
             self._began.append(self._reads)
         is_silent = not (is_any or self._any)
         self._complete, self._any = is_complete, is_any
-        while self._began and self._began[0] <= self._reads - LOSS_READS:
-            self._began.popleft()
-        if self._reported or not (is_silent or len(self._began) >= LOSSES):
+        for reads in (self._began, self._late):
+            while reads and reads[0] <= self._reads - LOSS_READS:
+                reads.popleft()
+        is_late = len(self._late) >= LATE_READS
+        if self._reported or not (is_silent or is_late or len(self._began) >= LOSSES):
             return None
         self._reported = True
+        if self._late:
+            return (
+                "replies arrive after the time-out: an adapter with a high latency, a slow "
+                "network, or a computer that is too busy; see snakewalk doctor"
+            )
         span = self._reads - self._began[0] + 1
         reason = f"replies got lost {LOSSES} times within {span} reads:"
         if is_silent:

@@ -121,8 +121,7 @@ class ServoChain:
         self._sensors = TemperatureSensors.of(robot)
         self._motion_sensors = MotionSensors(robot)
         self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)
-        self._armed = False
-        self._sent_at_s = -np.inf
+        self._armed, self._sent_at_s = False, -math.inf
         self._goal_rad = np.full(robot.joint_count, np.nan)
 
     @property
@@ -340,7 +339,8 @@ class ServoChain:
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
         read = reply.valid_count
-        if (losses := self._losses.update(read, len(reply.valid))) is not None:
+        losses = self._losses.update(read, len(reply.valid), self.counters.late_bytes)
+        if losses is not None:
             self.on_event(losses)
         measured_at_s = self._take(reply)
         imu = None

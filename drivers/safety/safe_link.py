@@ -33,6 +33,9 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 RESTART_S = 2.0
 """After a servo's reboot the goals' rate grows for this time until it is the limit again (ours)."""
+_DOUBTS = 10
+"""Impossible angles after which they are reported a second and last time (ours)."""
+_LAST_DOUBT = f" ({_DOUBTS} times so far; later ones are not reported); stop the run and check it"
 _OFF_TRIES = 3
 """Reads after a trip that repeat an unconfirmed torque off (ours)."""
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
@@ -88,6 +91,7 @@ class SafeLink:
         self._steps = MeasuredSteps(limits)
         self._loads = LoadLimits(limits)
         self._doubt: str | None = None
+        self._doubts = 0
         self._is_held_off = False
         self._on_event = on_event
         self._memory: SafetyMemory | None = None
@@ -212,7 +216,10 @@ class SafeLink:
         if self._state is not None:
             state, doubt = self._steps.update(state, self._state)
             if doubt is not None and self._doubt is None:
-                self._on_event(f"not believed: {doubt}")
+                self._doubts += 1
+                if self._doubts in (1, _DOUBTS):
+                    last = "" if self._doubts == 1 else _LAST_DOUBT
+                    self._on_event(f"not believed: {doubt}{last}")
             self._doubt = doubt
         if doubt is not None or (self._recovery is not None and self.tripped is None):
             stale = stale_fault(state, self._limits, self._clock.now_s())

@@ -125,7 +125,7 @@ def test_a_servo_that_is_not_there_is_one_line_and_code_1(
 ) -> None:
     code, _, err = call(monkeypatch, capsys, "bus", "set", "--port", device, "--id", "99")
     assert code == 1
-    assert err.startswith("snakewalk: servo 99: ping: ")
+    assert err.startswith("snakewalk: servo 99: ping: no answer at 1000000 baud; find it with")
 
 
 @pytest.fixture

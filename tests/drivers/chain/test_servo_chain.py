@@ -319,6 +319,23 @@ def test_an_alert_without_an_alarm_is_reported_and_read_again(line: Recorder, pa
     assert "Hardware Error Status reads 0" in events[0]
 
 
+def test_an_alert_that_comes_and_goes_is_reported_twice(line: Recorder) -> None:
+    """A bit that was set in every second packet gave 50 lines a minute of one joint."""
+    chain = ServoChain(DynamixelBus(line), ROBOT)
+    events: list[str] = []
+    chain.on_event = events.append
+    chain.enable()
+    chain._prepare_reads(fast=False)
+    events.clear()
+    for _ in range(30):
+        alert_without_alarm(line, 1)
+        for _ in range(2):
+            line.clock.advance(0.01)
+            chain.read()
+    assert len(events) == 2
+    assert "has come and gone 10 times without an alarm" in events[1]
+
+
 def test_an_alert_that_stays_counts_though_there_is_no_alarm(line: Recorder) -> None:
     chain = ServoChain(DynamixelBus(line), ROBOT)
     chain.enable()

@@ -216,3 +216,21 @@ def test_an_angle_that_stays_unbelievable_stops_the_run_for_good() -> None:
     assert "exchanged IDs" in link.tripped
     assert link.recoveries == 0
     assert step < 0.01
+
+
+def test_impossible_angles_that_come_and_go_are_reported_twice() -> None:
+    """A sensor that jumped by a turn in every seventh read gave hundreds of lines."""
+    line = SimLine(ServoBank(ROBOT.servo_ids), BenchPlant(3))
+    chain, events = ServoChain(DynamixelBus(line), ROBOT), list[str]()
+    limits = SafetyLimits.from_config(ROBOT, SafetyConfig())
+    link = SafeLink(chain, limits, line.clock, on_event=events.append)
+    link.enable()
+    line.tamper = forger = Forger(0)
+    for k in range(60):
+        forger.left = 1 if k % 3 == 0 else 0
+        next_s = line.clock.now_s() + 0.02
+        link.read()
+        link.write(JointCommand(line.clock.now_s(), np.zeros(3)))
+        line.clock.sleep_until_s(next_s)
+    assert len(events) == 2
+    assert "10 times so far; later ones are not reported" in events[1]
