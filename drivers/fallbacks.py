@@ -1,7 +1,6 @@
 """Private interfaces of dependencies that snakewalk uses for speed, and their public fallbacks.
 
-Each is wrapped in one module, which checks it once per process. If the check fails, the module
-uses the slower public interface and reports it here, once.
+One module wraps each, checks it once per process, and reports a fallback here.
 
 | name | wrapped in | fallback |
 | --- | --- | --- |

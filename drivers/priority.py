@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 RAISE = 10
-"""Steps of niceness if real-time scheduling is not available. Each step is about a quarter more of
-a busy processor (Linux, ``sched(7)``). This holds only among the programs of one terminal if the
-system groups them (autogroup)."""
+"""Steps of niceness if real-time scheduling is not available: each is about a quarter more of a
+busy processor (Linux, ``sched(7)``), with autogroup only within a terminal."""
 LOWER = 10
 """Niceness of work that may wait."""
 
@@ -16,10 +15,8 @@ LOWER = 10
 def raised_priority() -> Iterator[None]:
     """Put the calling thread, and what it starts, before others for as long as the context lasts.
 
-    A late command drops or stops the servos. On Linux it is a real-time priority (``SCHED_RR``, the
-    least), on other systems niceness. Only a superuser, or who is granted ``rtprio``
-    (``limits.conf(5)``), may have it: for others nothing changes. The system leaves a twentieth of
-    the time to all others.
+    On Linux it is the least real-time priority (``SCHED_RR``), which needs a superuser or
+    ``rtprio`` (``limits.conf(5)``); otherwise lower niceness, which needs a superuser as well.
     """
     restore = _real_time() or _nicer()
     try:

@@ -1,8 +1,6 @@
 """The control cycle of Feetech servos: ``ControlCycle`` with Feetech's packets.
 
-The rules for late, doubled and missing replies are those of ``ControlCycle``. The blocks that it
-returns are converted: to little-endian two's complement, and the state to the layout of Protocol
-2.0, so that the chain above cannot distinguish the makes.
+It converts blocks to little-endian two's complement, and the state to the layout of Protocol 2.0.
 """
 
 from collections.abc import Callable, Sequence

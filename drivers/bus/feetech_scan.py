@@ -49,8 +49,7 @@ def find_feetech(
 ) -> list[FeetechServo]:
     """Servos at each baud rate, by ID; leaves the port at the rate it had.
 
-    Each ID is pinged only at a rate at which a broadcast ping is answered: replies to that may
-    collide, but not be missed.
+    Each ID is pinged only at a rate at which a broadcast ping gets any reply.
 
     Raises:
         PortError: the port is gone.

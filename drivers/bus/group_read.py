@@ -1,8 +1,7 @@
 """Group reads: one (fast) sync read to many servos, and their reply as one result per servo.
 
-The regular reply, complete and without stuffing, is decoded in one compiled pass
-(``drivers.protocol.frames``). Any other reply is searched for the results that can be proved to
-belong to the request, servo by servo.
+A complete reply without stuffing is decoded in one compiled pass (``drivers.protocol.frames``). In
+any other reply only results that certainly belong to the request are valid.
 """
 
 from collections.abc import Sequence
@@ -146,9 +145,9 @@ class GroupReadRequest:
     def _in_turn(self, packets: Sequence[object]) -> tuple[dict[int, StatusPacket], int]:
         """Replies of this length by servo, and the number of damaged or misplaced packets.
 
-        Servos reply in the order of the request. So what belongs to every longest run in that order
-        is new, and a packet of the same servo before it is an older one that came twice. If two
-        replies are in one place, or one is behind it, the new one is unknown.
+        Servos reply in the order of the request, so packets of every longest run in that order are
+        new, and earlier packets of the same servo are copies of old ones. If two replies have one
+        place, neither is valid.
         """
         told = [
             packet

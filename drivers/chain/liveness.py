@@ -103,9 +103,9 @@ class LivenessCheck:
     def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
 
-        In a round of ``SLOW_EVERY`` cycles: torque, watchdog, identity, one of the settings, two of
-        those that shape the motion, and three of the fingerprint. In between, if the cycle
-        ``has_time``, a check to which not all servos have replied.
+        A round of ``SLOW_EVERY`` cycles has torque, watchdog, identity, one setting, two that shape
+        the motion, and three of the fingerprint. If a cycle ``has_time``, it repeats an incomplete
+        check.
 
         Raises:
             BusError: a servo is not as it was set.

@@ -13,9 +13,8 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 
 RISE_S_PER_K = 2.0
-"""Time at full output and at rest that warms a motor by a kelvin, s (ours). It is the heat of the
-stall current over the heat capacity of the servo's weight, 1.7 to 2.2 s for XL330, XM430 and
-XM540."""
+"""Time at full output and at rest that warms a motor by a kelvin, s (ours). Heat of the stall
+current over the heat capacity: 1.7 to 2.2 s for XL330, XM430 and XM540."""
 COOLING_S = 300.0
 """Time constant with which a motor cools, s (ours)."""
 EXPECTED_RISE_K = 4.0

@@ -73,8 +73,8 @@ class SdkPort(Protocol):
 class BytePort(SdkPort, Protocol):
     """A half-duplex line with a clock.
 
-    All methods raise ``PortError`` when the port is gone. Bytes arrive in order and each once; a
-    baud rate that differs from the servos' shows as noise or silence, never as an exception.
+    All methods raise ``PortError`` when the port is gone. A wrong baud rate causes noise or
+    silence, never an exception.
     """
 
     @property
@@ -105,8 +105,7 @@ class BytePort(SdkPort, Protocol):
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``clock.now_s() >= deadline_s``.
 
-        Returns what has arrived, at most ``count`` bytes: fewer mean that the deadline has passed.
-        With a deadline in the past it returns at once with the bytes that have arrived.
+        Returns fewer bytes if the deadline has passed; at once with a deadline in the past.
         """
         ...
 

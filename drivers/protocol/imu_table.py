@@ -1,12 +1,12 @@
 """The two public tables of IMUs that answer on a DYNAMIXEL bus, and what their bytes mean.
 
 - ``FFW-G40-IMU``, model number 537: ``param/dxl_model/ffw_g40_imu.model`` and ``dynamixel.model``
-  of ROBOTIS' ``dynamixel_hardware_interface``. It shows raw counts. The file names two registers of
-  scales (32 and 34) and does not say what they hold, so the user states the ranges.
+  of ROBOTIS' ``dynamixel_hardware_interface``. It shows raw counts. The values of its registers of
+  scales (32 and 34) are not published, so the user states the ranges.
 - ``imu_to_dxl``, version 2, on an LSM6DSV16X: ``duck-control/src/imu.rs`` of Pollen Robotics'
   ``microduck``, the host's side. ID 200, 12 bytes at 124: rates of 17.5 mdps a count, and the
-  vector of a unit quaternion as three IEEE half floats, all zero until the chip's filter runs. The
-  other registers of the device, its model number included, are not published.
+  vector of a unit quaternion as three IEEE half floats, all zero until the chip's filter runs.
+  Other registers are not published.
 """
 
 from collections.abc import Mapping

@@ -70,9 +70,8 @@ class InstructionPacket:
 class StatusPacket:
     """Servo to host; from ID 0xFE it is the common reply to a fast read.
 
-    The servos write the reply to a fast read one after the other: each adds an error byte, its ID,
-    its data and the CRC of everything so far. The last CRC is that of the packet. Then ``error`` is
-    the first servo's, and ``params`` is everything behind it except the last CRC.
+    In the reply to a fast read, ``error`` is the first servo's, and ``params`` is everything behind
+    it except the last CRC.
     """
 
     servo_id: int

@@ -1,7 +1,6 @@
 """The servos' replies to any instruction packet, one servo at a time.
 
-``sim.line.group_fast_path`` gives the same replies to the two packets of a control cycle, for all
-servos at once.
+``sim.line.group_fast_path`` gives the same replies to the packets of a control cycle.
 """
 
 from typing import NamedTuple
