@@ -3,6 +3,7 @@
 import math
 import random
 from collections.abc import Callable
+from functools import partial
 
 from snakewalk.drivers.protocol.crc import crc16
 from snakewalk.drivers.protocol.packet import HEADER, Instruction
@@ -180,7 +181,7 @@ def slipped_zero(rad: float, steps: int = 1, for_s: float = 0.0) -> Action:
 
         for k in range(steps):
             at_s = line.clock.now_s() + for_s * k / steps
-            firmware.events.schedule(at_s, lambda k=k: slip(k))
+            firmware.events.schedule(at_s, partial(slip, k))
 
     return begin
 

@@ -351,7 +351,7 @@ def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, Floa
 
 def _outside(value: Floats) -> Floats:
     """(S,) how much stands out at the outer ends of the sections (S, N), on the worse side."""
-    return np.maximum(value[:, :_OUTER].mean(axis=1), value[:, -_OUTER:].mean(axis=1))
+    return np.asarray(np.maximum(value[:, :_OUTER].mean(axis=1), value[:, -_OUTER:].mean(axis=1)))
 
 
 def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floats]:

@@ -287,7 +287,7 @@ class ControlCycle:
     def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
         """Send a request; until when its reply is awaited."""
         packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
-        if self._failed_in_a_row:  # what arrives now is of an older request
+        if self._failed_in_a_row:  # these bytes answer an older request
             self.counters.late_bytes += self._port.getBytesAvailable()
         self._port.clearPort()
         byte_s = self._byte_s

@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -128,7 +129,7 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
     segments = _segments(source, options)
     pieces = piece_graph(source, segments, mirror=options.mirror)
     around = _surroundings(source, options)
-    reached: dict[str, object] = {}
+    reached: dict[str, Any] = {}
     if options.through:
         points, radius = np.array(options.through), options.radius * source.length
         sequence = sequence_through(

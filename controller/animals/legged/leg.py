@@ -105,7 +105,7 @@ def triangle_m(
 
     Args:
         root_m: (T, 3)
-        end_m: (T, 3) where the third part ends, or the middle segment if there is none.
+        end_m: (T, 3) where the third part ends; without a third part, the middle segment.
         towards: (T, 3) directions to which the first joint points, not along the leg.
         first: segments (T,) before the middle one, as complex numbers in the plane.
         middle_m: length of the segment between the two rigid parts.
