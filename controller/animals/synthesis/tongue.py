@@ -51,7 +51,7 @@ class TongueRecord:
         The longest ``length_m`` is a height of 1.
 
         Raises:
-            InputError: no such file or column, values that are no numbers, times that are not even.
+            InputError: the file or a column is missing, a value is wrong, or times are uneven.
 
         """
         try:

@@ -13,7 +13,7 @@ from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import BoneMotion
 
 LENGTH, RADIUS = 0.05, 0.0018
-"""Of a tongue that is out, over the body's length (ours)."""
+"""Length and radius of the whole tongue, over the body's length (ours)."""
 _RGB = 191, 26, 38
 _ROWS = 8
 """Rows that the texture gets for the tongue's colour."""
