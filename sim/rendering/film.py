@@ -139,7 +139,8 @@ class _Stage:
         look = style.look
         self._robot, self._reached_s = robot, marks.reached_s
         self.bodies = len(look.rest_m) if look is not None and look.free else 1
-        self.spine = slice(1, 1 + (self.bodies if self.bodies > 1 else robot.link_count))
+        spine = self.bodies if self.bodies > 1 else robot.link_count
+        self.spine = slice(1, 1 + (spine if look is None else look.spine or spine))
         legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
         self.length_m = robot.length_m + legs_m
         """Length to show: the spine, and a leg to its side."""

@@ -61,6 +61,8 @@ class SkinLook:
     free: bool = False
     """Whether each link floats by itself, as the bones of a motion that no robot makes: a pose is
     then (7 L,), place and unit quaternion of each."""
+    spine: int = 0
+    """Number of bones of the spine, which come first; 0: all."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from snakewalk.controller.animals.legged.animal_synthesis import read_animal, sy
 from snakewalk.controller.animals.plots.animal_synthesis import draw_animal
 from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
 from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
+from snakewalk.controller.animals.synthesis.tongue import TongueRecord
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.messages import LOGGER
@@ -72,6 +73,14 @@ Feet = Annotated[
         autocompletion=completion.words(*FEET),
     ),
 ]
+TongueFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--tongue",
+        help="CSV table of a tracked tongue, to learn its chain from: time_s, and length_m or "
+        "height (0 to 1); default: made-up strokes",
+    ),
+]
 Frames = Annotated[
     int | None,
     typer.Option(
@@ -110,6 +119,7 @@ def synthesise(
     motion: Motion = None,
     animal: Animal = None,
     feet: Feet = None,
+    tongue: TongueFile = None,
     set_: Set = None,
     frames: Frames = None,
     film: Film = False,
@@ -137,9 +147,10 @@ def synthesise(
     if animal is None:
         if feet is not None:
             raise InputError(f"--feet {feet}: is for animals with legs; add --animal")
-        facts, complete = _snake(prepared, frames, look, files)
+        facts, complete = _snake(prepared, frames, look, tongue, files)
     else:
-        kept = {"--motion": motion, "--track": track, "--look": None if look == "animal" else look}
+        kept = {"--motion": motion, "--track": track, "--tongue": tongue}
+        kept["--look"] = None if look == "animal" else look
         wrong = [option for option, value in kept.items() if value is not None]
         if wrong:
             raise InputError(
@@ -154,7 +165,11 @@ def synthesise(
 
 
 def _snake(
-    prepared: WalkRun, frames: int | None, look: str, files: Mapping[str, Path]
+    prepared: WalkRun,
+    frames: int | None,
+    look: str,
+    tongue: Path | None,
+    files: Mapping[str, Path],
 ) -> tuple[dict[str, object], bool]:
     """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
     worn = None
@@ -164,7 +179,8 @@ def _snake(
         worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
     elif look != ANIMAL:
         raise InputError(f"--look {look}: is for --film and --glb")
-    made = SnakeSynthesis(prepared).synthesise(frames)
+    record = None if tongue is None else TongueRecord.read(tongue)
+    made = SnakeSynthesis(prepared, record).synthesise(frames)
     with atomic_write(files["track"]) as part:
         made.save(part, files["track"].stem, f"snakewalk synthesise of {prepared.run.track}")
     draw_walk(

@@ -10,6 +10,7 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.loader import load, locate
 from snakewalk.controller.animals.legged.animal_rig import animal_bones, animal_rig
 from snakewalk.controller.animals.legged.animal_synthesis import SynthesisedAnimal, as_long_robot
+from snakewalk.controller.animals.legged.prototype import SEGMENTS
 from snakewalk.controller.animals.mesh.body_look import rig_look
 from snakewalk.controller.animals.mesh.body_skin import Cut, shipped_skin
 from snakewalk.controller.animals.mesh.rig import Rig
@@ -61,7 +62,7 @@ class AnimalBody:
             prepared,
             file,
             animal_bones(made.animal, made.motion),
-            rig_look(self.rig, self.texture),
+            rig_look(self.rig, self.texture, spine=SEGMENTS),
             robot=as_long_robot(prepared.robot, _SHOWN * made.animal.length_m),
             reached_s=made.reached_s(),
             paths=[(0.0, dots)],

@@ -70,13 +70,14 @@ def skin_look(look: str, header: Header) -> SkinLook:
     return rig_look(replace(rig, rest_m=origins), dressed.texture, free=False)
 
 
-def rig_look(rig: Rig, texture: Image | None, *, free: bool = True) -> SkinLook:
+def rig_look(rig: Rig, texture: Image | None, *, free: bool = True, spine: int = 0) -> SkinLook:
     """Make the look of a rig.
 
     Args:
         rig: its size is the motion's.
         texture: the texture of the skin; None is one colour.
         free: whether its bones float, for a motion that no robot makes.
+        spine: number of its bones that are the spine; 0: all.
 
     """
     return SkinLook(
@@ -88,6 +89,7 @@ def rig_look(rig: Rig, texture: Image | None, *, free: bool = True) -> SkinLook:
         rest_m=rig.rest_m,
         texture=texture,
         free=free,
+        spine=spine,
     )
 
 

@@ -54,13 +54,13 @@ def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, tit
     wide, tall = high - low
     map_in = float(np.clip(0.85 * WIDTH_IN * tall / wide + 0.8, 2.8, 6.0))
     with style():
-        figure = Figure(figsize=(WIDTH_IN, map_in + 6.6), layout="constrained", dpi=110)
-        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 6.6])[:, 0]
+        figure = Figure(figsize=(WIDTH_IN, map_in + 8.6), layout="constrained", dpi=110)
+        upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 8.6])[:, 0]
         axes = upper.subplots(1, 1)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         _map(axes, made, ground, title)
-        _over_time(lower.subplots(3, 2, sharex=True).T.ravel(), made)
+        _over_time(lower.subplots(4, 2, sharex=True).T.ravel(), made)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
@@ -112,8 +112,8 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
 
 
 def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
-    """Distance, speed and bends, states; angles, behaviour, tongue."""
-    distance, speed, states, angles, behaviour, tongue = panels
+    """Distance, states, angles, behaviour; speed and bends, heading, head movement, tongue."""
+    distance, states, angles, behaviour, speed, heading, head, tongue = panels
     time, targets = made.time_s, made.targets
     end = len(targets.distance_m)
     current = np.minimum(targets.current, targets.count - 1)
@@ -148,8 +148,17 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     angles.set_yticks([0.0, 1.0], ["head", "tail"])
     angles.set_title(f"angle about the heading; to ±{most:.1f} rad")
     angles.set_ylabel("body")
+    mean = np.unwrap(made.plan.angles_rad.mean(axis=1))
+    heading.plot(time, np.degrees(mean), color=BLUE)
+    heading.set_title("heading: mean angle of the body")
+    heading.set_ylabel("degrees")
+    aside = made.plan.angles_rad[:, 0] - made.plan.angles_rad.mean(axis=1)
+    head.plot(time, np.degrees(aside), color=PURPLE)
+    head.set_title("head movement: angle to the heading")
+    head.set_ylabel("degrees")
+    behaviour.set_xlabel("time (s)")
     tongue.plot(time, made.tongue, color=RED, linewidth=0.8)
-    tongue.set_title("tongue: 0 in, 1 out")
+    tongue.set_title(f"tongue: 0 in, 1 out; {made.tongue_evidence}")
     tongue.set_ylabel("share")
     tongue.set_xlabel("time (s)")
     tongue.set_xlim(0.0, time[-1])
@@ -164,7 +173,6 @@ def _states(axes: Axes, made: SynthesisedWalk) -> None:
     axes.plot(time[at], state, "o", color=PURPLE, markersize=3)
     axes.set_title(f"state, {len(set(state))} of {len(made.library.shapes_rad)} used")
     axes.set_ylabel("number")
-    axes.set_xlabel("time (s)")
 
 
 def _behaviour(axes: Axes, made: SynthesisedWalk) -> None:

@@ -19,7 +19,7 @@ from snakewalk.controller.animals.synthesis.synthesis import (
     synthesise,
     varied_pulse,
 )
-from snakewalk.controller.animals.synthesis.tongue import HeightChain, Tongue, flicks
+from snakewalk.controller.animals.synthesis.tongue import HeightChain, Tongue, TongueRecord
 from snakewalk.controller.mechanics.ground_step import (
     GroundedSkeleton,
     GroundStep,
@@ -67,6 +67,8 @@ class SynthesisedWalk:
     """(T,)"""
     tongue: Floats
     """(T,) heights, 0 drawn in, 1 out."""
+    tongue_evidence: str
+    """measured or assumed, and the source."""
 
     @property
     def complete(self) -> bool:
@@ -112,6 +114,7 @@ class SynthesisedWalk:
             "speed_mean_body_lengths_s": round(float(plan.speed_m_s.mean()) / length_m, 4),
             "bend_k_rad": round(float(np.median(plan.angles_rad.std(axis=1))), 3),
             "steepest_deg": round(float(np.degrees(self.skeleton.steepest_rad)), 1),
+            "tongue_learned_from": self.tongue_evidence,
             "ground_gap_most_m": round(float(np.abs(self.skeleton.gap_m).max()), 9),
         }
 
@@ -154,8 +157,9 @@ class _Curves:
 class SnakeSynthesis:
     """The motion of one run's configuration; each step is made at its first use."""
 
-    def __init__(self, prepared: WalkRun) -> None:
+    def __init__(self, prepared: WalkRun, tongue: TongueRecord | None = None) -> None:
         self.prepared = prepared
+        self.tongue = TongueRecord.made_up() if tongue is None else tongue
         self.run = prepared.run
         self.how: SynthesisConfig = prepared.run.synthesis
         self.dt_s = 1.0 / self.how.rate_hz
@@ -246,6 +250,7 @@ class SnakeSynthesis:
             curves.head_held[:made],
             curves.calm_tail[:made],
             self._tongue(made),
+            f"{self.tongue.source} ({self.tongue.evidence})",
         )
 
     def _on_star(
@@ -361,5 +366,5 @@ class SnakeSynthesis:
     def _tongue(self, frames: int) -> Floats:
         """Heights at the frames: the chain plays b_st times as fast."""
         speed = curve_at(self.how.tongue_speed, np.arange(frames) * self.dt_s)
-        tongue = Tongue(HeightChain(flicks()), self.run.seed)
+        tongue = Tongue(HeightChain(self.tongue.heights), self.run.seed, self.tongue.rate_hz)
         return np.array([tongue.height(t) for t in np.cumsum(speed) * self.dt_s])

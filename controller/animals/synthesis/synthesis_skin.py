@@ -4,15 +4,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.animals.mesh.body_look import animal, rig_look
 from snakewalk.controller.animals.mesh.body_motion import robot_skin
 from snakewalk.controller.animals.mesh.body_skin import BodySkin, body_skin
-from snakewalk.controller.animals.mesh.rig import spine_rig
+from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
 from snakewalk.controller.animals.mesh.skin_file import write_skin
 from snakewalk.controller.animals.synthesis.snake_synthesis import SynthesisedWalk
+from snakewalk.controller.animals.synthesis.tongue_skin import (
+    bones_with_tongue,
+    rig_with_tongue,
+)
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.report.film import film_motion
@@ -31,6 +35,8 @@ class SynthesisSkin:
 
     dressed: BodySkin
     skin: Skin
+    tongue: bool
+    """Whether it shows its tongue: a snake, or a recorded body."""
 
     @classmethod
     def of(cls, look: str, track: str, robot: RobotConfig) -> "SynthesisSkin":
@@ -41,14 +47,23 @@ class SynthesisSkin:
 
         """
         dressed = body_skin(animal(track) if look == ANIMAL else look)
-        return cls(dressed, robot_skin(dressed.skin, robot))
+        return cls(dressed, robot_skin(dressed.skin, robot), look in (ANIMAL, "snake"))
 
     def write(self, made: SynthesisedWalk, file: Path) -> None:
         """Write the animated glTF, ``file`` ends in .glb."""
-        worn, bones = self.dressed, made.bones()
-        rig = spine_rig(self.skin, bones.bone_m)
+        worn = self.dressed
+        rig, bones, texture = self._rig(made, 1)
         with atomic_write(file) as part:
-            write_skin(part, rig, bones, worn.texture, worn.name, both_sides=worn.both_sides)
+            write_skin(part, rig, bones, texture, worn.name, both_sides=worn.both_sides)
+
+    def _rig(self, made: SynthesisedWalk, segments: int) -> tuple[Rig, BoneMotion, Image | None]:
+        """Rig and bones of that many segments each; a snake has a tongue."""
+        bones, texture = made.bones(segments), self.dressed.texture
+        rig = spine_rig(self.skin, bones.bone_m)
+        if not self.tongue:
+            return rig, bones, texture
+        rig, texture = rig_with_tongue(rig, bones.length_m, texture)
+        return rig, bones_with_tongue(bones, made.tongue), texture
 
     def film(self, made: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
@@ -57,12 +72,12 @@ class SynthesisSkin:
             InputError: the simulator or PyAV is not installed, or nothing draws here.
 
         """
-        bones = made.bones(FILM_SEGMENTS)
+        rig, bones, texture = self._rig(made, FILM_SEGMENTS)
         return film_over(
             prepared,
             file,
             bones,
-            rig_look(spine_rig(self.skin, bones.bone_m), self.dressed.texture),
+            rig_look(rig, texture, spine=made.bones(FILM_SEGMENTS).front_m.shape[1]),
             robot=prepared.robot,
             reached_s=made.reached_s(),
             paths=made.targets.paths(made.rate_hz),

@@ -4,9 +4,14 @@
 tongue shows ``Tongue.height(t)``: 0 is in and 1 is out.
 """
 
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 
 RATE_LIMITS = (0.4, 2.5)
 """Range of b_st, how fast the tongue plays."""
@@ -21,6 +26,54 @@ def flicks(rate_hz: float = 25.0) -> Floats:
     rest = np.zeros(round(0.8 * rate_hz))
     parts = [part for strokes in (2, 4, 3) for part in (rest, *[stroke] * strokes)]
     return np.concatenate([*parts, rest])
+
+
+@dataclass(frozen=True, slots=True)
+class TongueRecord:
+    """Heights of a tongue over time, to learn from."""
+
+    heights: Floats
+    """(T,) 0 drawn in, 1 out."""
+    rate_hz: float
+    evidence: str
+    """measured, by a file; or assumed."""
+    source: str
+
+    @classmethod
+    def made_up(cls) -> "TongueRecord":
+        """Use ``flicks``."""
+        return cls(flicks(), 25.0, "assumed", "made-up bursts of strokes")
+
+    @classmethod
+    def read(cls, file: Path) -> "TongueRecord":
+        """Read a CSV table with a header: ``time_s``, and ``length_m`` or ``height`` (0 to 1).
+
+        The longest ``length_m`` is a height of 1.
+
+        Raises:
+            InputError: the file or a column is missing, a value is wrong, or times are uneven.
+
+        """
+        try:
+            with file.open(encoding="utf-8", newline="") as held:
+                rows = list(csv.DictReader(held))
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"{file}: {error}; name a CSV table of the tongue") from None
+        columns = set(rows[0]) if rows else set()
+        kind = next((name for name in ("height", "length_m") if name in columns), None)
+        if "time_s" not in columns or kind is None:
+            raise InputError(f"{file}: the header must name time_s, and height or length_m")
+        try:
+            time_s, value = np.array([[float(row["time_s"]), float(row[kind])] for row in rows]).T
+        except (TypeError, ValueError):
+            raise InputError(f"{file}: a cell is no number; remove its row") from None
+        steps = np.diff(time_s)
+        if len(rows) < 3 or steps.min() <= 0.0 or np.ptp(steps) > 0.05 * np.median(steps):
+            raise InputError(f"{file}: time_s must rise evenly over three rows or more")
+        most = float(value.max()) if kind == "length_m" else 1.0
+        if not np.isfinite(value).all() or value.min() < 0.0 or value.max() > most or most <= 0.0:
+            raise InputError(f"{file}: {kind} must be 0 or more, and a height at most 1")
+        return cls(value / most, float(1.0 / np.median(steps)), "measured", file.name)
 
 
 class HeightChain:
@@ -43,8 +96,24 @@ class HeightChain:
         # the sequence repeats, so that its last pair has a successor
         np.add.at(counts, (seen[[-2, -1]], seen[[-1, 0]], seen[[0, 1]]), 1.0)
         total = counts.sum(axis=2, keepdims=True)
+        self.counts = counts
+        """(z, y, x): how often height x followed y after z."""
         self.probability = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0.0)
         """(z, y, x): of height x after y after z; rows of pairs never seen are 0."""
+
+    def interval(self, two: int, one: int, next_: int, z: float = 1.96) -> tuple[float, float]:
+        """Wilson interval of the probability of level ``next_`` after ``one`` after ``two``.
+
+        ``z`` is the normal quantile: 1.96 is 95 %. A pair that was never seen gives 0 to 1.
+        """
+        seen = float(self.counts[two, one].sum())
+        if seen == 0.0:
+            return 0.0, 1.0
+        share = float(self.counts[two, one, next_]) / seen
+        middle = (share + z * z / (2.0 * seen)) / (1.0 + z * z / seen)
+        half = z * np.sqrt(share * (1.0 - share) / seen + z * z / (4.0 * seen * seen))
+        half /= 1.0 + z * z / seen
+        return max(middle - float(half), 0.0), min(middle + float(half), 1.0)
 
     def sequence(self, steps: int, rng: np.random.Generator) -> Floats:
         """Draw heights (steps,) in 0..1, from the learned sequence's own beginning."""

@@ -1,11 +1,24 @@
 """The tongue's chain: probabilities, only learned transitions, seeds, speed."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from snakewalk.controller.animals.synthesis.tongue import HeightChain, Tongue, flicks
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.mesh.rig import Rig, posed_m
+from snakewalk.controller.animals.mesh.skin import Weights
+from snakewalk.controller.animals.synthesis.tongue import (
+    HeightChain,
+    Tongue,
+    TongueRecord,
+    flicks,
+)
+from snakewalk.controller.animals.synthesis.tongue_skin import bones_with_tongue, rig_with_tongue
+from snakewalk.controller.images.mesh import Mesh
+from snakewalk.controller.track.bone_motion import from_points
 
 CHAIN = HeightChain(flicks())
 
@@ -57,3 +70,68 @@ def test_too_little_to_learn_from_is_refused() -> None:
     for heights in (np.array([0.0, 1.0]), np.array([0.0, 1.5, 0.0])):
         with pytest.raises(ValueError, match="three or more heights"):
             HeightChain(heights)
+
+
+def test_a_known_chain_is_recovered_within_its_confidence_interval(tmp_path: Path) -> None:
+    """From a table of a tracked length: 99.9 % intervals hold the planted probabilities."""
+    rng = np.random.default_rng(4)
+    known = rng.dirichlet(np.ones(3), size=(3, 3))  # (z, y, x)
+    levels = [0, 1]
+    for _ in range(6000):
+        levels.append(int(rng.choice(3, p=known[levels[-2], levels[-1]])))
+    file = tmp_path / "tongue.csv"
+    rows = [f"{0.02 * k:.2f},{0.004 * level:.4f}" for k, level in enumerate(levels)]
+    file.write_text("time_s,length_m\n" + "\n".join(rows))
+    record = TongueRecord.read(file)
+    assert record.rate_hz == pytest.approx(50.0)
+    assert record.evidence == "measured"
+    chain = HeightChain(record.heights, levels=3)
+    wide = []
+    for two, one, next_ in np.ndindex(3, 3, 3):
+        low, high = chain.interval(two, one, next_, z=3.29)
+        assert low <= known[two, one, next_] <= high
+        wide.append(high - low)
+    assert np.median(wide) < 0.15
+    assert TongueRecord.made_up().evidence == "assumed"
+
+
+def test_a_pair_that_was_never_seen_has_no_estimate() -> None:
+    chain = HeightChain(np.array([0.0, 0.5, 1.0, 0.5]), levels=3)
+    assert chain.interval(0, 0, 1) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("time_s,x\n0,1", "the header must name time_s"),
+        ("time_s,height\n0,0\n1,a\n2,0", "a cell is no number"),
+        ("time_s,height\n0,0\n1,1\n5,0", "must rise evenly"),
+        ("time_s,height\n0,0\n1,2\n2,0", "a height at most 1"),
+    ],
+)
+def test_a_table_that_is_no_tongue_is_rejected(text: str, fault: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(InputError, match=fault):
+        TongueRecord.read(tmp_path / "t.csv")
+
+
+def test_the_tongue_of_the_skin_is_as_far_out_as_its_height() -> None:
+    points = np.zeros((3, 6, 3))
+    points[..., 0] = -0.2 * np.arange(6)
+    bones = from_points(points, np.arange(3.0))
+    moved = bones_with_tongue(bones, np.array([0.0, 0.5, 1.0]))
+    corners = np.zeros((3, 3))
+    mesh = Mesh(vertices=corners, normals=corners, uv=np.zeros((3, 2)), faces=np.array([[0, 1, 2]]))
+    held = Weights(np.zeros((3, 3), dtype=np.int64), np.tile([0.0, 1.0, 0.0], (3, 1)))
+    rest = points[0, :-1]
+    rig, texture = rig_with_tongue(
+        Rig(mesh, held, rest, np.arange(5) - 1), 1.0, np.zeros((24, 4, 3), dtype=np.uint8)
+    )
+    assert texture is not None
+    for frame, height in enumerate((0.0, 0.5, 1.0)):
+        tongue = posed_m(rig, moved, frame)[3:]
+        assert tongue[:, 0].max() == pytest.approx(0.05 * height - 0.0036, abs=1e-9)
+        assert tongue[:, 0].min() < 1e-9  # its root stays in the mouth
+    red = texture[int((1.0 - rig.mesh.uv[-1, 1]) * len(texture))]
+    assert red[0, 0] > 150
+    assert red[0, 1] < 60
