@@ -39,7 +39,7 @@ OPEN_LOOP: Final = ("gait", "cpg")
 START_SD_M: Final = 0.02
 """How accurately the robot is laid down before a task with waypoints (ours)."""
 TRACKER: Final = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
-"""Of the rehearsal: pose noise (1 s.d.) and delay."""
+"""Pose noise (1 s.d.) and delay in the rehearsal."""
 _LENGTH_S: Final = 0.5
 """Time at each end of a run over which a place is averaged (ours)."""
 
