@@ -17,6 +17,7 @@ from snakewalk.config.loader import checked
 from snakewalk.controller.bench.port_lines import PortLines
 from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_scan import find_feetech
 from snakewalk.drivers.errors import ChainError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 
@@ -52,7 +53,10 @@ def back_up(
         BusError: a servo stops answering.
 
     """
-    found = DynamixelBus(port, latency_s=latency_s).scan()
+    found = list(DynamixelBus(port, latency_s=latency_s).scan())
+    if not found:
+        rates = [port.getBaudRate()]
+        found = [each.servo_id for each in find_feetech(port, rates, latency_s=latency_s)]
     if not found:
         raise ChainError(f"{port.name}: no servo answers at {port.getBaudRate()} baud")
     servos = []

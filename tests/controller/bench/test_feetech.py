@@ -11,6 +11,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench import torque_off as stopping
 from snakewalk.controller.bench.doctor import examine
+from snakewalk.controller.bench.eeprom_backup import back_up, plan_restore
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.servo_settings import SettingsRequest, apply, open_servo, plan
 from snakewalk.controller.console.finding import Finding
@@ -129,6 +130,18 @@ def test_settings_of_a_feetech_servo_outlast_power_off() -> None:
     line.servos.reboot(0)
     assert scan(line, [500_000]).servos[0].servo_id == 7
     assert line.servos["Lock"].tolist() == [1, 1]
+
+
+def test_a_backup_of_feetech_servos_is_restored() -> None:
+    line = a_line("1-2:STS3215")
+    before = back_up(line, 0.004)
+    assert [(each.id, each.model) for each in before.servos] == [(1, "STS3215"), (2, "STS3215")]
+    bus = open_servo(line, 1, 0.004)
+    apply(bus, 1, plan(bus, 1, SettingsRequest(temperature_limit_c=60.0)))
+    changes = plan_restore(bus, before.servos[0])
+    assert [each.register for each in changes] == ["Temperature Limit"]
+    apply(bus, 1, changes)
+    assert back_up(line, 0.004) == before
 
 
 def test_a_run_reports_that_there_is_no_watchdog() -> None:

@@ -1,0 +1,179 @@
+"""``snakewalk tasks``: controllers on twelve tasks, as one table."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from snakewalk.config.archive import parse_json
+from snakewalk.config.errors import InputError
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.options import FirstSeed, Json, console
+from snakewalk.controller.console.pool import each
+from snakewalk.controller.console.progress import show_progress
+from snakewalk.controller.rehearsal.tasks import (
+    CONTROLLERS,
+    TASKS,
+    TRACKER,
+    Task,
+    TaskResult,
+    TaskRun,
+    run_task,
+    task_named,
+)
+
+
+@command(
+    "tasks",
+    group=JOB,
+    examples=(
+        "tasks --conditions",
+        "tasks slalom pegs --controller walk --controller gait --json",
+        "tasks --controller my_motion -o mine.jsonl",
+    ),
+)
+def tasks(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="tasks to run; default: all", metavar="TASK")
+    ] = None,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="walk, serpenoid, gait, cpg, a policy, or the motion of a plug-in; may be "
+            "repeated; default: all built-in ones"
+        ),
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per cell")] = 1,
+    first_seed: FirstSeed = 0,
+    conditions: Annotated[
+        bool, typer.Option("--conditions", help="list the tasks and their conditions; run nothing")
+    ] = False,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            "-o",
+            dir_okay=False,
+            help="write the results here as JSON lines; runs that it contains are skipped",
+        ),
+    ] = Path("tasks.jsonl"),
+    as_json: Json = False,
+) -> None:
+    """Run controllers on twelve tasks with stated conditions; list what the body truly did."""
+    chosen = [task_named(name) for name in names or ()] or list(TASKS)
+    if conditions:
+        _print_conditions(chosen, as_json)
+        return
+    require_extra("tasks need", "mujoco")
+    by = controller or list(CONTROLLERS)
+    planned = [
+        TaskRun(task.name, one, seed)
+        for seed in range(first_seed, first_seed + seeds)
+        for task in chosen
+        for one in by
+    ]
+    results = _results(out)
+    missing = [item for item in planned if item not in results]
+    with out.open("a", encoding="utf-8") as file:
+        for item, result in show_progress(
+            each(run_task, missing, workers=workers),
+            str(out),
+            len(planned),
+            done=len(planned) - len(missing),
+        ):
+            file.write(json.dumps(asdict(result)) + "\n")
+            file.flush()
+            results[item] = result
+    rows = [results[item] for item in planned]
+    if as_json:
+        print(json.dumps({"tasks": [asdict(row) for row in rows], "file": str(out)}))
+    else:
+        _print(rows, chosen, by)
+
+
+def _results(path: Path) -> dict[TaskRun, TaskResult]:
+    """Return the results in a file.
+
+    Raises:
+        InputError: it is damaged.
+
+    """
+    found: dict[TaskRun, TaskResult] = {}
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    for number, line in enumerate(lines, 1):
+        try:
+            result = TaskResult(**parse_json(line))
+        except (ValueError, TypeError):
+            raise InputError(
+                f"{path}: line {number} is not a result of a task; remove it, or choose another "
+                "file"
+            ) from None
+        found[TaskRun(result.task, result.controller, result.seed)] = result
+    return found
+
+
+def _print(rows: Sequence[TaskResult], chosen: Sequence[Task], by: Sequence[str]) -> None:
+    grid = Table("task", *by, box=None)
+    for task in chosen:
+        cells = [
+            [row for row in rows if (row.task, row.controller) == (task.name, one)] for one in by
+        ]
+        grid.add_row(task.name, *map(cell, cells))
+    console.print(grid)
+    console.print("share of the task, mean duration; - : the controller does not fit the task")
+
+
+def cell(rows: Sequence[TaskResult]) -> str:
+    """Return the text of one cell of the table: mean share and duration over the seeds."""
+    ran = [row for row in rows if row.share is not None]
+    if not ran:
+        return "-"
+    share = sum(row.share or 0.0 for row in ran) / len(ran)
+    seconds = sum(row.duration_s or 0.0 for row in ran) / len(ran)
+    tripped = sum(row.ended != "ran to its end" for row in ran)
+    return f"{share:.2f} {seconds:.0f} s" + (f", {tripped} tripped" if tripped else "")
+
+
+def condition(task: Task) -> dict[str, object]:
+    """Return the conditions of a task: goal, world, friction, robot, servo model and noise."""
+    run, robot, world = task.parts()
+    goal = (
+        f"{task.distance_m:g} m along {task.axis}"
+        if run is None
+        else f"{len(run.waypoints_m)} waypoints within {run.waypoint_radius_m:g} m"
+    )
+    noise = (
+        f"pose {TRACKER.noise_m:g} m, {TRACKER.noise_deg:g} deg, {TRACKER.delay_s:g} s late; "
+        "errors of friction, mass, one servo and horns"
+        if task.is_rehearsed
+        else "encoders only; true pose"
+    )
+    return {
+        "task": task.name,
+        "goal": goal,
+        "seconds": task.seconds,
+        "world": world.name,
+        "along": world.friction.along,
+        "across": world.friction.across,
+        "robot": robot.name,
+        "servo": robot.servo.model,
+        "gait": task.gait,
+        "noise": noise,
+    }
+
+
+def _print_conditions(chosen: Sequence[Task], as_json: bool) -> None:
+    rows = [condition(task) for task in chosen]
+    if as_json:
+        print(json.dumps({"conditions": rows}))
+        return
+    grid = Table(*rows[0], box=None)
+    for row in rows:
+        grid.add_row(*map(str, row.values()))
+    console.print(grid)

@@ -1,0 +1,92 @@
+"""Tasks that compare controllers: conditions, score, and controllers that do not fit."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import InputError
+from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.rehearsal import tasks
+from snakewalk.controller.rehearsal.commands.tasks import cell, condition
+from snakewalk.controller.rehearsal.tasks import TASKS, TaskResult, TaskRun, run_task
+from tests.helpers.in_process import work_in_this_process
+
+
+def test_twelve_tasks_state_friction_servo_and_noise() -> None:
+    rows = [condition(task) for task in TASKS]
+    assert len({row["task"] for row in rows}) == 12
+    for row in rows:
+        assert row["servo"] == "XM430-W350"
+        assert 0.0 < float(str(row["along"])) <= float(str(row["across"]))
+    assert "0.01 m, 3 deg, 0.1 s late" in str(rows[-1]["noise"])
+
+
+def test_a_short_swim_and_a_walk_without_waypoints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The score is a share of the distance that the body moved; the command resumes."""
+    work_in_this_process(monkeypatch)
+    short = tuple(
+        replace(task, seconds=4.0, distance_m=2.0) for task in TASKS if task.name == "swimming"
+    )
+    monkeypatch.setattr(tasks, "TASKS", short)
+    out = tmp_path / "tasks.jsonl"
+    words = ["tasks", "swimming", "--controller", "gait", "--controller", "walk", "-o", str(out)]
+    found = json.loads(CliRunner().invoke(app, [*words, "--json"], catch_exceptions=False).stdout)
+    swum, walked = found["tasks"]
+    assert 0.1 < swum["share"] < 1.0
+    assert swum["ended"] == "ran to its end"
+    assert walked["share"] is None
+    assert walked["ended"].startswith("not applicable: walk goes to waypoints")
+
+    def twice(item: TaskRun) -> TaskResult:
+        raise AssertionError(f"{item} ran twice")
+
+    monkeypatch.setattr("snakewalk.controller.rehearsal.commands.tasks.run_task", twice)
+    shown = CliRunner().invoke(app, words, catch_exceptions=False).stdout
+    assert f"{swum['share']:.2f}" in shown
+    out.write_text("{}\n")
+    broken = CliRunner().invoke(app, words)
+    assert "line 1 is not a result of a task" in str(broken.exception)
+
+
+def test_the_score_is_the_way_of_the_body_between_the_ends() -> None:
+    time_s = np.linspace(0.0, 10.0, 101)
+    centre_m = np.stack([0.3 * time_s, 0.0 * time_s, 0.1 * time_s], axis=1)
+    pose = type("Pose", (), {"time_s": time_s, "centre_m": centre_m})
+    record = type("Record", (), {"pose": pose})
+    assert tasks._moved_m(record, "x") == pytest.approx(0.3 * 9.5)  # type: ignore[arg-type]
+    assert tasks._moved_m(record, "z") == pytest.approx(0.1 * 9.5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("task", "controller", "why"),
+    [
+        ("rehearsal", "cpg", "does not use a pose"),
+        ("slalom", "nosuch", "unknown"),
+        ("pole", "serpenoid", "goes to waypoints"),
+    ],
+)
+def test_a_controller_that_does_not_fit_is_a_result(task: str, controller: str, why: str) -> None:
+    result = run_task(TaskRun(task, controller, 0))
+    assert result.share is None
+    assert result.ended.startswith("not applicable: ")
+    assert why in result.ended
+
+
+def test_an_unknown_task_is_named() -> None:
+    with pytest.raises(InputError, match="no such task; use one of slalom"):
+        run_task(TaskRun("volcano", "walk", 0))
+
+
+def test_cells_are_means_over_the_seeds() -> None:
+    rows = [
+        TaskResult("slalom", "walk", k, share=s, duration_s=10.0, ended=e)
+        for k, (s, e) in enumerate([(1.0, "ran to its end"), (0.5, "over current")])
+    ]
+    assert cell(rows) == "0.75 10 s, 1 tripped"
+    assert cell([TaskResult("slalom", "walk", 0, ended="not applicable: x")]) == "-"
