@@ -111,7 +111,7 @@ def marker_distortion(
         first[8] = coefficient
         fits.append(least_squares(off, first, method="lm", x_scale="jac", max_nfev=4000))
     fit = min(fits, key=lambda one: float(one.cost))
-    slopes = np.asarray(fit.jac, float)
+    slopes: Floats = np.array(fit.jac, dtype=float)
     inverse = np.linalg.pinv(slopes.T @ slopes)
     spare = max(len(fit.fun) - len(first), 1)
     sigma = float(np.sqrt(inverse[8, 8] * max(1.0, 2.0 * fit.cost / spare)))
