@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -180,7 +180,7 @@ def _prepare(task: Task, controller: str, seed: int) -> PreparedRun:
     if run is not None:
         moved = np.array(run.start_m) + START_SD_M * np.random.default_rng(seed).normal(size=2)
         keys["run.start_m"] = [float(value) for value in moved]
-    place = {"robot": task.robot, "world": task.world}
+    place: dict[str, Any] = {"robot": task.robot, "world": task.world}
     if run is not None:
         place = {"robot": run.robot, "world": run.world}
     if controller in OPEN_LOOP and not (run is not None and run.motion == controller):
