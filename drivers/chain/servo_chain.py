@@ -265,19 +265,18 @@ class ServoChain:
         if self._has_watchdog:
             bus.sync_write(ids, WATCHDOG, 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(here_rad)
+        ticks = self._watchdog_ticks
+        if self._has_watchdog:
+            bus.sync_write(ids, WATCHDOG, ticks)  # before torque, which is never on without it
+            self._expect(WATCHDOG, [ticks] * len(ids))
+        # read last: meanwhile another program may have written goals, or exchanged IDs
         now_rad, held = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
-        check_stillness(
-            self.robot, now_rad, here_rad, STILL_RAD
-        )  # IDs may have been exchanged since
+        check_stillness(self.robot, now_rad, here_rad, STILL_RAD)
         for joint in np.flatnonzero(held != goals).tolist():
             raise BusError(
                 f"{self.robot.joint_label(joint)}: Goal Position is {held[joint]:.0f} after "
                 f"{goals[joint]} was written to all"
             )
-        ticks = self._watchdog_ticks
-        if self._has_watchdog:
-            bus.sync_write(ids, WATCHDOG, ticks)  # before torque, which is never on without it
-            self._expect(WATCHDOG, [ticks] * len(ids))
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", [1] * len(ids))
         self._liveness = self._new_liveness()

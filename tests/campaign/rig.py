@@ -96,7 +96,7 @@ class ChangeWatch:
         self.reports: list[str] = []
         """What the chain and its recovery have said since the beginning."""
         self._cold: dict[int, int] = {}
-        """Cycles in which the temperature of a joint read 0 and was not reported."""
+        """Cycles in a row in which the temperature of a joint read 0 and was not reported."""
         self._cold_reported: set[int] = set()
         self.lines: list[str] = []
         """What the chain and its recovery have said since the last cycle."""
@@ -124,6 +124,7 @@ class ChangeWatch:
         """Begin anew: the chain has been set up."""
         self._cycles.clear()
         self._pending.clear()
+        self._cold.clear()
         self.lines.clear()
 
     def look(self, valid: np.ndarray, link: SafeLink) -> None:
@@ -146,8 +147,9 @@ class ChangeWatch:
         if rows is None:
             return
         is_cold = valid & (self._bank["Present Temperature"][rows] == 0)
+        self._cold = {joint: count for joint, count in self._cold.items() if is_cold[joint]}
         for joint in set(np.flatnonzero(is_cold).tolist()) - self._cold_reported:
-            if any(f"{ROBOT.joint_label(joint)}: temperature reads 0" in x for x in self.lines):
+            if any(f"{ROBOT.joint_label(joint)}: temperature reads 0" in x for x in self.reports):
                 self._cold_reported.add(joint)
                 self.noticed += 1
                 continue
@@ -229,17 +231,20 @@ class Rig:
         self._sent: np.ndarray | None = None
         self._sent_at_s = 0.0
         self._steady = False
+        self._recoveries = 0
         self._stamp_readings()
         self.line.taps.append(self._overhear)
 
     def read(self) -> JointState:
         """One read under the witness's eyes."""
         self._cycle += 1
-        before, brought_back = self._seen, self.link.recoveries
+        before = self._seen
         state = self.link.read()
         self._seen = state
         self.changes.look(state.valid, self.link)
-        self._steady = self._steady and self.link.recoveries == brought_back
+        # a recovery reads as well, also one while goals are written
+        self._steady = self._steady and self.link.recoveries == self._recoveries
+        self._recoveries = self.link.recoveries
         self._check_values(state, before if self._steady else None)
         self._steady = True
         return state

@@ -10,7 +10,9 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.liveness import SLOW_EVERY
 from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.errors import SafetyTrippedError
+from snakewalk.drivers.errors import BusError, SafetyTrippedError
+from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
+from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand
@@ -176,3 +178,24 @@ def test_detection_takes_at_most_a_round_and_a_few_cycles(
     rig.disturb = lambda: rig.write_goals([joints - 1], 2300)
     assert rig.swing(2 * SLOW_EVERY, period_s=period_s) <= SLOW_EVERY + 3
     assert f"joint yaw_{joints:02} (ID {joints}): Goal Position is 2300" in str(rig.link.tripped)
+
+
+def test_torque_stays_off_if_another_program_writes_goals_while_the_watchdog_is_armed() -> None:
+    rig = Rig()
+
+    def after_the_watchdog(time_s: float, from_host: bool, data: bytes) -> None:
+        del time_s
+        for packet in PacketParser().feed(data) if from_host else []:
+            is_write = (
+                isinstance(packet, InstructionPacket)
+                and packet.instruction == Instruction.SYNC_WRITE
+                and packet.params[:2] == (98).to_bytes(2, "little")
+            )
+            if is_write and packet.params[5]:
+                rig.write_goals([2], 1500)
+
+    rig.line.taps.append(after_the_watchdog)
+    with pytest.raises(BusError, match=r"yaw_03.*: Goal Position is 1500 after 2048 was written"):
+        rig.link.enable()
+    rig.line.settle()
+    assert rig.line.bank["Torque Enable"].tolist() == [0, 0, 0, 0]
