@@ -1,5 +1,6 @@
 """A synthesised motion as [PT] shows it: trajectory, distance to the target, speed, states."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -40,6 +41,8 @@ from snakewalk.controller.figures.style import (
 _BODY_SPACING = 1.15
 """Body lengths between the bodies drawn."""
 _MARGIN_M = 0.4
+_LONGEST_SOURCE = 36
+"""Characters of the source of the tongue's chain that fit below its axes."""
 
 
 def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, title: str) -> None:
@@ -158,9 +161,10 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     head.set_ylabel("degrees")
     behaviour.set_xlabel("time (s)")
     tongue.plot(time, made.tongue, color=RED, linewidth=0.8)
-    tongue.set_title(f"tongue: 0 in, 1 out; {made.tongue_evidence}")
+    tongue.set_title("tongue: 0 in, 1 out")
     tongue.set_ylabel("share")
-    tongue.set_xlabel("time (s)")
+    learned_from = textwrap.shorten(made.tongue_evidence, _LONGEST_SOURCE, placeholder=" ...")
+    tongue.set_xlabel(f"time (s)\nlearned from: {learned_from}")
     tongue.set_xlim(0.0, time[-1])
 
 
