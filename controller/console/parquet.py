@@ -24,7 +24,7 @@ def check_parquet(path: Path | None) -> None:
         require_extra("Parquet needs", "pyarrow")
 
 
-def write_parquet(table: Path, path: Path, kinds: Mapping[str, Kind]) -> int:
+def table_to_parquet(table: Path, path: Path, kinds: Mapping[str, Kind]) -> int:
     """Write a CSV table as Parquet and return its number of rows; empty cells are null.
 
     Args:

@@ -5,7 +5,7 @@ import tempfile
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from itertools import islice
@@ -105,16 +105,20 @@ def _on_one_pool(
     with process_pool(workers) as pool:
         while True:
             most, source = (1, suspects) if suspects else (AHEAD * workers, None)
-            while len(waiting) < most:
+            broken = False
+            while len(waiting) < most and not broken:
                 number = suspects.popleft() if source else next(upcoming, None)
                 if number is None:
                     break
-                waiting[pool.submit(work, items[number])] = number
+                try:
+                    waiting[pool.submit(work, items[number])] = number
+                except BrokenProcessPool:  # a worker has died since the last result
+                    suspects.append(number)
+                    broken = True
             if not waiting:
-                return True
-            alone = len(waiting) == 1
-            finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            broken = False
+                return not broken
+            alone = len(waiting) == 1 and not broken
+            finished, _ = wait(waiting, return_when=ALL_COMPLETED if broken else FIRST_COMPLETED)
             for future in finished:
                 try:
                     result = future.result()

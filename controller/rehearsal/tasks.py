@@ -45,7 +45,7 @@ _LENGTH_S: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class ControllerTask:
     """One task: the waypoints of a run, or a distance in a world."""
 
     name: str
@@ -73,18 +73,18 @@ class Task:
 
 
 TASKS: Final = (
-    Task("slalom", "flat-slalom", "lateral-undulation", 90.0),
-    Task("ramp-along", "ramp-10-along", "lateral-undulation", 90.0),
-    Task("ramp-up", "ramp-15-up", "lateral-undulation", 90.0),
-    Task("steps", "steps-4cm", "lateral-undulation", 90.0),
-    Task("gaps", "gaps-8cm", "lateral-undulation", 90.0),
-    Task("random-ground", "random-20", "lateral-undulation", 90.0),
-    Task("pegs", None, "pegs-undulation", 30.0, world="pegs", distance_m=5.0),
-    Task("pole", None, "helix-pole", 20.0, "pole", "alternating16", "z", 2.0),
-    Task("pipe", None, "helix-pipe", 20.0, "pipe", "alternating16", "z", 2.0),
-    Task("swimming", None, "anguilliform", 20.0, world="pool", distance_m=8.0),
-    Task("water-to-land", "water-to-land", "subcarangiform", 60.0),
-    Task("rehearsal", "flat-slalom", "lateral-undulation", 90.0, is_rehearsed=True),
+    ControllerTask("slalom", "flat-slalom", "lateral-undulation", 90.0),
+    ControllerTask("ramp-along", "ramp-10-along", "lateral-undulation", 90.0),
+    ControllerTask("ramp-up", "ramp-15-up", "lateral-undulation", 90.0),
+    ControllerTask("steps", "steps-4cm", "lateral-undulation", 90.0),
+    ControllerTask("gaps", "gaps-8cm", "lateral-undulation", 90.0),
+    ControllerTask("random-ground", "random-20", "lateral-undulation", 90.0),
+    ControllerTask("pegs", None, "pegs-undulation", 30.0, world="pegs", distance_m=5.0),
+    ControllerTask("pole", None, "helix-pole", 20.0, "pole", "alternating16", "z", 2.0),
+    ControllerTask("pipe", None, "helix-pipe", 20.0, "pipe", "alternating16", "z", 2.0),
+    ControllerTask("swimming", None, "anguilliform", 20.0, world="pool", distance_m=8.0),
+    ControllerTask("water-to-land", "water-to-land", "subcarangiform", 60.0),
+    ControllerTask("rehearsal", "flat-slalom", "lateral-undulation", 90.0, is_rehearsed=True),
 )
 
 
@@ -113,7 +113,7 @@ class TaskResult:
     """``ran to its end``, the trip, or ``not applicable: ...``."""
 
 
-def task_named(name: str) -> Task:
+def task_named(name: str) -> ControllerTask:
     """Return a task.
 
     Raises:
@@ -148,7 +148,7 @@ def run_task(item: TaskRun) -> TaskResult:
     )
 
 
-def share(task: Task, finished: Finished) -> float:
+def share(task: ControllerTask, finished: Finished) -> float:
     """Share of a task that a body truly did."""
     record = finished.record
     if task.run is None:
@@ -168,7 +168,7 @@ def _moved_m(record: RunRecord, axis: str) -> float:
     return float((ends[1] - ends[0])["xyz".index(axis)])
 
 
-def _prepare(task: Task, controller: str, seed: int) -> PreparedRun:
+def _prepare(task: ControllerTask, controller: str, seed: int) -> PreparedRun:
     """Prepare a run of a built-in controller, a policy, or a plug-in's motion.
 
     Raises:
@@ -207,7 +207,7 @@ def _is_policy(controller: str) -> bool:
     return controller in shipped("policies") or controller.endswith(".toml")
 
 
-def _rehearsed(task: Task, item: TaskRun) -> TaskResult:
+def _rehearsed(task: ControllerTask, item: TaskRun) -> TaskResult:
     if item.controller in OPEN_LOOP or _is_policy(item.controller):
         raise InputError(f"{item.controller} does not use a pose, and the rehearsal is about it")
     case = RehearsalCase(str(task.run), item.seed, has_errors=True, tracker=TRACKER)

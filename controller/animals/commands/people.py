@@ -21,7 +21,7 @@ from snakewalk.controller.animals.people.cycle import (
     animate,
     scaled,
 )
-from snakewalk.controller.animals.people.feet import FeetLaw
+from snakewalk.controller.animals.people.feet_law import MOTIONS, FeetLaw
 from snakewalk.controller.animals.people.surface import Person
 from snakewalk.controller.animals.people.worn_mesh import worn_mesh
 from snakewalk.controller.console import completion
@@ -47,7 +47,7 @@ from snakewalk.controller.images.mesh_files import read_mesh
 )
 def people(
     motion: Annotated[
-        str, typer.Argument(help="walk or run", autocompletion=completion.words(*GAITS))
+        str, typer.Argument(help="walk or run", autocompletion=completion.words(*MOTIONS))
     ] = "walk",
     output: Annotated[
         Path, typer.Option("-o", "--output", help="write one looping cycle here (.glb)")

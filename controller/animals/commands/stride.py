@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.controller.animals.legged.animal_stride import VIEWS, Names, measure_animal
+from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
+from snakewalk.controller.animals.legged.views import VIEWS
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import (

@@ -12,10 +12,9 @@ from snakewalk.config.template import template
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.animals.legged.prototype import LEGS
 from snakewalk.controller.animals.legged.stride import Foot, Stride, measure_stride
+from snakewalk.controller.animals.legged.views import VIEWS
 from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypoints
 
-VIEWS = ("above", "side")
-"""Views of a camera on an animal."""
 _FEWEST_POINTS = 3
 _HEAD = """An animal by the stride of a tracked one; height, knees and skin are those of {like}.
   snakewalk synthesise jacksboro-traverse --animal {name}.toml --film

@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.legged.leg import triangle_m
-from snakewalk.controller.animals.people.feet import Feet, FeetLaw, FootParameters, feet
+from snakewalk.controller.animals.people.feet import Feet, FootParameters, feet
+from snakewalk.controller.animals.people.feet_law import MOTIONS, FeetLaw
 from snakewalk.controller.animals.people.skeleton import (
     ABDUCTION_RAD,
     BALL,
@@ -79,7 +80,7 @@ RUN: Final = PersonGait(
            (0.66, -70.0), (0.82, -12.0), (0.93, 6.0)),
 )  # fmt: skip
 """A run at 3 m/s: 35 % of a cycle on the ground, so that both feet are in the air twice."""
-GAITS: Final = {one.name: one for one in (WALK, RUN)}
+GAITS: Final = dict(zip(MOTIONS, (WALK, RUN), strict=True))
 
 
 @dataclass(frozen=True, slots=True)

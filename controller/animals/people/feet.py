@@ -12,24 +12,13 @@ in a walk it is more than half, in a run less.
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.animals.people.feet_law import FeetLaw
 from snakewalk.controller.gaits import footfall
 from snakewalk.controller.gaits.wave import TURN
-
-
-class FeetLaw(StrEnum):
-    """Equations of the feet."""
-
-    PRINTED = "printed"
-    """Eq. 9 and 10 as printed."""
-    PHASES = "phases"
-    """Eq. 9 and 10, the feet half a cycle apart and never below the ground."""
-    PLANTED = "planted"
-    """In addition a foot keeps its place while it is on the ground."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from snakewalk.controller.rehearsal.tasks import (
     CONTROLLERS,
     TASKS,
     TRACKER,
-    Task,
+    ControllerTask,
     TaskResult,
     TaskRun,
     run_task,
@@ -118,7 +118,7 @@ def _results(path: Path) -> dict[TaskRun, TaskResult]:
     return found
 
 
-def _print(rows: Sequence[TaskResult], chosen: Sequence[Task], by: Sequence[str]) -> None:
+def _print(rows: Sequence[TaskResult], chosen: Sequence[ControllerTask], by: Sequence[str]) -> None:
     grid = Table("task", *by, box=None)
     for task in chosen:
         cells = [
@@ -140,7 +140,7 @@ def cell(rows: Sequence[TaskResult]) -> str:
     return f"{share:.2f} {seconds:.0f} s" + (f", {tripped} tripped" if tripped else "")
 
 
-def condition(task: Task) -> dict[str, object]:
+def condition(task: ControllerTask) -> dict[str, object]:
     """Return the conditions of a task: goal, world, friction, robot, servo model and noise."""
     run, robot, world = task.parts()
     goal = (
@@ -168,7 +168,7 @@ def condition(task: Task) -> dict[str, object]:
     }
 
 
-def _print_conditions(chosen: Sequence[Task], as_json: bool) -> None:
+def _print_conditions(chosen: Sequence[ControllerTask], as_json: bool) -> None:
     rows = [condition(task) for task in chosen]
     if as_json:
         print(json.dumps({"conditions": rows}))

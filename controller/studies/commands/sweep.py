@@ -14,7 +14,7 @@ from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Dask, Force, Json, Set, console, key_values
-from snakewalk.controller.console.parquet import check_parquet, write_parquet
+from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
@@ -116,7 +116,7 @@ def sweep(
     if picture is not None:
         pictures().draw_sweep(read_table(out) if out.exists() else [], picture)
     if parquet is not None and out.exists():
-        write_parquet(out, parquet, KINDS)
+        table_to_parquet(out, parquet, KINDS)
     if as_json:
         found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
         print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))

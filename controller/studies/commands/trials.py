@@ -25,7 +25,7 @@ from snakewalk.controller.console.options import (
     TrackFile,
     console,
 )
-from snakewalk.controller.console.parquet import check_parquet, write_parquet
+from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.run.factory import moves_by_gait
@@ -180,7 +180,7 @@ def trials(
     planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
     found = _run(planned, cases, changes, start_spread, _Where(workers, dask), out)
     if parquet is not None and out is not None:
-        write_parquet(out, parquet, KINDS)
+        table_to_parquet(out, parquet, KINDS)
     summaries = study.table(found, cases)
     if picture is not None:
         pictures().draw_trials(summaries, picture)

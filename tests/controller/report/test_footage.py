@@ -97,6 +97,9 @@ class _Blank:
     def __exit__(self, *_: object) -> None:
         pass
 
+    def reload(self, *_: object) -> None:
+        pass
+
     def draw(self, *_: object) -> np.ndarray:
         return self._black
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.parquet import write_parquet
+from snakewalk.controller.console.parquet import table_to_parquet
 from snakewalk.controller.studies.plots.sweep import draw_sweep
 from snakewalk.controller.studies.sweep_measure import Measurement
 from snakewalk.controller.studies.sweep_points import Point
@@ -125,7 +125,7 @@ def test_a_table_becomes_parquet_with_types(tmp_path: Path, monkeypatch: Any) ->
         for k in range(30):
             point = replace(POINTS[k % 6], number=k)
             table.add(point, row(0.1 * k) if k != 3 else Measurement("refused: no, never"))
-    assert write_parquet(path, out, KINDS) == 30
+    assert table_to_parquet(path, out, KINDS) == 30
     found = parquet.read_table(out)
     assert parquet.ParquetFile(out).num_row_groups > 1
     assert tuple(found.column_names) == COLUMNS

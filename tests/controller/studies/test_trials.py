@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.parquet import write_parquet
+from snakewalk.controller.console.parquet import table_to_parquet
 from snakewalk.controller.studies import trials as study
 from snakewalk.controller.studies.commands.trials import trials as command
 from snakewalk.controller.studies.trials import Case, Trial, plan_trials, prepare_case, wilson
@@ -288,7 +288,7 @@ def test_trials_become_parquet(tmp_path: Path) -> None:
     with TrialsTable(path, {FLAT: "digest"}, 0.04) as table:
         table.add(Trial(FLAT, 4, (0.5, -1.0), 3, complete=True, reached=3, duration_s=12.5))
         table.add(Trial(FLAT, 5, cause="error", why="ValueError: a, b"))
-    assert write_parquet(path, out, KINDS) == 2
+    assert table_to_parquet(path, out, KINDS) == 2
     first, second = parquet.read_table(out).to_pylist()
     assert (first["seed"], first["complete"], first["duration_s"]) == (4, True, 12.5)
     assert first["start_m"] == "0.5 -1.0"

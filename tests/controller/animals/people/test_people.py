@@ -19,7 +19,8 @@ from snakewalk.controller.animals.people.cycle import (
     PersonMotion,
     animate,
 )
-from snakewalk.controller.animals.people.feet import FeetLaw, FootParameters, feet
+from snakewalk.controller.animals.people.feet import FootParameters, feet
+from snakewalk.controller.animals.people.feet_law import FeetLaw
 from snakewalk.controller.animals.people.skeleton import INDEX
 from snakewalk.controller.animals.people.surface import Person
 from snakewalk.controller.animals.people.worn_mesh import worn_mesh

@@ -1,0 +1,17 @@
+"""Names of the motions of people, and of the equations of their feet."""
+
+from enum import StrEnum
+from typing import Final
+
+MOTIONS: Final = ("walk", "run")
+
+
+class FeetLaw(StrEnum):
+    """Equations of the feet."""
+
+    PRINTED = "printed"
+    """Eq. 9 and 10 as printed."""
+    PHASES = "phases"
+    """Eq. 9 and 10, the feet half a cycle apart and never below the ground."""
+    PLANTED = "planted"
+    """In addition a foot keeps its place while it is on the ground."""
