@@ -115,13 +115,18 @@ def _under_sun(points_m: Floats, ground: HeightField | None) -> Floats:
 
 def link_surface_m(links_m: Floats, forward: Floats, robot: RobotConfig) -> Floats:
     """Points (P, 3) of links (L, 3) with axes (L, 3), drawn as the capsules of a robot."""
-    half_m = 0.62 * robot.length_m / len(links_m)
-    thin = 1.0 - 0.5 * np.clip(np.linspace(0.0, 1.0, len(links_m)) - 0.55, 0.0, None) / 0.45
+    half_m, radius_m = _half_sizes_m(robot, len(links_m))
     side = np.stack([-forward[:, 1], forward[:, 0], np.zeros(len(forward))], axis=1)
     along = links_m[:, None] + forward[:, None] * (half_m * np.linspace(-1.0, 1.0, 12))[:, None]
-    across = (robot.body_radius_m * thin)[:, None] * np.linspace(-1.0, 1.0, 7)
+    across = radius_m[:, None] * np.linspace(-1.0, 1.0, 7)
     points = along[:, :, None] + (across[..., None] * side[:, None])[:, None]
     return np.asarray(points.reshape(-1, 3))
+
+
+def _half_sizes_m(robot: RobotConfig, links: int) -> tuple[float, Floats]:
+    """Half length of a drawn link, and the radius (L,) of each: thinner towards the tail."""
+    thin = 1.0 - 0.5 * np.clip(np.linspace(0.0, 1.0, links) - 0.55, 0.0, None) / 0.45
+    return 0.62 * robot.length_m / links, robot.body_radius_m * thin
 
 
 def add_shade(
@@ -140,11 +145,9 @@ def add_shade(
     ahead = forward - (forward * normal).sum(axis=1, keepdims=True) * normal
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     side = np.cross(normal, ahead)
-    thin = 1.0 - 0.5 * np.clip(np.linspace(0.0, 1.0, len(links_m)) - 0.55, 0.0, None) / 0.45
+    half_m, radius_m = _half_sizes_m(robot, len(links_m))
     for k in range(len(links_m)):
-        size = np.array(
-            [0.62 * robot.length_m / len(links_m), thin[k] * robot.body_radius_m, 0.001]
-        )
+        size = np.array([half_m, radius_m[k], 0.001])
         axes = np.stack([ahead[k], side[k], normal[k]], axis=1).ravel()
         patch = scene.geoms[scene.ngeom]
         mujoco.mjv_initGeom(patch, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, place[k], axes, DARK)
@@ -153,14 +156,10 @@ def add_shade(
 
 def _on_ground(links_m: Floats, ground: HeightField | None) -> tuple[Floats, Floats]:
     """Where the sun's rays through (L, 3) points meet the ground, and its normals (L, 3) there."""
-    slide = SUN_DIRECTION[:2] / -SUN_DIRECTION[2]
-    place = links_m.copy()
+    place = np.zeros_like(links_m)
+    place[:, :2] = _under_sun(links_m, ground)
     if ground is None:
-        place[:, :2] += links_m[:, 2:] * slide
-        place[:, 2] = 0.0
         return place, np.tile([0.0, 0.0, 1.0], (len(links_m), 1))
-    height = links_m[:, 2] - ground.elevation_m(links_m[:, 0], links_m[:, 1])
-    place[:, :2] += np.clip(height, 0.0, None)[:, None] * slide
     place[:, 2] = ground.elevation_m(place[:, 0], place[:, 1])
     east, north = ground.gradient(place[:, 0], place[:, 1])
     normal = np.stack([-east, -north, np.ones_like(east)], axis=1)
