@@ -11,7 +11,6 @@ The command continues its file.
 """
 
 import argparse
-import json
 import math
 import tempfile
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ import numpy as np
 import scipy.signal
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 
@@ -90,18 +90,16 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("-o", "--out", type=Path, required=True)
     asked = parser.parse_args()
-    rows = []
-    if asked.out.exists():
-        rows = [json.loads(line) for line in asked.out.read_text(encoding="utf-8").splitlines()]
+    rows = read_lines(asked.out, dict, "a row of this benchmark")
     done = {(row["slope_deg"], row["motion"], row["seed"]) for row in rows}
-    for seed in range(asked.first_seed, asked.first_seed + asked.seeds):
-        for slope_deg in asked.slopes:
-            for motion in ("walk", "serpenoid"):
-                if (slope_deg, motion, seed) in done:
-                    continue
-                rows.append(measured(slope_deg, motion, seed))
-                with asked.out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(rows[-1]) + "\n")
+    planned = [
+        (slope_deg, motion, seed)
+        for seed in range(asked.first_seed, asked.first_seed + asked.seeds)
+        for slope_deg in asked.slopes
+        for motion in ("walk", "serpenoid")
+    ]
+    finished = ((case, measured(*case)) for case in planned if case not in done)
+    rows += [row for _, row in append_lines(asked.out, finished, dict)]
     print(table(rows))
 
 

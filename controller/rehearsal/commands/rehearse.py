@@ -9,8 +9,6 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from snakewalk.config.archive import parse_json
-from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.console import completion
@@ -19,6 +17,7 @@ from snakewalk.controller.console.options import FirstSeed, Json, console, key_v
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.rehearsal.rehearsal import RUNS, RehearsalCase, case_of, rehearse
+from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
 
 _METRICS = {"distance %": "distance_m", "cost %": "cost_of_transport", "eta %": "eta"}
 """Columns of the largest errors of metrics."""
@@ -76,14 +75,11 @@ def rehearse_runs(
         for seed in range(first_seed, first_seed + seeds)
         for run in runs or RUNS
     ]
-    results = _results(out)
+    results = {case_of(row).key: row for row in read_lines(out, _rehearsal, "a rehearsal")}
     missing = [case for case in planned if case.key not in results]
-    with out.open("a", encoding="utf-8") as file:
-        finished = each(rehearse, missing, workers=workers)
-        for case, row in show_progress(finished, "rehearsals", len(missing)):
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            results[case.key] = row
+    finished = show_progress(each(rehearse, missing, workers=workers), "rehearsals", len(missing))
+    for case, row in append_lines(out, finished, dict):
+        results[case.key] = row
     rows = [results[case.key] for case in planned]
     if as_json:
         print(json.dumps({"rehearsals": rows, "file": str(out)}))
@@ -93,25 +89,9 @@ def rehearse_runs(
         raise SystemExit(1)
 
 
-def _results(path: Path) -> dict[tuple[str, int, bool, str], dict[str, Any]]:
-    """Return the results in a file, by case.
-
-    Raises:
-        InputError: it is damaged.
-
-    """
-    found: dict[tuple[str, int, bool, str], dict[str, Any]] = {}
-    if not path.exists():
-        return found
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        try:
-            row = parse_json(line)
-            found[case_of(row).key] = row
-        except (ValueError, KeyError, TypeError):
-            raise InputError(
-                f"{path}: line {number} is not a rehearsal; remove it, or choose another file"
-            ) from None
-    return found
+def _rehearsal(row: dict[str, Any]) -> dict[str, Any]:
+    case_of(row)  # rejects another row
+    return row
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> Table:

@@ -9,13 +9,12 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from snakewalk.config.archive import parse_json
-from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import JOB, command
 from snakewalk.controller.console.options import FirstSeed, Json, console
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
+from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
 from snakewalk.controller.rehearsal.tasks import (
     CONTROLLERS,
     TASKS,
@@ -78,44 +77,22 @@ def tasks(
         for task in chosen
         for one in by
     ]
-    results = _results(out)
+    known = read_lines(out, lambda row: TaskResult(**row), "a result of a task")
+    results = {TaskRun(row.task, row.controller, row.seed): row for row in known}
     missing = [item for item in planned if item not in results]
-    with out.open("a", encoding="utf-8") as file:
-        for item, result in show_progress(
-            each(run_task, missing, workers=workers),
-            str(out),
-            len(planned),
-            done=len(planned) - len(missing),
-        ):
-            file.write(json.dumps(asdict(result)) + "\n")
-            file.flush()
-            results[item] = result
+    finished = show_progress(
+        each(run_task, missing, workers=workers),
+        str(out),
+        len(planned),
+        done=len(planned) - len(missing),
+    )
+    for item, result in append_lines(out, finished, asdict):
+        results[item] = result
     rows = [results[item] for item in planned]
     if as_json:
         print(json.dumps({"tasks": [asdict(row) for row in rows], "file": str(out)}))
     else:
         _print(rows, chosen, by)
-
-
-def _results(path: Path) -> dict[TaskRun, TaskResult]:
-    """Return the results in a file.
-
-    Raises:
-        InputError: it is damaged.
-
-    """
-    found: dict[TaskRun, TaskResult] = {}
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    for number, line in enumerate(lines, 1):
-        try:
-            result = TaskResult(**parse_json(line))
-        except (ValueError, TypeError):
-            raise InputError(
-                f"{path}: line {number} is not a result of a task; remove it, or choose another "
-                "file"
-            ) from None
-        found[TaskRun(result.task, result.controller, result.seed)] = result
-    return found
 
 
 def _print(rows: Sequence[TaskResult], chosen: Sequence[ControllerTask], by: Sequence[str]) -> None:

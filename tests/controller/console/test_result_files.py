@@ -44,8 +44,7 @@ STREAMS = {
     "bus_serve.py": "a recording of the line grows",
     "table.py": "a table grows by rows",
     "truth.py": "the truth of a served robot grows by rows",
-    "rehearse.py": "the results of rehearsals grow by rows, and are continued",
-    "tasks.py": "the results of tasks grow by rows, and are continued",
+    "result_lines.py": "the results of rehearsals and tasks grow by rows, and are continued",
     "live_page.py": "what viser prints goes to the null device",
 }
 """Files that grow, each row whole, in place of being written at once."""
