@@ -204,6 +204,22 @@ FURTHER = [
         [_reading("Present Velocity", 100), {"kind": "no_output", "ids": [3]}],
         amplitude_rad=0.18,
     ),
+    *(
+        Scenario(
+            f"`reading`: current always {value}, and `no_output`, amplitude {amplitude} rad",
+            [_reading("Present Current", value), {"kind": "no_output", "ids": [3]}],
+            amplitude_rad=amplitude,
+        )
+        for value, amplitude in ((186, 0.18), (-186, 0.18), (40, 0.12), (-700, 0.18), (186, 0.1))
+    ),
+    Scenario(
+        "`reading`: current always 186, pitch joint, and `no_output`, amplitude 0.18 rad",
+        [
+            {**_reading("Present Current", 186), "ids": [4]},
+            {"kind": "no_output", "ids": [4]},
+        ],
+        amplitude_rad=0.18,
+    ),
     Scenario(
         "`reading`: current, velocity and position constant",
         [_reading(f"Present {name}") for name in ("Current", "Velocity", "Position")],

@@ -277,8 +277,8 @@ class ControlCycle:
         return request
 
     def _responding(self) -> list[int]:
-        """IDs of the servos that have replied lately."""
-        return [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
+        """IDs of the servos that have replied lately; all IDs if none has."""
+        return [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)] or [*self._ids]
 
     def _send(self, packet: bytes) -> None:
         self._line.reserve(len(packet) * self._byte_s)
