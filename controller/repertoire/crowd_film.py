@@ -13,7 +13,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.repertoire.behaviour import Wandering
-from snakewalk.controller.repertoire.detail import NEAR, DetailedCrowd, ViewFrustum
+from snakewalk.controller.repertoire.detail import FAR, NEAR, DetailedCrowd, ViewFrustum
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot, CrowdView, render_crowd
 
@@ -95,7 +95,7 @@ class CrowdScene:
                 azimuth,
                 elevation,
                 [
-                    BodyChain(chain.points_m, chain.radius_m, chain.body, chain.level == NEAR)
+                    BodyChain(chain.points_m, chain.radius_m, chain.body, chain.level - FAR)
                     for chain in chains
                 ],
                 f"{len(chains)} of {len(levels)} bodies in view, {near} near",
