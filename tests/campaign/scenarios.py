@@ -24,6 +24,8 @@ WRITES = {
     "direction": ("Drive Mode", (1,)),
     "shutdown": ("Shutdown", (0,)),
     "limits": ("Min Position Limit", (100, 1000)),
+    "hot limit": ("Temperature Limit", (90, 100)),
+    "velocity limit": ("Velocity Limit", (100, 900)),
 }
 """Registers that another program changes while the chain moves, and values that it may write."""
 GOALS = ("second master", "deaf")

@@ -9,6 +9,7 @@ import pytest
 from snakewalk.controller.cli.main import main
 from snakewalk.drivers.chain.fingerprint import FINGERPRINT
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
+from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.line_port import OpenedLine, line_port
@@ -134,7 +135,10 @@ def robot_file(tmp_path: Path, line: OpenedLine) -> Path:
     path = tmp_path / "mine.toml"
     path.write_text('name = "mine"\njoint_axes = "yyyyyyyyyyyyyyyy"\n', encoding="utf-8")
     bank = line.bank
-    known = {i: {n: int(bank[n][i - 1]) for n in FINGERPRINT} for i in range(1, 17)}
+    known = {
+        i: {n: int(bank[n][i - 1]) for n in FINGERPRINT if n in load_control_table("XM430-W350")}
+        for i in range(1, 17)
+    }
     FingerprintFile(path).write(known)
     return path
 
