@@ -75,9 +75,13 @@ def test_bus_set_shows_asks_and_writes(
 ) -> None:
     words = ("bus", "set", "--port", device, "--id", "16", "--new-id", "40")
     code, out, err = call(monkeypatch, capsys, *words)
-    assert code == 0
-    assert "nothing written" in out
-    assert "say --yes" in err
+    assert code == 2  # 0 although it had done nothing
+    assert "ID" in out
+    assert "bus set asks first, but there is no terminal; nothing is changed; add --yes" in err
+    assert line.bank["ID"][15] == 16
+    code, out, err = call(monkeypatch, capsys, *words, "--json")
+    assert (code, out) == (2, "")
+    assert "--json is for programs" in err
     code, out, _ = call(monkeypatch, capsys, *words, "--dry-run", "--yes", "--json")
     assert not json.loads(out)["written"]
     assert line.bank["ID"][15] == 16
