@@ -137,6 +137,10 @@ _WRITES = [
     _written("Min Position Limit", 2000),
     _written("PWM Limit", 100),
     _written("Current Limit", 20),
+    _written("Velocity Limit", 900),
+    _written("Temperature Limit", 100),
+    _written("Min Voltage Limit", 100),
+    _written("Max Voltage Limit", 150),
     Scenario("`write`: Goal Position once", [_write("Goal Position", 2200)], is_harmless=True),
     Scenario(
         "second master: Goal Position of one joint, every 5 ms",

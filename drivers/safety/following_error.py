@@ -43,8 +43,8 @@ STANDING_RAD = 0.005
 """A joint stands while its position differs by at most this (ours): three units of a DYNAMIXEL."""
 CHANGED_OUTPUT = 0.2
 """Change of the expected current, as a share of the current at full output, during which a joint
-that stands has to draw another current (ours). Of a sensor in the supply line, whose current grows
-with the square of the output, the smallest change is a fifth of the expected one."""
+that stands has to draw another current (ours). The current in a supply line grows with the square
+of the output: a sensor there shows at least a fifth of the change."""
 CHANGED_LIMIT = 0.6
 """The same as a share of a lower limit of the current (ours): the limit varies with the supply."""
 _FLOATS = readonly_array()
@@ -121,10 +121,9 @@ class FollowingError:
         since_s, _, _, low_a, high_a = self._steady[:, joint]
         error_rad = abs(float(goal_rad[joint] - state.position_rad[joint]))
         return (
-            f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal, and its "
-            f"current stays at {state.current_a[joint]:.2f} A for {state.time_s - since_s:.2f} s, "
-            f"though its error asks for {low_a:.2f} to {high_a:.2f} A: its motor does not push, "
-            "or it is blocked, and its current sensor is dead"
+            f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal; its current "
+            f"stays at {state.current_a[joint]:.2f} A for {state.time_s - since_s:.2f} s, expected "
+            f"{low_a:.2f} to {high_a:.2f} A: dead current sensor, and its motor does not push"
         )
 
 
