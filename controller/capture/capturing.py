@@ -313,7 +313,8 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
         if share > _INACCURATE:
             doubts.append(
                 f"the points are expected to be off by {share:.1%} of the body in most frames; "
-                "look at --sheet, and use more light or a larger picture of the animal"
+                "look at --sheet, and give --background or --threshold if a part of the animal "
+                "is not found"
             )
     return f"{options.recording}: {'. '.join(doubts)}" if doubts else None
 

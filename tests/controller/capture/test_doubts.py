@@ -2,16 +2,21 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.capture.capturing import warning_of
-from snakewalk.controller.capture.identity import head_end
+from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
-from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.capture.verification.film_check import goes_on_faintly
+from snakewalk.controller.capture.verification.frame_store import FrameStore
+from snakewalk.controller.images.body_detector import BodyDetector, make_detector
+from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
-from tests.oracles.rendered_snake import SnakeScene, film, half_width, true_midlines
+from tests.oracles.rendered_snake import SnakeScene, empty, film, half_width, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
 SCENE = SnakeScene(rows=240, columns=320, frames=10, rate_hz=3.75, wave_hz=0.6, length_px=100.0)
@@ -77,3 +82,25 @@ def test_a_large_expected_error_is_reported() -> None:
     text = warning_of(OPTIONS, captured(rough, 5.0))
     assert text is not None
     assert "off by 5.0% of the body" in text
+
+
+TAILS: dict[str, tuple[dict[str, Any], bool]] = {
+    "the tail is too faint": ({"head": 1.8, "faint": 0.07, "taper": 0.6}, True),
+    "pointed": ({"tip": 0.0}, False),
+    "shadow": ({"shadow": 0.4}, False),
+    "stains": ({"stains": 40.0}, False),
+}
+
+
+@pytest.mark.parametrize("kind", TAILS)
+def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
+    change, expected = TAILS[kind]
+    scene = replace(SCENE, frames=8, rate_hz=3.0, **change)
+    detector = BodyDetector(empty(scene), Polarity.DARK, "given", search_faint_parts=False)
+    store, found = FrameStore(), []
+    for number, frame in enumerate(film(scene)):
+        body = detector.detect(frame).skeleton
+        assert body.status is FrameStatus.GOOD
+        store.put(number, frame, body.points_px, body.length_px)
+        found.append(body)
+    assert goes_on_faintly(align_ends(found).skeletons, store) is expected
