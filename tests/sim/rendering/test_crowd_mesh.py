@@ -25,7 +25,7 @@ def test_a_tube_is_closed_faces_outward_and_has_the_volume_of_its_body(
     mesh: tuple[int, int], points: int
 ) -> None:
     grid = TubeGrid(*mesh)
-    lines = np.stack([wave(points), wave(points) + [1.0, 2.0, 3.0]])
+    lines = np.stack([wave(points), wave(points) + np.array([1.0, 2.0, 3.0])])
     corner, normal = grid.tubes(lines, np.full((2, points), 0.015))
     assert corner.shape == normal.shape == (2, grid.corners, 3)
     np.testing.assert_allclose(corner[1] - corner[0], np.tile([1.0, 2.0, 3.0], (len(corner[0]), 1)))
@@ -34,7 +34,7 @@ def test_a_tube_is_closed_faces_outward_and_has_the_volume_of_its_body(
     volume = float((np.cross(a, b) * c).sum()) / 6.0
     length = np.linalg.norm(np.diff(wave(200), axis=0), axis=1).sum()
     assert 0.5 < volume / (np.pi * 0.015**2 * length) < 1.1
-    sides = {tuple(edge) for face in grid.faces for edge in zip(face, np.roll(face, -1))}
+    sides = {tuple(edge) for face in grid.faces for edge in zip(face, np.roll(face, -1), strict=True)}
     ends = {grid.corners - k for k in range(1, grid.sides + 1)} | set(range(grid.sides))
     open_edges = {e for e in sides if e[::-1] not in sides}
     assert {corner for edge in open_edges for corner in edge} <= ends
