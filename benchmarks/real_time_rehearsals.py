@@ -66,7 +66,8 @@ def rehearsed(run: str, seed: int) -> dict[str, Any]:
             [*PROGRAM, "judge", "truth.jsonl", str(log), "--json"],
             check=False, cwd=folder, capture_output=True, text=True,
         )  # fmt: skip
-        return row | json.loads(judged.stdout) | _lateness(log, float(counts["latest_s"]))
+        found: dict[str, Any] = json.loads(judged.stdout)
+        return row | found | _lateness(log, float(counts["latest_s"]))
 
 
 def _on_core(core: int) -> tuple[str, ...]:
