@@ -138,7 +138,8 @@ class ServedRobot:
         self._robot, self._deviation = robot, deviation
         ground = build_ground(world)
         self.body: MujocoPlant = physics.MujocoPlant(
-            deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s
+            *(deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s),
+            is_placed=False,
         )
         straight = (0.0,) * robot.joint_count
         servo_rad = np.array(straight if place.joint_rad is None else place.joint_rad)
