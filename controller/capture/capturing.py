@@ -4,6 +4,7 @@ A track that was captured before is corrected by the file that the user has save
 page.
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -137,10 +138,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
 
     """
     check_options(options)
-    folder = PartFolder(
-        options.output.with_name(options.output.name + ".part"),
-        settings_of(options) | {"frames_of_a_part": PART_FRAMES},
-    )
+    folder = part_folder(options)
     finished = folder.start(resume=options.resume, force=options.force)
     console = stderr_console()
     with console.status("learning the background ..."):
@@ -179,6 +177,14 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     return facts
 
 
+def part_folder(options: CaptureOptions) -> PartFolder:
+    """Return the folder of the finished parts of a capture."""
+    return PartFolder(
+        options.output.with_name(options.output.name + ".part"),
+        settings_of(options) | {"frames_of_a_part": PART_FRAMES},
+    )
+
+
 def _parts(
     options: CaptureOptions, film: OpenedFilm, folder: PartFolder, finished: list[Capture]
 ) -> FilmParts:
@@ -202,14 +208,11 @@ def _captured(
 ) -> Capture:
     first = len(film.stated_s)
     bar.update(first)
-    try:
+    kept = nullcontext() if parts.folder is None else parts.folder.kept_if_interrupted()
+    with kept:
         for frame in film.frames(first):
             parts.add(frame, detector.detect(frame), film.stated_s[-1])
             bar.advance()
-    except KeyboardInterrupt as stop:
-        if parts.folder is not None and parts.finished:
-            stop.add_note(f"{parts.folder.path}: holds the frames so far; continue by --resume")
-        raise
     captured, _ = parts.done()
     return captured
 
