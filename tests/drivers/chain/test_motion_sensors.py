@@ -62,7 +62,7 @@ def hold(sensor: int, value: float, joint: int = 0) -> Change:
 
 
 def test_readings_that_agree_are_not_reported() -> None:
-    assert swing(lambda motion: None, 3000) == []
+    assert swing(lambda motion: None, 600) == []
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -70,7 +70,7 @@ def test_readings_that_agree_are_not_reported() -> None:
 def test_a_current_that_stays_the_same_while_the_joint_turns_back_is_reported_once(
     amps: float, joint: int
 ) -> None:
-    ((k, line),) = swing(hold(0, amps, joint), 1000)
+    ((k, line),) = swing(hold(0, amps, joint), 300)
     name = ROBOT.joint_label(joint)
     assert line.startswith(f"{name}: current reads {amps:.2f} A all the time")
     assert CURRENT_READS <= k < 100
@@ -113,7 +113,7 @@ def test_a_joint_at_rest_is_not_reported() -> None:
     def rest(motion: np.ndarray) -> None:
         motion[:] = np.array([[0.1, 0.1], [0.0, 0.0], [0.2, 0.2]])
 
-    assert swing(rest, 1000) == []
+    assert swing(rest, 200) == []
 
 
 def test_a_constant_speed_with_its_constant_current_is_not_reported() -> None:
