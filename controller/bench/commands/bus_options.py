@@ -15,10 +15,10 @@ def confirmed(action: str, question: str, *, as_json: bool) -> bool:
     """Ask a person before an action; whether the person agrees.
 
     Raises:
-        InputError: there is no person: no terminal, or an output for programs.
+        InputError: nobody can be asked: a terminal is missing, or the output is for programs.
 
     """
     if as_json or not sys.stdin.isatty():
-        reason = "--json is for programs" if as_json else "there is no terminal"
+        reason = "--json is for programs" if as_json else "a terminal is missing"
         raise InputError(f"{action} asks first, but {reason}; nothing is changed; add --yes")
     return typer.confirm(question, default=False, err=True)

@@ -132,7 +132,7 @@ def _check_options(out: Path, current: float, *, homing_offset: bool, yes: bool)
         raise InputError(f"--current {current:g}: over 0 and at most 2 A")
     if homing_offset and not yes and not sys.stdin.isatty():
         raise InputError(
-            "calibrate --homing-offset asks first, but there is no terminal; add --yes"
+            "calibrate --homing-offset asks first, but a terminal is missing; add --yes"
         )
     if yes and not homing_offset:
         raise InputError("--yes: goes with --homing-offset; the robot's file is always written")

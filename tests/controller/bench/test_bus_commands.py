@@ -77,7 +77,7 @@ def test_bus_set_shows_asks_and_writes(
     code, out, err = call(monkeypatch, capsys, *words)
     assert code == 2  # 0 although it had done nothing
     assert "ID" in out
-    assert "bus set asks first, but there is no terminal; nothing is changed; add --yes" in err
+    assert "bus set asks first, but a terminal is missing; nothing is changed; add --yes" in err
     assert line.bank["ID"][15] == 16
     code, out, err = call(monkeypatch, capsys, *words, "--json")
     assert (code, out) == (2, "")

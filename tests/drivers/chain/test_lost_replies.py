@@ -1,16 +1,6 @@
 """Replies that get lost or arrive late are reported once, with the likely cause."""
 
-import numpy as np
-import pytest
-
-from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.lost_replies import LATE_READS, LOSS_READS, LOSSES, LostReplies
-from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.types import JointCommand
-from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.bench import BenchPlant
 
 
 def test_losses_without_late_bytes_are_noise() -> None:
@@ -33,19 +23,46 @@ def test_rare_late_bytes_are_not_reported() -> None:
         assert found.update(2, 2, late_bytes=20 * (k // (LOSS_READS // 2))) is None
 
 
-@pytest.mark.parametrize(("latency_s", "is_late"), [(0.001, False), (0.016, True)])
-def test_an_adapter_that_becomes_slow_is_named(latency_s: float, *, is_late: bool) -> None:
-    """The run named noise, a loose plug, and no power."""
-    robot = RobotConfig(name="four", joint_axes="yyyy")
-    line = SimLine(ServoBank(robot.servo_ids), BenchPlant(4), usb_latency_s=1e-3)
-    chain, events = ServoChain(DynamixelBus(line, latency_s=0.003), robot), list[str]()
-    chain.enable()
-    chain.on_event = events.append
-    line.usb_latency_s = latency_s
-    start_s = line.clock.now_s()
-    for k in range(6):
-        line.clock.sleep_until_s(start_s + 0.02 * k)
-        chain.read()
-        chain.write(JointCommand(line.clock.now_s(), np.zeros(4)))
-    assert any("after the time-out" in event for event in events) == is_late
-    assert not any("noise" in event for event in events)
+def reports(counts: list[int], joints: int = 2) -> list[tuple[int, str]]:
+    """Lines, and the reads (from 1) at which they come, for numbers of joints that were read."""
+    found = LostReplies()
+    lines = [(k, found.update(count, joints)) for k, count in enumerate(counts, start=1)]
+    return [(k, line) for k, line in lines if line is not None]
+
+
+def losses_at(*reads: int, upto: int = 300) -> list[int]:
+    """Numbers of joints that were read, with one joint missing in some reads."""
+    return [1 if k in reads else 2 for k in range(1, upto)]
+
+
+def test_the_fourth_loss_is_reported_with_the_reads_since_the_first() -> None:
+    ((k, line),) = reports(losses_at(1, 3, 5, 9))
+    assert k == 9
+    assert line.startswith("replies got lost 4 times within 9 reads: noise, a loose plug")
+    ((k, line),) = reports(losses_at(11, 13, 15, 30))
+    assert (k, "within 20 reads" in line) == (30, True)
+
+
+def test_losses_count_within_a_window() -> None:
+    ((k, line),) = reports(losses_at(1, 30, 60, LOSS_READS))
+    assert (k, f"within {LOSS_READS} reads" in line) == (LOSS_READS, True)
+    assert reports(losses_at(1, 30, 60, LOSS_READS + 1)) == []
+
+
+def test_a_servo_that_falls_silent_is_one_loss() -> None:
+    assert reports([2] * 5 + [1] * 500) == []
+
+
+def test_a_silent_read_is_one_loss_and_two_in_a_row_are_a_dead_line() -> None:
+    assert reports([0, 2, 2, 0, 1, 2, 2, 0, 2]) == []
+    ((k, line),) = reports([2, 2, 0, 0, 0, 2, 0, 0])
+    assert k == 4
+    assert line.startswith("no servo was read in two reads in a row: no power, noise")
+    ((k, _),) = reports([0, 0])
+    assert k == 2
+
+
+def test_the_first_late_byte_counts() -> None:
+    found = LostReplies()
+    lines = [found.update(2, 2, late_bytes=k) for k in range(1, LATE_READS + 1)]
+    assert [each is not None for each in lines] == [False] * (LATE_READS - 1) + [True]

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from snakewalk.config.robot import RobotConfig, ServoConfig
-from snakewalk.config.run import SafetyConfig
-from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.motion_sensors import (
     BACK_RAD,
     CURRENT_READS,
@@ -18,13 +16,6 @@ from snakewalk.drivers.chain.motion_sensors import (
     SPEED_READS,
     MotionSensors,
 )
-from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.safety.limits import SafetyLimits
-from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.types import JointCommand
-from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.servo.bank import ServoBank
-from snakewalk.sim.servo.bench import BenchPlant
 
 ROBOT = RobotConfig(
     name="two",
@@ -71,7 +62,7 @@ def hold(sensor: int, value: float, joint: int = 0) -> Change:
 
 
 def test_readings_that_agree_are_not_reported() -> None:
-    assert swing(lambda motion: None, 3000) == []
+    assert swing(lambda motion: None, 600) == []
 
 
 @pytest.mark.parametrize("joint", [0, 1])
@@ -79,7 +70,7 @@ def test_readings_that_agree_are_not_reported() -> None:
 def test_a_current_that_stays_the_same_while_the_joint_turns_back_is_reported_once(
     amps: float, joint: int
 ) -> None:
-    ((k, line),) = swing(hold(0, amps, joint), 1000)
+    ((k, line),) = swing(hold(0, amps, joint), 300)
     name = ROBOT.joint_label(joint)
     assert line.startswith(f"{name}: current reads {amps:.2f} A all the time")
     assert CURRENT_READS <= k < 100
@@ -122,7 +113,7 @@ def test_a_joint_at_rest_is_not_reported() -> None:
     def rest(motion: np.ndarray) -> None:
         motion[:] = np.array([[0.1, 0.1], [0.0, 0.0], [0.2, 0.2]])
 
-    assert swing(rest, 1000) == []
+    assert swing(rest, 200) == []
 
 
 def test_a_constant_speed_with_its_constant_current_is_not_reported() -> None:
@@ -142,21 +133,3 @@ def test_unread_unknown_and_rare_readings_are_not_judged() -> None:
 def test_the_travel_of_a_constant_current_must_suffice() -> None:
     least_rad = min(CURRENT_TRAVEL_RAD, 2.0 * BACK_RAD)
     assert swing(hold(0, 0.1), 126, amplitude_rad=least_rad / 8) == []  # a period
-
-
-def test_a_run_reports_a_dead_current_sensor() -> None:
-    """The run went on without a word, and nothing watched the load of the joint."""
-    line = SimLine(ServoBank(ROBOT.servo_ids), BenchPlant(2))
-    chain = ServoChain(DynamixelBus(line), ROBOT)
-    events: list[str] = []
-    chain.on_event = events.append
-    link = SafeLink(chain, SafetyLimits.from_config(ROBOT, SafetyConfig()), line.clock)
-    link.enable()
-    line.firmware.set_reading(np.array([0]), "Present Current", 30)
-    start_s = line.clock.now_s()
-    for k in range(150):
-        line.clock.sleep_until_s(start_s + k * STEP_S)
-        link.read()
-        link.write(JointCommand(line.clock.now_s(), np.full(2, 0.3 * np.sin(2.5 * k * STEP_S))))
-    (event,) = events
-    assert event.startswith("joint yaw_01 (ID 1): current reads 0.08 A all the time")
