@@ -7,6 +7,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -52,15 +53,18 @@ def text(file: Path) -> str:
     return file.read_text(encoding="utf-8")
 
 
-def functions(source: str) -> Iterator[tuple[str, int, int]]:
-    """Yield name, lines and parameters of each function; ``self`` and ``cls`` do not count."""
+@cache
+def functions(source: str) -> list[tuple[str, int, int]]:
+    """Return name, lines and parameters of each function; ``self`` and ``cls`` do not count."""
+    found = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             given = node.args
             named = [*given.posonlyargs, *given.args, *given.kwonlyargs]
             count = sum(each.arg not in {"self", "cls"} for each in named)
             assert node.end_lineno is not None
-            yield node.name, node.end_lineno - node.lineno + 1, count
+            found.append((node.name, node.end_lineno - node.lineno + 1, count))
+    return found
 
 
 def oversized(source: str, *, is_command: bool) -> Iterator[str]:

@@ -20,15 +20,17 @@ from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.truth import TruthLog
+from snakewalk.sim.feetech.line import FeetechLine
+from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import Plant
+from snakewalk.sim.serve.bench_line import feetech_line
 from snakewalk.sim.serve.watched_plant import WatchedPlant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import motors_of
 from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 if TYPE_CHECKING:
-    from snakewalk.sim.feetech.line import FeetechLine
     from snakewalk.sim.imu import Imu
     from snakewalk.sim.physics.plant import MujocoPlant
 
@@ -83,7 +85,7 @@ def simulated_line(
     deviation: Deviation = NO_DEVIATION,
     imu: "Imu | None" = None,
     baud: int | None = None,
-) -> "SimLine | FeetechLine":
+) -> SimLine | FeetechLine:
     """Return the robot's servos on the shafts of a body, behind a simulated line."""
     rate = baud or robot.servo.baud
     facts = robot.servo_records[0]
@@ -103,12 +105,7 @@ def simulated_line(
     return line
 
 
-def _feetech_line(
-    robot: RobotConfig, plant: Plant, deviation: Deviation, baud: int
-) -> "FeetechLine":
-    from snakewalk.sim.feetech.servos import FeetechServos  # noqa: PLC0415  loops that few robots use
-    from snakewalk.sim.serve.bench_line import feetech_line  # noqa: PLC0415  loops that few robots use
-
+def _feetech_line(robot: RobotConfig, plant: Plant, deviation: Deviation, baud: int) -> FeetechLine:
     servos = FeetechServos(
         robot.servo_ids,
         plant,
