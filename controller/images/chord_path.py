@@ -5,76 +5,22 @@ path that begins at c = 0. It can end only where ``t_N`` is the end of the curve
 The chord may shrink on the way, where a circle touches the curve. On a polyline the path is smooth
 until a place reaches a vertex. There the place goes on to the next piece in the same direction,
 as the cofactor that gives its sign does not depend on its own piece (Allgower & Georg 1990, 12).
+
+Equation i contains the places i - 1 and i and the chord only. So the direction of the path and
+Newton's step are built up one equation at a time by plane rotations, without a matrix.
 """
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
+from snakewalk.drivers.compiling import compiled, readonly_array
 
 _CLOSE = 1e-13
 """Residual of a point on the path, as a share of the length of the curve."""
 _NEWTON = 8
 _STRAIGHT = 0.9  # cosine between tangents before and after a step, at least
 _SMALLEST = 1e-12
-
-
-class _Path:
-    """Equations of the places on a polyline."""
-
-    def __init__(self, curve: Floats, arc: Floats, segments: int) -> None:
-        self.curve, self.arc, self.segments = curve, arc, segments
-        self.length = float(arc[-1])
-        self.slope = np.diff(curve, axis=0) / np.diff(arc)[:, None]
-        self.piece: Ints = np.zeros(segments, dtype=np.int64)
-
-    def equations(self, at: Floats) -> tuple[Floats, Floats]:
-        """Residuals (N,) in chords and their derivatives (N, N + 1) by the places and the chord."""
-        n, k = self.segments, self.piece
-        place = self.curve[k] + (at[:n] - self.arc[k])[:, None] * self.slope[k]
-        step = np.diff(place, axis=0, prepend=self.curve[:1])
-        size = np.maximum(np.hypot(*step.T), 1e-300)
-        unit = step / size[:, None]
-        slopes = np.zeros((n, n + 1))
-        row = np.arange(n)
-        slopes[row, row] = (unit * self.slope[k]).sum(axis=1)
-        slopes[row[1:], row[:-1]] = -(unit[1:] * self.slope[k[:-1]]).sum(axis=1)
-        slopes[:, n] = -1.0
-        return size - at[n], slopes
-
-    def tangent(self, at: Floats, border: Floats) -> Floats:
-        """Unit vector (N + 1,) along the path, on the side of ``border``."""
-        _, slopes = self.equations(at)
-        end = np.append(np.zeros(self.segments), 1.0)
-        found = np.linalg.solve(np.vstack([slopes, border]), end)
-        return np.asarray(found / np.linalg.norm(found))
-
-    def corrected(self, at: Floats, border: Floats, value: float) -> Floats | None:
-        """Nearest point of the path with ``border @ at == value``; None if Newton fails."""
-        for _ in range(_NEWTON):
-            gap, slopes = self.equations(at)
-            gap = np.append(gap, border @ at - value)
-            if np.abs(gap).max() <= _CLOSE * self.length:
-                return at
-            try:
-                at = at - np.linalg.solve(np.vstack([slopes, border]), gap)
-            except np.linalg.LinAlgError:
-                return None
-        return None
-
-    def next_vertex(self, at: Floats, tangent: Floats) -> tuple[float, int]:
-        """Return how far along the tangent a place first reaches a vertex, and which place."""
-        rate = tangent[: self.segments]
-        vertex = self.arc[self.piece + (rate > 0.0)]
-        safe = np.where(np.abs(rate) > 1e-14, rate, 1.0)
-        far = np.where(np.abs(rate) > 1e-14, (vertex - at[: self.segments]) / safe, np.inf)
-        place = int(np.argmin(far))
-        return max(float(far[place]), 0.0), place
-
-    def crossed(self, at: Floats) -> Floats:
-        """(N,) how far each place lies outside its piece: below 0, above, or 0 inside."""
-        places = at[: self.segments]
-        low, high = self.arc[self.piece], self.arc[self.piece + 1]
-        return np.asarray(np.minimum(places - low, 0.0) + np.maximum(places - high, 0.0))
+_CURVE = f"{readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}"
 
 
 def follow_chords(curve: Floats, arc: Floats, segments: int, most_steps: int) -> Floats | None:
@@ -87,38 +33,134 @@ def follow_chords(curve: Floats, arc: Floats, segments: int, most_steps: int) ->
         most_steps: of the path.
 
     """
-    path = _Path(curve, arc, segments)
     at = np.append(np.arange(1.0, segments + 1.0), 1.0) * (0.5 * arc[1] / segments)
-    tangent = at / np.linalg.norm(at)
-    reach = 0.05 * path.length
+    curve, arc = np.ascontiguousarray(curve), np.ascontiguousarray(arc)
+    piece: Ints = np.zeros(segments, dtype=np.int64)
+    if not follow(curve, arc, at, piece, most_steps):
+        return None
+    return np.concatenate([[0.0], at[:-1]])
+
+
+@compiled(f"void({_CURVE}, float64[::1], int64[::1], float64[::1], float64[:, ::1])")
+def equations(
+    curve: Floats, arc: Floats, at: Floats, piece: Ints, gap: Floats, slopes: Floats
+) -> None:
+    """Write the residuals (N,) in chords, and their slopes (N, 2) by the place before and by its.
+
+    Args:
+        curve: (M, 2).
+        arc: (M,).
+        at: (N + 1,) the places and the chord.
+        piece: (N,) number of the piece on which each place lies.
+        gap: written.
+        slopes: written.
+
+    """
+    count = len(piece)
+    px, py, tx, ty = curve[0, 0], curve[0, 1], 0.0, 0.0
+    for i in range(count):
+        k = piece[i]
+        long = arc[k + 1] - arc[k]
+        ux, uy = (curve[k + 1, 0] - curve[k, 0]) / long, (curve[k + 1, 1] - curve[k, 1]) / long
+        x = curve[k, 0] + (at[i] - arc[k]) * ux
+        y = curve[k, 1] + (at[i] - arc[k]) * uy
+        size = max(np.hypot(x - px, y - py), 1e-300)
+        ex, ey = (x - px) / size, (y - py) / size
+        gap[i] = size - at[count]
+        slopes[i, 0], slopes[i, 1] = -(ex * tx + ey * ty), ex * ux + ey * uy
+        px, py, tx, ty = x, y, ux, uy
+
+
+@compiled(
+    f"void({readonly_array(layout='C')}, {readonly_array(dimensions=2, layout='C')}, float64[::1],"
+    " float64[::1])"
+)
+def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
+    """Write a step (N + 1,) that closes the gaps, and the unit vector along the path.
+
+    The equations so far leave one direction. The next equation turns it in the plane of itself and
+    the next place; the step grows in the direction that is left out.
+    """
+    count = len(gap)
+    grow = np.empty(count)
+    turn = np.empty((count, 2))  # of the direction: share of the new place, share that remains
+    before, old, chord, free = 0.0, 0.0, 0.0, 1.0  # entries of the last place, and of the chord
+    for i in range(count):
+        a, s = slopes[i, 0] * before - free, slopes[i, 1]
+        size = max(np.hypot(a, s), 1e-300)
+        a, s = a / size, s / size
+        grow[i] = (-gap[i] - slopes[i, 0] * old + chord) / size
+        chord += grow[i] * a * free
+        free *= s
+        before, old = -a, grow[i] * s
+        turn[i, 0], turn[i, 1] = a, s
+    later, remains = 0.0, 1.0  # sum of later growths, and product of later shares
+    for i in range(count - 1, -1, -1):
+        a, s = turn[i]
+        step[i] = grow[i] * s - a * later
+        along[i] = -a * remains
+        later = grow[i] * a + s * later
+        remains *= s
+    step[count], along[count] = chord, free
+
+
+@compiled(f"boolean({_CURVE}, float64[::1], int64[::1], int64)")
+def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int) -> bool:
+    """Move ``at`` (N + 1,) along the path until the last place is the end of the curve."""
+    count, length = len(piece), arc[-1]
+    gap, slopes, step, along = (
+        np.empty(count), np.empty((count, 2)), np.empty(count + 1), np.empty(count + 1),
+    )  # fmt: skip
+    tangent = at / np.sqrt((at * at).sum())
+    there, least, reach = np.empty(count + 1), np.diff(arc).min(), 0.05 * length
     for _ in range(most_steps):
-        if reach < _SMALLEST * path.length:
-            return None
-        share, place = path.next_vertex(at, tangent)
-        meets = share <= reach
-        border, step = tangent, min(share, reach)
-        value = float(tangent @ at) + step
-        ahead = bool(tangent[place] > 0.0)
+        if reach < _SMALLEST * length:
+            return False
+        share, place = np.inf, 0
+        for i in range(count):  # how far along the tangent a place first reaches a vertex
+            if abs(tangent[i]) > 1e-14:
+                far = (arc[piece[i] + (1 if tangent[i] > 0.0 else 0)] - at[i]) / tangent[i]
+                if far < share:
+                    share, place = far, i
+        share = max(share, 0.0)
+        meets, size, ahead = share <= reach, min(share, reach), tangent[place] > 0.0
+        vertex = arc[piece[place] + (1 if ahead else 0)]
+        value = vertex if meets else (tangent * at).sum() + size
+        there[:] = at + size * tangent
+        close = False
+        for _newton in range(_NEWTON):
+            equations(curve, arc, there, piece, gap, slopes)
+            off = value - (there[place] if meets else (tangent * there).sum())
+            if max(np.abs(gap).max(), abs(off)) <= _CLOSE * length:
+                close = True
+                break
+            solve(gap, slopes, step, along)
+            lead = along[place] if meets else (tangent * along).sum()
+            if abs(lead) < 1e-300:
+                break
+            rest = off - (step[place] if meets else (tangent * step).sum())
+            there += step + rest / lead * along
+        for i in range(count):
+            inside = arc[piece[i]] - 1e-10 * length <= there[i]
+            close = close and inside and there[i] <= arc[piece[i] + 1] + 1e-10 * length
+        if not close:
+            reach = 0.5 * size
+            continue
+        if meets and place == count - 1 and ahead and vertex == length:
+            at[:] = there
+            return True
         if meets:
-            border = np.zeros(segments + 1)
-            border[place] = 1.0
-            value = float(arc[path.piece[place] + ahead])
-        there = path.corrected(at + step * tangent, border, value)
-        if there is None or np.abs(path.crossed(there)).max() > 1e-10 * path.length:
-            reach = 0.5 * step
+            piece[place] += 1 if ahead else -1
+            if piece[place] < 0:
+                return False
+            equations(curve, arc, there, piece, gap, slopes)
+        solve(gap, slopes, step, along)
+        lead = (along[place] if ahead else -along[place]) if meets else (tangent * along).sum()
+        if lead < 0.0:
+            along *= -1.0
+        if not meets and abs(lead) < _STRAIGHT:
+            reach *= 0.5
             continue
-        if not meets:
-            after = path.tangent(there, tangent)
-            if float(after @ tangent) < _STRAIGHT:
-                reach *= 0.5
-                continue
-            at, tangent, reach = there, after, 2.0 * reach
-            continue
-        if place == segments - 1 and ahead and value == arc[-1]:
-            return np.concatenate([[0.0], there[:-1]])
-        path.piece[place] += 1 if ahead else -1
-        if path.piece[place] < 0:
-            return None
-        at, tangent = there, path.tangent(there, border if ahead else -border)
-        reach = max(2.0 * reach, float(np.diff(arc).min()))
-    return None
+        at[:], tangent[:] = there, along
+        reach = max(2.0 * reach, least) if meets else 2.0 * reach
+    return False

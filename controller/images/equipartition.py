@@ -22,7 +22,7 @@ _RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
 _DESCENTS = 12
 _BISECTIONS = 80
 _SCAN = 96  # chords tried between the least and the greatest possible one
-_FEW = 8  # most chords for which the path is followed: it costs seconds for 100
+_MOST_STEPS = 40_000  # along the path: a second or two for 100 chords
 _GRID = 400  # of the scan for three chords
 _NEWTON_STEPS = 40
 _BENT = 1.05  # arc over chord from which all solutions are searched
@@ -197,7 +197,7 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
         for third in _thirds(given):
             if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in found):
                 found.append(third)
-    if not found and given.segments <= _FEW:
+    if not found:
         places = follow_chords(given.curve, given.arc, given.segments, _path_steps(given))
         if places is not None:
             found.append(_at_places(given, places))
@@ -211,7 +211,7 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
 
 def _path_steps(given: _Curve) -> int:
     """Most steps along the path: each place passes each vertex a few times."""
-    return 8 * given.segments * len(given.curve) + 1000
+    return min(8 * given.segments * len(given.curve) + 1000, _MOST_STEPS)
 
 
 def _at_places(given: _Curve, places: Floats) -> Equipartition:

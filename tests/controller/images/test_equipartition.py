@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from snakewalk.controller.images.chord_path import follow_chords
+from snakewalk.controller.images.chord_path import follow_chords, solve
 from snakewalk.controller.images.equipartition import (
     NoEquipartitionError,
     equipartition,
@@ -177,6 +177,32 @@ def test_the_path_of_the_proof_ends_at_an_equipartition(seed: int, n: int) -> No
     assert (np.diff(found.at) > 0.0).all()
     assert np.array_equal(found.points[[0, -1]], smooth(seed)[[0, -1]])
     assert on_curve(smooth(seed), found.points) < 1e-9
+
+
+def test_the_path_divides_a_zigzag_into_a_hundred_chords() -> None:
+    """Counted crossings reject this one of 60."""
+    found = equipartition(bent(26), 100)
+    assert found.method == "path"
+    assert np.ptp(chords(found.points)) < 1e-9
+    assert (np.diff(found.at) > 0.0).all()
+    assert on_curve(bent(26), found.points) < 1e-9
+
+
+@pytest.mark.parametrize("count", [2, 5, 100])
+def test_a_step_of_the_path_solves_its_equations(count: int) -> None:
+    random = np.random.default_rng(count)
+    gap, slopes = random.normal(size=count), random.normal(size=(count, 2))
+    slopes[count // 2, 1] = 0.0  # a circle that touches the curve
+    step, along = np.empty(count + 1), np.empty(count + 1)
+    for function in (solve, getattr(solve, "py_func", solve)):
+        function(gap, slopes, step, along)
+        rows = np.zeros((count, count + 1))
+        rows[np.arange(count), np.arange(count)] = slopes[:, 1]
+        rows[np.arange(1, count), np.arange(count - 1)] = slopes[1:, 0]
+        rows[:, count] = -1.0
+        np.testing.assert_allclose(rows @ step, -gap, atol=1e-9)
+        np.testing.assert_allclose(rows @ along, 0.0, atol=1e-12)
+        assert np.linalg.norm(along) == pytest.approx(1.0)
 
 
 def test_too_few_steps_of_the_path_are_reported() -> None:
