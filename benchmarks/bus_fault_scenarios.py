@@ -137,6 +137,10 @@ _WRITES = [
     _written("Min Position Limit", 2000),
     _written("PWM Limit", 100),
     _written("Current Limit", 20),
+    _written("Velocity Limit", 900),
+    _written("Temperature Limit", 100),
+    _written("Min Voltage Limit", 100),
+    _written("Max Voltage Limit", 150),
     Scenario("`write`: Goal Position once", [_write("Goal Position", 2200)], is_harmless=True),
     Scenario(
         "second master: Goal Position of one joint, every 5 ms",
@@ -202,6 +206,22 @@ FURTHER = [
     Scenario(
         "`reading`: velocity always 100, and `no_output`, small amplitude (0.18 rad)",
         [_reading("Present Velocity", 100), {"kind": "no_output", "ids": [3]}],
+        amplitude_rad=0.18,
+    ),
+    *(
+        Scenario(
+            f"`reading`: current always {value}, and `no_output`, amplitude {amplitude} rad",
+            [_reading("Present Current", value), {"kind": "no_output", "ids": [3]}],
+            amplitude_rad=amplitude,
+        )
+        for value, amplitude in ((186, 0.18), (-186, 0.18), (40, 0.12), (-700, 0.18), (186, 0.1))
+    ),
+    Scenario(
+        "`reading`: current always 186, pitch joint, and `no_output`, amplitude 0.18 rad",
+        [
+            {**_reading("Present Current", 186), "ids": [4]},
+            {"kind": "no_output", "ids": [4]},
+        ],
         amplitude_rad=0.18,
     ),
     Scenario(

@@ -6,6 +6,8 @@ new body frame and all link centres of one body. Both in one run, on one core.
 """
 
 import time
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,7 +22,7 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.repertoire_planning import plan_route, search_cost
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
-from snakewalk.sim.rendering.crowd_film import CrowdView
+from snakewalk.sim.rendering.crowd_film import CrowdShot, CrowdView
 
 TITLE = "Repertoire: 17 links, 60 frames a second, one core"
 
@@ -45,7 +47,7 @@ def run() -> list[Row]:
     frame_s = seen_s / (BODIES * FRAMES)
     fits = physics_s / frame_s
     herd_s = herd_frame_s(repertoire)
-    plain_s, detailed_s = (drawing_s(repertoire, detail=detail) for detail in (False, True))
+    plain_s, detailed_s, ground_s = drawing_s(repertoire)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "repertoire.npz"
         repertoire.save(file)
@@ -61,6 +63,7 @@ def run() -> list[Row]:
         Row("bodies at 60 frames a second there", FRAME_S / herd_s, "", "100", 6e3 * herd_s),
         Row("drawing 100 bodies on hills, all in full", plain_s * 1e3, "ms"),
         Row("the same with levels of detail and culling", detailed_s * 1e3, "ms"),
+        Row("the ground alone", ground_s * 1e3, "ms"),
         Row("search: a candidate", cost.candidate_s * 1e6, "us"),
         Row("a candidate run on the physics", cost.physics_candidate_s * 1e3, "ms"),
         Row(
@@ -91,7 +94,8 @@ def herd_frame_s(repertoire: Repertoire) -> float:
     """CPU time of a body-frame of a herd on hills before a camera, bodies laid on the ground."""
     ground = build_ground(load_world(HILLS))
     assert ground is not None, "a world with hills"
-    scene = CrowdScene(repertoire, load_robot(repertoire.robot), ground, HERD)
+    robot = load_robot(repertoire.robot)
+    scene = CrowdScene(repertoire, robot, ground, HERD, separate=False)
     best = float("inf")
     for _ in range(TRIES):
         scene.costs.motion_s = scene.costs.laying_s = 0.0
@@ -101,20 +105,27 @@ def herd_frame_s(repertoire: Repertoire) -> float:
     return best
 
 
-def drawing_s(repertoire: Repertoire, *, detail: bool) -> float:
-    """CPU time in which a frame of ``DRAWN`` bodies is drawn, without their motion."""
+def drawing_s(repertoire: Repertoire) -> tuple[float, float, float]:
+    """CPU time of a frame of ``DRAWN`` bodies in full, with levels, and without bodies."""
     world, robot = load_world(HILLS), load_robot(repertoire.robot)
     ground = build_ground(world)
     assert ground is not None, "a world with hills"
     view = CrowdView(robot, world, ground, DRAWN, SIZE_PX)
     try:
-        shots = list(CrowdScene(repertoire, robot, ground, DRAWN, detail=detail).shots(SHOTS, 3))
+        full, detailed = (
+            list(CrowdScene(repertoire, robot, ground, DRAWN, detail=detail).shots(SHOTS, 3))
+            for detail in (False, True)
+        )
+        empty = [replace(shot, bodies=[]) for shot in detailed]
 
-        def draw() -> None:
+        def draw(shots: list[CrowdShot]) -> None:
             for shot in shots:
                 view.draw(shot)
 
-        return cpu_s(draw, 1, TRIES) / SHOTS
+        one, two, three = (
+            cpu_s(partial(draw, shots), 1, TRIES) / SHOTS for shots in (full, detailed, empty)
+        )
+        return one, two, three
     finally:
         view.close()
 

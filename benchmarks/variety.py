@@ -6,6 +6,7 @@ power between 0.05 and 4 Hz, in bins of 0.05 Hz; the mean over the joints is pri
 has one frequency, which the window spreads over 2.4 bins.
 
 python -m benchmarks.variety --slopes 0.2 12 --seeds 4 --first-seed 10 -o variety.jsonl
+python -m benchmarks.variety --slopes 12 --set run.walk.climb_progress=0 --seeds 4 -o variety.jsonl
 
 The command continues its file.
 """
@@ -21,6 +22,7 @@ import numpy as np
 import scipy.signal
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.console.options import key_values
 from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
@@ -45,9 +47,10 @@ def effective_frequencies(goals_rad: Floats, period_s: float) -> float:
     return float(np.exp(entropy).mean())
 
 
-def measured(slope_deg: float, motion: str, seed: int) -> dict[str, Any]:
-    """Walk up a plane, and return a row of the file."""
+def measured(slope_deg: float, motion: str, seed: int, changes: Sequence[str]) -> dict[str, Any]:
+    """Walk up a plane with other values of keys, and return a row of the file."""
     keys = {"world.ground.slope_rad": math.radians(slope_deg)}
+    keys |= key_values("--set", list(changes))
     prepared = prepare_walk(RUN, seed=seed, motion=motion, keys=keys)
     with tempfile.TemporaryDirectory() as folder:
         finished = execute(prepared, Path(folder) / "run", stoppable=False)
@@ -57,6 +60,7 @@ def measured(slope_deg: float, motion: str, seed: int) -> dict[str, Any]:
         "slope_deg": slope_deg,
         "motion": motion,
         "seed": seed,
+        "changes": " ".join(changes),
         "has_arrived": summary.waypoints_reached == summary.waypoints,
         "duration_s": summary.duration_s,
         "frequencies": effective_frequencies(goals_rad, finished.record.period_s),
@@ -64,22 +68,28 @@ def measured(slope_deg: float, motion: str, seed: int) -> dict[str, Any]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the rows as a table, one line for a slope and a motion."""
+    """Return the rows as a table, one line for a slope, a motion and other values of keys."""
     lines = [
         "| slope, degrees | motion | runs | arrived | duration, s | effective frequencies |",
         "| ---: | --- | ---: | ---: | ---: | ---: |",
     ]
-    for slope_deg, motion in sorted({(row["slope_deg"], row["motion"]) for row in rows}):
-        of = [row for row in rows if (row["slope_deg"], row["motion"]) == (slope_deg, motion)]
+    for case in sorted({_case(row) for row in rows}):
+        of = [row for row in rows if _case(row) == case]
         number, time_s = (
             np.array([row[key] for row in of]) for key in ("frequencies", "duration_s")
         )
+        slope_deg, motion, changes = case
+        name = f"{motion}, `{changes}`" if changes else motion
         lines.append(
-            f"| {slope_deg:g} | {motion} | {len(of)} | {sum(row['has_arrived'] for row in of)} "
+            f"| {slope_deg:g} | {name} | {len(of)} | {sum(row['has_arrived'] for row in of)} "
             f"| {time_s.min():.0f} to {time_s.max():.0f} "
             f"| {np.median(number):.1f} ({number.min():.1f} to {number.max():.1f}) |"
         )
     return "\n".join(lines)
+
+
+def _case(row: dict[str, Any]) -> tuple[float, str, str]:
+    return row["slope_deg"], row["motion"], row.get("changes", "")
 
 
 def main() -> None:
@@ -88,17 +98,24 @@ def main() -> None:
     parser.add_argument("--slopes", type=float, nargs="+", default=[0.2, 12.0])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--motions", nargs="+", default=["walk", "serpenoid"])
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", dest="changes")
     parser.add_argument("-o", "--out", type=Path, required=True)
     asked = parser.parse_args()
     rows = read_lines(asked.out, dict, "a row of this benchmark")
-    done = {(row["slope_deg"], row["motion"], row["seed"]) for row in rows}
+    done = {(*_case(row), row["seed"]) for row in rows}
+    name = " ".join(asked.changes)
     planned = [
         (slope_deg, motion, seed)
         for seed in range(asked.first_seed, asked.first_seed + asked.seeds)
         for slope_deg in asked.slopes
-        for motion in ("walk", "serpenoid")
+        for motion in asked.motions
     ]
-    finished = ((case, measured(*case)) for case in planned if case not in done)
+    finished = (
+        (case, measured(*case, asked.changes))
+        for case in planned
+        if (*case[:2], name, case[2]) not in done
+    )
     rows += [row for _, row in append_lines(asked.out, finished, dict)]
     print(table(rows))
 

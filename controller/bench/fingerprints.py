@@ -11,7 +11,12 @@ from snakewalk.controller.console.finding import Finding
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
-from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, changes, own_file
+from snakewalk.drivers.chain.fingerprint_file import (
+    FingerprintFile,
+    changes,
+    missing_registers,
+    own_file,
+)
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.protocol.control_table import load_control_table
 
@@ -77,6 +82,10 @@ def fingerprint_finding(
     if known is None:
         return None
     lines = changes(robot, known, found, _rad_per_position(robot))
+    missing = missing_registers(known, found)
+    if not lines and missing:
+        text = f"{file.path} has no {', '.join(missing)}: not compared"
+        return Finding("fingerprint", "warn", text, "the next run on the port completes the file")
     if not lines:
         return Finding("fingerprint", "ok", f"the servos are as in {file.path}")
     remedy = "if it is meant: snakewalk doctor --accept --robot FILE"

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,14 @@ from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
 from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.film_fit import fit_film, with_least_errors
-from snakewalk.controller.capture.verification.film_check import verified
+from snakewalk.controller.capture.verification.film_check import goes_on_faintly, verified
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
+_FAINT_TAIL = 0.1  # of the length: expected error if something faint goes on beyond a tip
 _STILL = 0.02  # of the length: a smaller change does not count as motion
 
 
@@ -152,6 +153,8 @@ def captured_from(
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
     expected[[not one.status.has_points for one in skeletons]] = np.nan
+    if goes_on_faintly(skeletons, found.store):
+        skeletons, expected = _without_tail(skeletons, expected)
     return Capture(
         points_px=np.stack([one.points_px for one in skeletons]),
         radius_px=np.stack([one.radius_px for one in skeletons]),
@@ -166,6 +169,16 @@ def captured_from(
         head_sure=min(1.0, abs(score)),
         places_recorded=fixed,
     )
+
+
+def _without_tail(bodies: Sequence[Skeleton], error_px: Floats) -> tuple[list[Skeleton], Floats]:
+    """The bodies and their expected errors (T,) if something faint goes on beyond a tip."""
+    least = _FAINT_TAIL * np.array([one.length_px for one in bodies])
+    rough = [
+        replace(one, status=FrameStatus.ROUGH) if one.status is FrameStatus.GOOD else one
+        for one in bodies
+    ]
+    return rough, np.asarray(np.fmax(error_px, least))
 
 
 def _without_body(

@@ -4,6 +4,7 @@ A track that was captured before is corrected by the file that the user has save
 page.
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -33,7 +34,12 @@ from snakewalk.controller.console.result_files import atomic_write, refuse_to_ov
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.region import WHOLE
 from snakewalk.controller.images.video import Footage, in_8_bits
+from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import UNSURE_HEAD
+
+_MANY = 1.0 / 3.0  # of the frames: if so many are not used, the capture needs a look
+_EXPLAINED = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED, FrameStatus.LEFT_OUT}
+_INACCURATE = 0.03  # of the length: a larger expected error needs a look
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +73,7 @@ class CaptureFacts:
     frames_rejected: int
     """Frames whose finished skeleton their own pixels contradict; ``verdicts`` has the reasons."""
     warning: str | None
-    """A doubt about the whole recording."""
+    """Doubts about the whole recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,10 +138,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
 
     """
     check_options(options)
-    folder = PartFolder(
-        options.output.with_name(options.output.name + ".part"),
-        settings_of(options) | {"frames_of_a_part": PART_FRAMES},
-    )
+    folder = part_folder(options)
     finished = folder.start(resume=options.resume, force=options.force)
     console = stderr_console()
     with console.status("learning the background ..."):
@@ -174,6 +177,14 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
     return facts
 
 
+def part_folder(options: CaptureOptions) -> PartFolder:
+    """Return the folder of the finished parts of a capture."""
+    return PartFolder(
+        options.output.with_name(options.output.name + ".part"),
+        settings_of(options) | {"frames_of_a_part": PART_FRAMES},
+    )
+
+
 def _parts(
     options: CaptureOptions, film: OpenedFilm, folder: PartFolder, finished: list[Capture]
 ) -> FilmParts:
@@ -197,14 +208,11 @@ def _captured(
 ) -> Capture:
     first = len(film.stated_s)
     bar.update(first)
-    try:
+    kept = nullcontext() if parts.folder is None else parts.folder.kept_if_interrupted()
+    with kept:
         for frame in film.frames(first):
             parts.add(frame, detector.detect(frame), film.stated_s[-1])
             bar.advance()
-    except KeyboardInterrupt as stop:
-        if parts.folder is not None and parts.finished:
-            stop.add_note(f"{parts.folder.path}: holds the frames so far; continue by --resume")
-        raise
     captured, _ = parts.done()
     return captured
 
@@ -283,17 +291,35 @@ def facts_of(
         frames_missing=footage.missing,
         places_recorded=captured.places_recorded,
         frames_rejected=sum(one in REJECTED for one in captured.status),
-        warning=_warning(options, captured),
+        warning=warning_of(options, captured),
     )
 
 
-def _warning(options: CaptureOptions, captured: Capture) -> str | None:
-    if captured.head_sure >= UNSURE_HEAD:
-        return None
-    return (
-        f"{options.recording}: head and tail may be exchanged (sure by {captured.head_sure:.2f}, "
-        f"from the {captured.head_by}); look at --sheet or --review, and give --head X,Y"
-    )
+def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
+    """Doubts about the recording, in one sentence each; None without a doubt."""
+    doubts = []
+    if captured.head_sure < UNSURE_HEAD:
+        doubts.append(
+            f"head and tail may be exchanged (sure by {captured.head_sure:.2f}, "
+            f"from the {captured.head_by}); look at --sheet or --review, and give --head X,Y"
+        )
+    unused = [one for one in captured.status if not one.has_points and one not in _EXPLAINED]
+    if len(unused) >= _MANY * len(captured.status):
+        reason = max(dict.fromkeys(unused), key=unused.count)
+        doubts.append(
+            f"{len(unused)} of {len(captured.status)} frames are not used, mostly because "
+            f"({reason}); look at --sheet"
+        )
+    known = np.isfinite(captured.expected_px)
+    if known.any():
+        share = float(np.median(captured.expected_px[known] / captured.length_px[known]))
+        if share > _INACCURATE:
+            doubts.append(
+                f"the points are expected to be off by {share:.1%} of the body in most frames; "
+                "look at --sheet, and give --background or --threshold if a part of the animal "
+                "is not found"
+            )
+    return f"{options.recording}: {'. '.join(doubts)}" if doubts else None
 
 
 def _unsure_heads(captured: Capture) -> int:

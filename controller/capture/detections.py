@@ -16,6 +16,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _LOST_FRAMES = 5  # for this number of frames a lost small body is searched at its last place
 _FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
+_HIDDEN = 0.1  # of the length: error if half of the contrast of the faint parts is only noise
+# because a tail that fades into the noise goes on beyond its visible end (measured on larvae)
 
 
 @dataclass(slots=True)
@@ -54,13 +56,14 @@ class Detections:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
             if detection.faint_parts:
-                axis_px *= _FAINT_PARTS
+                hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
+                axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)
                 self.faint_error_px[number] = axis_px
         if body.status is FrameStatus.GOOD or body.status in COILS:
             width_px = 2.0 * float(np.max(body.radius_px))
             self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
         self._keep(number, frame, detection)
-        if body.length_px <= LONGEST_PX:
+        if body.length_px <= LONGEST_PX and not detection.faint_parts:
             self._last, self._points = number, body.points_px
             self.crops[number] = crop_body(frame, detection.background, self._points)
         elif body.status is FrameStatus.GOOD:

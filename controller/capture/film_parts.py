@@ -6,7 +6,8 @@ folder next to the result, and an interrupted capture continues after them.
 
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -53,6 +54,11 @@ class FilmParts:
     def __post_init__(self) -> None:
         """Count the frames of parts that were finished before."""
         self._done = sum(len(one.status) for one in self.finished)
+
+    @property
+    def done_frames(self) -> int:
+        """Frames so far."""
+        return self._done
 
     def add(self, frame: DeepImage, detection: Detection, at_s: float = float("nan")) -> None:
         """Add the next frame; ``at_s`` is the time that the film states."""
@@ -186,6 +192,8 @@ class PartFolder:
     path: Path
     settings: dict[str, Any]
     """The film and the options on which the parts depend."""
+    parent: "PartFolder | None" = None
+    """The folder of a film of several animals, each of which has a folder there."""
 
     def start(self, *, resume: bool, force: bool) -> list[Capture]:
         """Return the finished parts; none of a new capture.
@@ -217,18 +225,47 @@ class PartFolder:
                 f"{self.path}: its capture has other values of {', '.join(other)}; give the same, "
                 "or start again with --force"
             )
+        return self.parts()
+
+    def parts(self) -> list[Capture]:
+        """Return the finished parts.
+
+        Raises:
+            InputError: a part is damaged.
+
+        """
         return [_read_part(file) for file in sorted(self.path.glob("*.npz"))]
 
     def add(self, number: int, part: Capture) -> None:
         """Keep a finished part."""
         if number == 0:
-            self.path.mkdir(exist_ok=True)
-            with atomic_write(self.path / _SETTINGS) as file:
-                file.write_text(json.dumps(self.settings), encoding="utf-8")
+            self._begin()
         values = {one.name: getattr(part, one.name) for one in fields(part)}
         values["status"] = np.array([str(one) for one in part.status])
         with atomic_write(self.path / f"{number:05d}.npz") as file, file.open("wb") as stream:
             np.savez(stream, **values)
+
+    def _begin(self) -> None:
+        """Create the folder."""
+        if self.parent is not None:
+            self.parent._begin()
+        self.path.mkdir(exist_ok=True)
+        with atomic_write(self.path / _SETTINGS) as file:
+            file.write_text(json.dumps(self.settings), encoding="utf-8")
+
+    def of_animal(self, number: int) -> "PartFolder":
+        """Return the folder of one of several animals."""
+        return PartFolder(self.path / f"animal-{number}", self.settings, self)
+
+    @contextmanager
+    def kept_if_interrupted(self) -> Iterator[None]:
+        """Add to an interruption how to continue."""
+        try:
+            yield
+        except KeyboardInterrupt as stop:
+            if self.path.is_dir():
+                stop.add_note(f"{self.path}: holds the frames so far; continue by --resume")
+            raise
 
     def clear(self) -> None:
         """Delete the parts."""

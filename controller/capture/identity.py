@@ -22,6 +22,8 @@ _TRAVEL = 0.2  # travel score from which the travel decides which end is the hea
 _TRAVEL_S = 0.25
 _TRAVEL_PX = 1.0  # over that time; less is what a camera that goes with the animal by pixels leaves
 _TRAVEL_OF_WAVE = 0.075  # of the wave's speed: less travel is that of the camera, not of the animal
+_CONTRARY = 0.25  # of the mean thickness: a taper that contradicts the motion
+_DOUBTED = 0.2  # certainty of a head that the taper contradicts: an animal may move backwards
 _GAP = 3  # frames without a skeleton after which the place alone is not enough
 
 
@@ -151,6 +153,9 @@ def head_end(
 ) -> tuple[float, str]:
     """Which end is the head: given, or by travel, the wave's direction, or the taper.
 
+    An animal that moves backwards leads with its tail. If the trailing end is clearly the thicker
+    one, the score is at most ``_DOUBTED``.
+
     Args:
         points: (T, P, 2) pixels, the same end first in all; NaN for a frame without a body.
         radius: (T, P) half the thickness.
@@ -167,6 +172,7 @@ def head_end(
         first = points[np.argmax(good)]
         one, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
         return (1.0 if one <= other else -1.0), "given"
+    taper = taper_score(radius[good])
     wave = None
     if int(good.sum()) >= _WAVE_FRAMES:
         wave = measure_wave(track_from_points("", points, rate_hz))
@@ -178,7 +184,14 @@ def head_end(
             pulse = abs(wave.pulse_body_lengths_s) * median_length(points) * step / rate_hz
             least_px = max(least_px, _TRAVEL_OF_WAVE * pulse)
         if abs(travel) > _TRAVEL and usual_travel(points, step) > least_px:
-            return travel, "travel"
+            return _doubted(travel, taper), "travel"
     if wave is not None and abs(wave.headward - 0.5) > 0.05:
-        return 1.0 - 2.0 * wave.headward, "wave"
-    return taper_score(radius[good]), "taper"
+        return _doubted(1.0 - 2.0 * wave.headward, taper), "wave"
+    return taper, "taper"
+
+
+def _doubted(score: float, taper: float) -> float:
+    """The score of a motion, small if the taper contradicts it."""
+    if score * taper >= 0.0 or abs(taper) < _CONTRARY:
+        return score
+    return float(np.clip(score, -_DOUBTED, _DOUBTED))

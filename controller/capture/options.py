@@ -96,8 +96,6 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
             f"--animals {animals}: expected a number from 1 to {MOST_ANIMALS}, or {AUTO}"
         )
     given = {"--head": options.head, "--steps": options.steps, "--sheet": options.sheet}
-    if options.resume:
-        raise InputError("--animals and --resume: only a film of one animal can be continued")
     one = [name for name, value in given.items() if value is not None]
     if one:
         raise InputError(f"--animals and {one[0]}: this option is for one animal; leave it out")
@@ -108,7 +106,7 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
 def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool | None]:
     """Return the film and the options on which the skeletons depend."""
     film = options.recording
-    names = ("background", "rate_hz", "head", "cropped", "roi", "mask", "threshold")
+    names = ("background", "rate_hz", "head", "cropped", "roi", "mask", "threshold", "animals")
     values = {name: getattr(options, name) for name in names}
     held = {name: str(one) if isinstance(one, Path) else one for name, one in values.items()}
     size = 0

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from rich.progress import (
     BarColumn,
@@ -15,8 +15,10 @@ from rich.progress import (
 )
 
 from snakewalk.controller.console.messages import LOGGER, stderr_console
-from snakewalk.controller.runtime.drive import Progress as RunProgress
 from snakewalk.drivers.clock import Clock, WallClock
+
+if TYPE_CHECKING:
+    from snakewalk.controller.runtime.drive import Progress as RunProgress
 
 T = TypeVar("T")
 EVERY = 10
@@ -114,7 +116,7 @@ class RunBar(ProgressBar):
             self.hide()
         super().__exit__(kind, error, trace)
 
-    def _is_due(self, progress: RunProgress) -> bool:
+    def _is_due(self, progress: "RunProgress") -> bool:
         """Count a cycle; return whether the bar is updated with it."""
         self._cycles += 1
         return self._cycles % EVERY == 0 or progress.done
@@ -126,7 +128,7 @@ class PathBar(RunBar):
     def __init__(self, path_m: float) -> None:
         super().__init__("ramp", path_m)
 
-    def on_progress(self, progress: RunProgress) -> None:
+    def on_progress(self, progress: "RunProgress") -> None:
         """Update, not in every cycle."""
         if self._is_due(progress):
             self.update(
@@ -150,7 +152,7 @@ class TimeBar(RunBar):
         self._name_at = name_at if name_at is not None else lambda gone_s: name
         self._start_s: float | None = None
 
-    def on_progress(self, progress: RunProgress) -> None:
+    def on_progress(self, progress: "RunProgress") -> None:
         """Update, not in every cycle."""
         if self._start_s is None:
             self._start_s = progress.time_s
@@ -159,12 +161,14 @@ class TimeBar(RunBar):
             self.update(gone_s, description=self._name_at(gone_s), note=f"{gone_s:5.1f} s")
 
 
-def in_real_time(on_progress: Callable[[RunProgress], None]) -> Callable[[RunProgress], None]:
+def in_real_time(
+    on_progress: "Callable[[RunProgress], None]",
+) -> "Callable[[RunProgress], None]":
     """Hold a simulated run to the pace of a person's clock."""
     clock = WallClock()
     ahead_s: float | None = None
 
-    def wait(progress: RunProgress) -> None:
+    def wait(progress: "RunProgress") -> None:
         nonlocal ahead_s
         on_progress(progress)
         if ahead_s is None:

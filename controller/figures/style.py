@@ -10,6 +10,9 @@ from typing import Any, Final
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import FigureCanvasBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -157,6 +160,8 @@ def mark_waypoints(panels: list[Axes], times_s: Floats, *, measured: bool) -> No
 
 def save_picture(figure: Figure, path: Path, dpi: float | None = None) -> None:
     """Write a figure in the format of the path's ending, whole or not at all."""
+    if path.suffix.lower() == ".png":
+        _lay_out(FigureCanvasAgg(figure), dpi or figure.dpi)
     with atomic_write(path) as part:
         figure.savefig(part, dpi=dpi or figure.dpi)
 
@@ -164,5 +169,19 @@ def save_picture(figure: Figure, path: Path, dpi: float | None = None) -> None:
 def data_uri(figure: Figure) -> str:
     """Figure as an SVG image for an HTML page; the same figure gives the same bytes."""
     buffer = BytesIO()
+    _lay_out(FigureCanvasSVG(figure), FigureCanvasSVG.fixed_dpi)
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def _lay_out(canvas: FigureCanvasBase, dpi: float) -> None:
+    """Place the panels of a figure once and for all, for a canvas and its resolution.
+
+    ``savefig`` would draw the whole figure twice, the first time only to place its panels.
+    """
+    figure = canvas.figure
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        figure.set_dpi(dpi)
+        engine.execute(figure)
+        figure.set_layout_engine("none")

@@ -44,6 +44,15 @@ class Detection:
     """(H, W[, 3]) the image that the frame was compared with."""
     faint_parts: bool = False
     """Whether parts of the body are much fainter than the rest; its line is then less accurate."""
+    may_have_faint_parts: bool = False
+    """Whether something fainter than the silhouette goes on beyond it."""
+    core_threshold: float | None = None
+    """Of a body with faint parts: half of the contrast of its strongest part."""
+
+    @property
+    def contrast_threshold(self) -> float:
+        """Half of the contrast of the body's strongest part."""
+        return self.silhouette.threshold if self.core_threshold is None else self.core_threshold
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +92,16 @@ class BodyDetector:
             )
         body = silhouette_of(image, background, self.polarity, self.threshold, wide_margin=True)
         found = self._judged(image, background, body)
-        search = self.search_faint_parts and self.threshold is None
-        if search and may_have_faint_parts(body):
+        if self.threshold is not None or not may_have_faint_parts(body):
+            return found
+        if self.search_faint_parts:
             fuller = with_faint_parts(image, background, self.polarity, body)
             if fuller is not None:
                 other = self._judged(image, background, fuller)
                 length = np.nan_to_num(found.skeleton.length_px)
                 if other.skeleton.length_px > _LONGER * length:
-                    return replace(other, faint_parts=True)
-        return found
+                    return replace(other, faint_parts=True, core_threshold=body.threshold)
+        return replace(found, may_have_faint_parts=True)
 
     def _judged(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Detection:
         """The skeleton of a silhouette, and whether it explains the frame."""
@@ -158,6 +168,8 @@ def make_detector(
     if best.share < _SURE:
         other = _learnt(plain, frames, cropped=cropped)
         best = other if other.share > best.share + _BETTER else best
+    elif best.faint_share >= _SURE:
+        best = _best_of([best, _learnt(plain, frames, cropped=cropped)])
     return replace(best.detector, search_faint_parts=True)
 
 
@@ -208,6 +220,8 @@ class _Candidate:
     width_px: float
     contrast: float
     """At the boundaries of these bodies, grey levels."""
+    faint_share: float
+    """Share of the frames in which something fainter than the body goes on beyond it."""
 
     @classmethod
     def of(cls, detector: BodyDetector, frames: Sequence[DeepImage]) -> "_Candidate":
@@ -215,12 +229,13 @@ class _Candidate:
         bodies = [one.skeleton for one in found]
         length = np.array([one.length_px for one in bodies])
         if not np.isfinite(length).any():
-            return cls(detector, 0.0, 0.0, 0.0, 0.0)
+            return cls(detector, 0.0, 0.0, 0.0, 0.0, 0.0)
         usual = float(np.nanmedian(length))
         share = float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
         width = 2.0 * float(np.nanmedian([np.median(one.radius_px) for one in bodies]))
-        edges = [one.silhouette.threshold for one in found if np.isfinite(one.skeleton.length_px)]
-        return cls(detector, share, usual, width, float(np.median(edges)))
+        edges = [one.contrast_threshold for one in found if np.isfinite(one.skeleton.length_px)]
+        faint = float(np.mean([one.may_have_faint_parts for one in found]))
+        return cls(detector, share, usual, width, float(np.median(edges)), faint)
 
 
 def _best(candidates: Sequence[_Candidate]) -> BodyDetector:

@@ -8,7 +8,7 @@ R. J. Hanson, Solving Least Squares Problems, 1974, by scipy) find the few links
 """
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy  # its modules load when they are first used: optimize needs 0.3 s
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.constants import GRAVITY_M_S2
@@ -49,7 +49,7 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
     rows = np.concatenate([lever_m, whole, even])
     target = (rows * share).sum(axis=1) * weight_n
     target[: len(pitch)] -= torque_n_m[pitch]
-    return np.asarray(nnls(rows, target)[0])
+    return np.asarray(scipy.optimize.nnls(rows, target)[0])
 
 
 def lifted(robot: RobotConfig, bears_n: Floats) -> Bools:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Floats, Indices
+from snakewalk.config.arrays import Bools, Floats, Indices, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.kinematics.frame import Frame
@@ -10,17 +10,25 @@ from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.secondary import SecondaryController
+from snakewalk.controller.repertoire.segment import REVERSE
+from snakewalk.controller.repertoire.separation import SeparatedCrowd
 
 STEEP_RAD = 0.6
 """Slopes beyond are avoided (ours)."""
 ROOM_LENGTHS = 0.6
 """Clearance to the centre of another body, body lengths (ours)."""
+ROOM_BESIDE_LENGTHS = 0.25
+"""Clearance to head, middle and tail of bodies that do not intersect, body lengths (ours)."""
 AHEAD_LENGTHS = 1.0
 """How far ahead a body looks (ours)."""
 TURNING_S = 1.5
 """In which a body would turn to where it wants (ours)."""
 PAUSE_SHARE = 0.08
 """Share of arrivals after which a body rests for a while (ours)."""
+WAITING_FRAMES = 24
+"""After which a body that another one blocks begins another action (ours)."""
+SPREADING_TRIES = 200
+"""Rounds in which bodies that intersect at the start move to other places (ours)."""
 _OFFSETS_RAD = np.array([0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6, 2.4, -2.4])
 
 
@@ -39,8 +47,17 @@ class Wandering:
         *,
         seed: int = 0,
         balance_rad: float = 0.005,
+        radius_m: Floats | None = None,
     ) -> None:
-        """Put bodies of lengths ``sizes`` (N,) times the recorded one's at random places."""
+        """Put bodies of lengths ``sizes`` (N,) times the recorded one's at random places.
+
+        ``radius_m`` (L,) are half the widths of the recorded body at its links: bodies then never
+        intersect. Without it they pass through each other.
+
+        Raises:
+            InputError: the ground is steep everywhere, or has no room for so many bodies.
+
+        """
         count = len(sizes)
         self._repertoire, self._ground = repertoire, ground
         self._random = random = np.random.default_rng(seed)
@@ -60,14 +77,54 @@ class Wandering:
             action = self._controllers[body].choose(float(self._speed_m_s[body]))
             self.crowd.place(body, start, segment=action, scale=float(sizes[body]))
         self.crowd.stagger(seed)
+        kinds = np.array([one.kind for one in repertoire.segments])
+        turns = np.isin(kinds, ["left", "right"])
+        back = np.isin(kinds, REVERSE)
+        self._parts = np.linspace(0, repertoire.segments[0].link_m.shape[1] - 1, 5).astype(int)
+        self._back = np.flatnonzero(back | turns)
+        self._onward = np.flatnonzero((kinds == "forward") | turns)
+        self.separated = (
+            None if radius_m is None else SeparatedCrowd(self.crowd, radius_m, repertoire.length_m)
+        )
+        if self.separated is not None:
+            self._spread(self.separated)
 
     def step(self, frames: int = 1) -> None:
         """Go on by ``frames`` frames of the repertoire."""
         for _ in range(frames):
-            self.crowd.step()
-            ended = np.flatnonzero(self.crowd.ended)
+            if self.separated is None:
+                self.crowd.step()
+                ended = np.flatnonzero(self.crowd.ended)
+            else:
+                moved = self.separated.step()
+                ended = np.flatnonzero(self.crowd.ended & moved)
+                self._evade(self.separated.held)
             if len(ended):
                 self._decide(ended)
+
+    def _spread(self, separated: SeparatedCrowd) -> None:
+        """Give bodies that intersect other places until none does."""
+        self.crowd.step()
+        for _ in range(SPREADING_TRIES):
+            pairs = separated.intersecting()
+            if not len(pairs):
+                return
+            bodies = np.unique(pairs[:, 0])
+            for body, place in zip(bodies.tolist(), self._places(len(bodies)), strict=True):
+                self.crowd.shift(body, place - self.crowd.origin_m[body, :2])
+        raise InputError(
+            f"crowd of {len(separated.held)} bodies: the ground has no room for so many; use fewer"
+        )
+
+    def _evade(self, held: Ints) -> None:
+        """Let each body that has waited long begin another action, and go to another place."""
+        late = np.flatnonzero((held > 0) & (held % WAITING_FRAMES == 0))
+        if len(late):
+            self._goal_m[late] = self._places(len(late))
+        for body in late.tolist():
+            behind = self.separated is not None and self.separated.met[body] > 0.5
+            options = self._onward if behind else self._back
+            self.crowd.interrupt(body, int(self._random.choice(options)))
 
     def _decide(self, bodies: Indices) -> None:
         """Choose the next action of bodies whose cycle has ended."""
@@ -95,14 +152,28 @@ class Wandering:
         tried = goal[:, None] + _OFFSETS_RAD
         reach = AHEAD_LENGTHS * self.length_m[bodies]
         ahead = np.stack([np.cos(tried), np.sin(tried)], axis=2) * reach[:, None, None]
-        ahead += at[:, None]
-        free = self._safe(ahead)
-        others = self.crowd.origin_m[:, :2]
-        gap = np.linalg.norm(ahead[:, :, None] - others[None, None], axis=3)
-        gap[np.arange(len(bodies)), :, bodies] = np.inf
-        free &= gap.min(axis=2) > ROOM_LENGTHS * reach[:, None]
-        first = np.where(free.any(axis=1), free.argmax(axis=1), 0)
+        free = self._safe(ahead + at[:, None])
+        gap = self._gap_m(bodies, ahead + at[:, None])
+        if self.separated is None:
+            free &= gap > ROOM_LENGTHS * reach[:, None]
+        else:
+            gap = np.minimum(gap, self._gap_m(bodies, 0.5 * ahead + at[:, None]))
+            free &= gap > ROOM_BESIDE_LENGTHS * reach[:, None]
+        widest = 0 if self.separated is None else gap.argmax(axis=1)
+        first = np.where(free.any(axis=1), free.argmax(axis=1), widest)
         return wrap(tried[np.arange(len(bodies)), first] - heading)
+
+    def _gap_m(self, bodies: Indices, ahead_m: Floats) -> Floats:
+        """(n, directions) from points (n, directions, 2) to the nearest part of another body."""
+        others = self.crowd.origin_m[:, None, :2]
+        if self.separated is not None:
+            others = self.crowd.points_m[:, :2, self._parts].transpose(0, 2, 1)
+        gap = np.full(ahead_m.shape[:2], np.inf)
+        for part in range(others.shape[1]):
+            to = np.linalg.norm(ahead_m[:, :, None] - others[None, None, :, part], axis=3)
+            to[np.arange(len(bodies)), :, bodies] = np.inf
+            gap = np.minimum(gap, to.min(axis=2))
+        return gap
 
     def _safe(self, points_m: Floats) -> Bools:
         x, y = points_m[..., 0], points_m[..., 1]

@@ -1,9 +1,12 @@
 """Many bodies at once, compiled: body frames, link centres, bridges, level of detail ([YT] 4)."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Int32s
+from snakewalk.config.arrays import Bools, Floats, Indices, Int32s
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import bridge_frames, tip_travel_m
@@ -31,7 +34,7 @@ class Crowd:
         ``balance_rad``: by how much a body that has come to lean rolls upright in a frame, at most
         ([YT] 4.2); 0 replays exactly what was recorded.
         """
-        self._balance_rad = balance_rad
+        self._balance_rad, self._largest_tip_m = balance_rad, largest_tip_m
         segments = repertoire.segments
         lengths = np.array([segment.frames for segment in segments])
         self._first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int32)
@@ -101,6 +104,51 @@ class Crowd:
     def link_m(self, body: int) -> Floats:
         """(L, 3) centres of a body's links in the world, single precision."""
         return np.asarray(self._points[body, :, : self._links].T, dtype=np.float64)
+
+    @property
+    def points_m(self) -> NDArray[np.float32]:
+        """(N, 3, links and padding) of the links."""
+        return self._points
+
+    def shift(self, body: int, move_m: Floats) -> None:
+        """Move a body by (2,) in the plane, with its links."""
+        self.origin_m[body, :2] += move_m
+        self._points[body, :2] += move_m[:, None].astype(np.float32)
+
+    def interrupt(self, body: int, segment: int) -> None:
+        """Begin another segment at once, at the moment whose shape is nearest to the body's.
+
+        The body frame rests until a bridge has reached this shape.
+        """
+        first, last = self._first[segment], self._last[segment]
+        now = self._next[body]
+        off = self._shape[first : last + 1] - self._shape[now]
+        travel = np.linalg.norm(off[:, :2, self._links - 1], axis=1)
+        nearest = int(np.sqrt((off[:, :2] ** 2).sum(axis=(1, 2))).argmin())
+        self._bridge_from[body] = now
+        self._bridge_frames[body] = self._bridge_remaining[body] = bridge_frames(
+            float(travel[nearest]), self._largest_tip_m
+        )
+        self.segment[body] = self._playing[body] = segment
+        self._next[body] = first + nearest
+        self.cycles[body], self._ended[body] = 0, False
+
+    def snapshot(self) -> tuple[NDArray[Any], ...]:
+        """Return a copy of the state of all bodies, for ``restore``."""
+        return tuple(array.copy() for array in self._state)
+
+    def restore(self, state: tuple[NDArray[Any], ...], bodies: Indices) -> None:
+        """Return some bodies to a state from ``snapshot``."""
+        for array, old in zip(self._state, state, strict=True):
+            array[bodies] = old[bodies]
+
+    @property
+    def _state(self) -> tuple[NDArray[Any], ...]:
+        """Arrays (N, ...) that a step changes."""
+        return (
+            self.rotation, self.origin_m, self.cycles, self._playing, self._next, self._ended,
+            self._bridge_from, self._bridge_frames, self._bridge_remaining, self._points,
+        )  # fmt: skip
 
     def step(self, frames: int = 1) -> None:
         """Go on by ``frames`` frames."""

@@ -13,7 +13,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.repertoire.behaviour import Wandering
-from snakewalk.controller.repertoire.detail import NEAR, DetailedCrowd, ViewFrustum
+from snakewalk.controller.repertoire.detail import FAR, HIDDEN, NEAR, DetailedCrowd, ViewFrustum
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot, CrowdView, render_crowd
 
@@ -51,10 +51,25 @@ class CrowdScene:
         seed: int = 0,
         fovy_deg: float = 45.0,
         detail: bool = True,
+        separate: bool = True,
     ) -> None:
-        """``detail``: with culling and levels; else every body is drawn in full."""
+        """Put the bodies on the ground.
+
+        Args:
+            repertoire: their actions.
+            robot: its radii are those of the bodies.
+            ground: under them.
+            bodies: how many.
+            seed: of places, sizes and choices.
+            fovy_deg: opening of the camera.
+            detail: with culling and levels; else every body is drawn in full.
+            separate: bodies do not intersect.
+
+        Raises:
+            InputError: the ground has no room.
+
+        """
         sizes = np.random.default_rng(seed).uniform(*SIZES, bodies)
-        self._wandering = Wandering(repertoire, ground, sizes, seed=seed)
         self._ground, self._fovy_deg, self._detail = ground, fovy_deg, detail
         links = repertoire.segments[0].link_m.shape[1]
         radii = np.array(robot.radii_m(2 * links + 1))[1::2]
@@ -62,6 +77,9 @@ class CrowdScene:
         thin = 0.85 + 0.15 * np.sin(np.pi * np.minimum(along / 0.5, 1.0) / 2)
         thin *= 1.0 - 0.7 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
         self._chains = DetailedCrowd(ground, radii * thin)
+        self._wandering = Wandering(
+            repertoire, ground, sizes, seed=seed, radius_m=radii * thin if separate else None
+        )
         self.costs = CrowdCosts()
 
     def shots(self, frames: int, steps: int) -> Iterator[CrowdShot]:
@@ -79,7 +97,8 @@ class CrowdScene:
                 ground_m = self._ground.elevation_m(*crowd.origin_m[:, :2].T)
                 centre = np.column_stack([crowd.origin_m[:, :2], ground_m])
                 levels = frustum.levels(centre, wandering.length_m)
-            crowd.visible[:] = levels > 0
+            if self._wandering.separated is None:
+                crowd.visible[:] = levels > HIDDEN
             culled = time.process_time()
             wandering.step(steps)
             moved = time.process_time()
@@ -95,7 +114,7 @@ class CrowdScene:
                 azimuth,
                 elevation,
                 [
-                    BodyChain(chain.points_m, chain.radius_m, chain.body, chain.level == NEAR)
+                    BodyChain(chain.points_m, chain.radius_m, chain.body, chain.level - FAR)
                     for chain in chains
                 ],
                 f"{len(chains)} of {len(levels)} bodies in view, {near} near",

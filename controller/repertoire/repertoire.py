@@ -9,7 +9,7 @@ import numpy as np
 from snakewalk.config.archive import parse_json, read_arrays
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.repertoire.segment import Segment
+from snakewalk.controller.repertoire.segment import REVERSE, SIDES, Segment
 
 FORMAT = "snakewalk-repertoire-1"
 _HEAD = ("robot", "joint_axes", "world", "length_m")
@@ -51,8 +51,9 @@ class Repertoire:
         lines = []
         for segment in self.segments:
             speed_m_s, turn_rad_s = segment.speed_m_s, segment.turn_rad_s
-            forward = {"forward": 1, "left": 1, "right": 1, "reverse": -1}.get(segment.kind, 0)
-            left = {"left": 1, "right": -1}.get(segment.kind, 0)
+            forward = {"brake": 0, "rest": 0}.get(segment.kind, 1)
+            forward = -1 if segment.kind in REVERSE else forward
+            left = SIDES.get(segment.kind, 0)
             if forward * speed_m_s < 0.0 or left * turn_rad_s < 0.0:
                 lines.append(
                     f"action {segment.name}: the body went {speed_m_s:.2f} m/s and turned "

@@ -16,7 +16,7 @@ from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
-from snakewalk.controller.repertoire.segment import Kind, Segment, cut
+from snakewalk.controller.repertoire.segment import REVERSE, Kind, Segment, cut
 from snakewalk.controller.run.servo_setup import check_supply
 
 SETTLING = 3
@@ -43,11 +43,16 @@ ACTIONS = (
     Action("right-gentle", "right", 0.8, -0.6),
     Action("right-sharp", "right", 0.8, -1.5),
     Action("reverse", "reverse", 0.5),
+    Action("left-slow", "left", 0.4, 1.0),
+    Action("right-slow", "right", 0.4, -1.0),
+    Action("reverse-left", "reverse-left", 0.4, -1.0),
+    Action("reverse-right", "reverse-right", 0.4, 1.0),
     Action("brake", "brake", 0.8),
     Action("rest", "rest", 0.8),
 )
-"""[YT] 3.3: three speeds, and gradual and sharp turns to either side. There braking and retreating
-are made of a forward action played slower and backwards; here they are recorded, too."""
+"""[YT] 3.3: three speeds, and gradual and sharp turns to either side. Slow turns, and turns of a
+body that goes backward, are ours. There braking and retreating are made of a forward action played
+slower and backwards; here they are recorded, too."""
 REST_S = 0.5
 
 
@@ -82,7 +87,7 @@ def record_action(
     parameters: dict[str, Any] = {
         "turn_rad": action.turn_rad,
         "frequency_hz": action.frequency_hz,
-        "backward": action.kind == "reverse",
+        "backward": action.kind in REVERSE,
     }
     asked = GaitCycle(make_gait("lateral-undulation", parameters), robot)
     count = int(np.ceil(1.0 / (asked.frequency_hz * FRAME_S) - 1e-9))

@@ -7,6 +7,7 @@ import numpy as np
 from snakewalk.config.arrays import Indices
 from snakewalk.config.errors import InputError
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.segment import SIDES
 
 _ALIKE: Final = 0.1
 """Turns that differ by less than this share of the largest one count as equal (ours)."""
@@ -53,7 +54,7 @@ class SecondaryController:
         self._turn_rad_s = np.array([segment.turn_rad_s for segment in segments])
         moves = self._kinds != "rest"
         self._direction = np.where(moves, np.sign(self._speed_m_s), 0.0).astype(int)
-        turns = np.isin(self._kinds, ["left", "right"])
+        turns = np.isin(self._kinds, list(SIDES))
         self._side = np.where(turns, np.sign(self._turn_rad_s), 0.0).astype(int)
         steady_m_s = self._speed_m_s[self._steady]
         if not (self._direction[self._steady] > 0).any():

@@ -2,14 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import Frame
 
-Kind = Literal["forward", "left", "right", "reverse", "brake", "rest"]
+Kind = Literal[
+    "forward", "left", "right", "reverse", "reverse-left", "reverse-right", "brake", "rest"
+]
+SIDES: Final[dict[str, int]] = {"left": 1, "right": -1, "reverse-left": 1, "reverse-right": -1}
+"""Side to which the heading turns: 1 is left."""
+REVERSE: Final = ("reverse", "reverse-left", "reverse-right")
 """[YT] 3.2: forward and turns; retreating and braking, which the paper makes from forward; and
 rest, the state after a brake. All but a brake are one settled cycle."""
 

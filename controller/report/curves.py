@@ -28,7 +28,8 @@ two pixels."""
 _BAND_POINTS: Final = 100
 """Places of the band that is drawn instead."""
 _PANEL_PX: Final = 160
-_GAP: Final = 0.06
+_GAP_PX: Final = 34
+"""Between two panels: the title and the legend of the lower one."""
 Curve = tuple[str, str, Floats, Floats]
 """Name, colour, times, values."""
 
@@ -51,13 +52,13 @@ def curves_html(record: RunRecord) -> str:
         for k in range(record.cycle.asked_rad.shape[1])
     )
     step = _step(len(record.cycle.time_s))
-    which = "" if step == 1 else f" Every {step}. cycle is here, all are in the log."
+    which = "" if step == 1 else f" One of {step} cycles is drawn; all are in the log."
     return (
         "<section id='curves'><h2>Curves</h2><figure>"
         f"<p class='facts'><label>Last two panels: <select id='joint'>{joints}</select></label></p>"
         "<div id='plot'><noscript>Curves need scripts. The pictures below do not.</noscript></div>"
-        "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. A "
-        "pale band reaches from least to largest. "
+        "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
+        "Where a mean is drawn, pale lines show the least and the largest value. "
         "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is "
         f"the time of the film or trip.{which}{constant}"
         "</figcaption></figure>"
@@ -123,7 +124,8 @@ def _figure(
 def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
     count = len(titles)
     reached = "solid" if record.header.pose_evidence.is_measured else "dash"
-    tall = (1.0 - _GAP * (count - 1)) / count
+    gap = _GAP_PX / (_PANEL_PX * count)
+    tall = (1.0 - gap * (count - 1)) / count
     layout: dict[str, Any] = {
         "margin": {"l": 46, "r": 8, "t": 50, "b": 36},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
@@ -148,7 +150,7 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
         ],
     }
     for row, title in enumerate(titles, start=1):
-        top = 1.0 - (row - 1) * (tall + _GAP)
+        top = 1.0 - (row - 1) * (tall + gap)
         layout["yaxis" if row == 1 else f"yaxis{row}"] = {
             "domain": [max(top - tall, 0.0), top],
             "fixedrange": True,
@@ -178,17 +180,15 @@ def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
 def _traces(
     name: str, colour: str, row: int, time_s: Floats, values: Floats
 ) -> list[dict[str, Any]]:
-    """Return the trace of a curve; of one that jumps all the time, the mean in a pale band."""
+    """Return the trace of a curve; of one that jumps all the time, mean, least and largest."""
     known = values[np.isfinite(values)]
     if len(known) < _BLOCK or _crossings(known) < _BLOCK:
         return [_trace(name, colour, row, time_s, values)]
     at_s, low, mean, high = thin(time_s, values, _BAND_POINTS)
-    edge = {"mode": "lines", "line": {"width": 0}, "showlegend": False, "hoverinfo": "skip"}
+    edge = {"line": {"color": _pale(colour), "width": 1}, "showlegend": False}
     return [
-        _trace(name, colour, row, at_s, low) | edge,
-        _trace(name, colour, row, at_s, high)
-        | edge
-        | {"fill": "tonexty", "fillcolor": _pale(colour)},
+        _trace(f"{name}, least", colour, row, at_s, low) | edge,
+        _trace(f"{name}, largest", colour, row, at_s, high) | edge,
         _trace(f"{name}, mean", colour, row, at_s, mean),
     ]
 
@@ -200,7 +200,7 @@ def _crossings(values: Floats) -> int:
 
 
 def _pale(colour: str) -> str:
-    return f"rgba({', '.join(str(part) for part in rgb(colour))}, 0.25)"
+    return f"rgba({', '.join(str(part) for part in rgb(colour))}, 0.5)"
 
 
 def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> dict[str, Any]:

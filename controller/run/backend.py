@@ -91,7 +91,7 @@ class RehearsedPort(Protocol):
 
 
 class _SimulatedBody:
-    """The body of a run in MuJoCo, and the parts that are made from it."""
+    """The body of a run in MuJoCo, not yet placed, and the parts that are made from it."""
 
     def __init__(
         self,
@@ -103,7 +103,8 @@ class _SimulatedBody:
     ) -> None:
         plant, twin = physics_modules()
         self.plant: MujocoPlant = plant.MujocoPlant(
-            deviation.robot(robot), deviation.world(world), ground, run.physics_step_s
+            *(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s),
+            is_placed=False,
         )
         self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
         """Makes the robot's IMU from the motion of the body; None without an IMU."""

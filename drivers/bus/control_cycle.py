@@ -22,7 +22,7 @@ from snakewalk.drivers.bus.fast_path import FastPath, FastPathPort
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
-from snakewalk.drivers.bus.pending_replies import PendingReplies
+from snakewalk.drivers.bus.pending_replies import SPARE_LENGTHS, PendingReplies
 from snakewalk.drivers.compiling import is_compiling
 from snakewalk.drivers.port.byte_port import BytePort, DescriptorPort
 from snakewalk.drivers.protocol.frames import HEAD
@@ -265,7 +265,11 @@ class ControlCycle:
         if self._order is self._default_order and self.fast is default.fast and none_pending:
             return default
         if not none_pending:
-            length = self._pending.free_length(self._responding(), length, fast=self.fast)
+            # on a silent bus some lengths stay free for the reads after its first reply
+            responding, spares = self._responding(), SPARE_LENGTHS
+            if not responding:
+                responding, spares = [*self._ids], SPARE_LENGTHS // 2
+            length = self._pending.free_length(responding, length, fast=self.fast, spares=spares)
         key = (self.fast, length, self._order)
         request = self._requests.get(key)
         if request is None:

@@ -135,10 +135,6 @@ class FeetechCycle(ControlCycle):
         is_single = len(ids) == 1 and not self._facts.sync_read
         return FeetechReadRequest(ids, self.read_address, length, is_single=is_single)
 
-    def _responding(self) -> list[int]:
-        # after fast reads Protocol 2.0 has plain ones, whose length nobody awaits
-        return super()._responding() or list(self._ids)
-
     def _native_path(self, spin_s: float | None) -> FastPath | None:
         del spin_s
         return None

@@ -41,10 +41,12 @@ class PendingReplies:
         until_s = self._until_s.get((servo_id, fast, length))
         return until_s is not None and self._clock.now_s() < until_s
 
-    def free_length(self, servo_ids: Iterable[int], shortest: int, *, fast: bool) -> int:
+    def free_length(
+        self, servo_ids: Iterable[int], shortest: int, *, fast: bool, spares: int = SPARE_LENGTHS
+    ) -> int:
         """Shortest reply length that no servo still has pending; ``shortest`` if all do."""
         ids = tuple(servo_ids)
-        for length in range(shortest, shortest + SPARE_LENGTHS):
+        for length in range(shortest, shortest + spares):
             if not any(self.is_pending(servo_id, length, fast=fast) for servo_id in ids):
                 return length
         return shortest

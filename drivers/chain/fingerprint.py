@@ -1,13 +1,20 @@
-"""Fingerprint: EEPROM settings of a servo that determine zero, direction and limits of a joint."""
+"""Fingerprint: EEPROM settings of a servo that determine zero, direction, limits and protection."""
 
 from collections.abc import Mapping
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.protocol.registers import REVERSE
 
+PROTECTION = (
+    *("PWM Limit", "Current Limit", "Velocity Limit"),
+    *("Temperature Limit", "Min Voltage Limit", "Max Voltage Limit"),
+    *("Protection Current", "Over-current Time"),
+    *("Overload Torque", "Protection Time", "Protective Torque"),
+)
+"""Registers that decide when a servo protects itself; the last five are those of Feetech servos."""
 FINGERPRINT = (
     *("Homing Offset", "Drive Mode", "Operating Mode", "Shutdown"),
-    *("Min Position Limit", "Max Position Limit", "PWM Limit", "Current Limit"),
+    *("Min Position Limit", "Max Position Limit", *PROTECTION),
 )
 """Registers of it; a model may lack some."""
 Fingerprint = Mapping[str, int]

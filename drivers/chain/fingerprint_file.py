@@ -12,6 +12,7 @@ from snakewalk.config.errors import ConfigError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.chain.fingerprint import (
     FINGERPRINT,
+    PROTECTION,
     Fingerprint,
     register_change,
 )
@@ -20,7 +21,7 @@ from snakewalk.drivers.protocol.registers import REVERSE
 
 _HEAD = """\
 # Settings of the servos as they were found at the last start on a port (snakewalk).
-# A start is refused if a zero, a direction, a PWM limit or a current limit differs.
+# A start is refused if a zero, a direction or a limit that protects the servo differs.
 # Accept a change: snakewalk doctor --accept --robot {robot}
 """
 
@@ -112,6 +113,9 @@ class FingerprintFile:
             return [f"{self.path}: cannot be written: {error}; no later start is compared"]
         if known is None:
             return [f"{self.path}: created with the settings of {len(new)} servos"]
+        missing = missing_registers(known, fingerprints)
+        if missing:
+            return [f"{self.path}: had no {', '.join(missing)}; completed with the present values"]
         return [f"{self.path}: updated: servos were added, or limits follow the robot's file"]
 
 
@@ -135,7 +139,20 @@ def changes(
     return lines
 
 
-_KEPT = ("Homing Offset", "Drive Mode", "PWM Limit", "Current Limit")
+def missing_registers(
+    known: Mapping[int, Fingerprint], found: Mapping[int, Fingerprint]
+) -> list[str]:
+    """Registers of the servos in a file that it lacks, as an older version wrote it."""
+    missing = {
+        name
+        for servo_id, values in found.items()
+        if servo_id in known
+        for name in values.keys() - known[servo_id].keys()
+    }
+    return [name for name in FINGERPRINT if name in missing]
+
+
+_KEPT = ("Homing Offset", "Drive Mode", *PROTECTION)
 """Registers that no start sets; of Drive Mode the direction."""
 
 

@@ -27,7 +27,7 @@ from snakewalk.drivers.protocol.registers import WATCHDOG, WATCHDOG_TRIPPED
 SLOW_EVERY = 16
 """Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
 _GOALS_AT, _TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT = 2, 5, 8, 10, 13
-_SHAPING_AT, _FINGERPRINT_AT = (3, 11), (6, 9, 14)
+_SHAPING_AT, _FINGERPRINT_AT = (3, 11), (6, 9, 12, 14)
 """Cycles of a round in which registers are read, at most one in each."""
 _CHECKED_AT = frozenset(
     {_TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT, *_SHAPING_AT, *_FINGERPRINT_AT}
@@ -104,7 +104,7 @@ class LivenessCheck:
         """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
 
         A round of ``SLOW_EVERY`` cycles has torque, watchdog, identity, one setting, two that shape
-        the motion, and three of the fingerprint. If a cycle ``has_time``, it repeats an incomplete
+        the motion, and four of the fingerprint. If a cycle ``has_time``, it repeats an incomplete
         check.
 
         Raises:

@@ -16,8 +16,8 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 CURRENT_READS, CURRENT_TRAVEL_RAD, BACK_RAD = 25, 0.5, 0.2
 """A sensor is dead if a current stays the same for that many reads and that much travel, part of it
 back again (ours). Friction alone changes its sign when a joint turns back."""
-SATURATED = 0.9
-"""Share of a current limit from which on the limit keeps a current constant (ours)."""
+SATURATED, OVER_LIMIT = 0.9, 1.5
+"""Shares of a current limit between which the limit may keep a current constant (ours)."""
 SPEED_READS, MISMATCH_RAD, MISMATCH_RAD_S = 25, 0.15, 0.1
 """Position and velocity contradict each other if one of them stays the same for that many reads.
 The position must also differ from the integral of the velocity by this, and by this for each second
@@ -133,7 +133,10 @@ def _compare(
                         reads >= CURRENT_READS
                         and first >= CURRENT_TRAVEL_RAD
                         and first - abs(second) >= BACK_RAD
-                        and abs(motion[0, k]) < SATURATED * limits_a[k]
+                        and (
+                            abs(motion[0, k]) < SATURATED * limits_a[k]
+                            or abs(motion[0, k]) > OVER_LIMIT * limits_a[k]
+                        )
                     )
                 else:
                     limit = MISMATCH_RAD + MISMATCH_RAD_S * since[n, 1, k]

@@ -20,7 +20,7 @@ from snakewalk.drivers.chain.chain_settings import (
     ChainSetting,
     chain_settings,
 )
-from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
+from snakewalk.drivers.chain.fingerprint import FINGERPRINT, PROTECTION, Fingerprint, fingerprint_of
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause
 from snakewalk.drivers.protocol import feetech
@@ -52,8 +52,8 @@ _COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position", *FI
 """Registers read as well, for comparisons of a servo with its earlier state."""
 _SETTINGS = (
     *("Torque Enable", "Bus Watchdog", "Secondary(Shadow) ID", "Return Delay Time"),
-    *("Operating Mode", "Drive Mode", STARTUP, "Shutdown", "Homing Offset", "PWM Limit"),
-    *("Current Limit", "Min Position Limit", "Max Position Limit", "Goal Current"),
+    *("Operating Mode", "Drive Mode", STARTUP, "Shutdown", "Homing Offset", *PROTECTION),
+    *("Min Position Limit", "Max Position Limit", "Goal Current"),
     *("Goal PWM", "Position P Gain", *SHAPING_SETTINGS, IDENTITY),
 )
 """Registers that ``configure`` checks."""

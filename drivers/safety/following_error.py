@@ -9,6 +9,11 @@ the current that it is allowed.
 The current is evidence at small errors, too: a motor whose output stage works draws current as soon
 as its joint is off the goal and slow. If it draws next to none, the output stage is dead. A
 velocity sensor may be dead as well, so a joint is also slow if its positions are.
+
+A current sensor that always reads the same value hides a dead output stage. The current of a motor
+at rest is proportional to its output, and the output follows the error. If the joint stands and its
+error changes while its current does not, the output stage or the sensor is dead. A constant error
+shows nothing: an obstacle also causes a constant current.
 """
 
 import math
@@ -34,6 +39,14 @@ SLOW_RAD_S = 0.3
 speed of the slowest model."""
 LONGEST_STEP_S = 0.1
 """A pause between two states counts as this much, s (ours)."""
+STANDING_RAD = 0.005
+"""A joint stands while its position differs by at most this (ours): three units of a DYNAMIXEL."""
+CHANGED_OUTPUT = 0.2
+"""Change of the expected current, as a share of the current at full output, during which a joint
+that stands has to draw another current (ours). The current in a supply line grows with the square
+of the output: a sensor there shows at least a fifth of the change."""
+CHANGED_LIMIT = 0.6
+"""The same as a share of a lower limit of the current (ours): the limit varies with the supply."""
 _FLOATS = readonly_array()
 
 
@@ -47,6 +60,7 @@ class FollowingError:
         self._rules = np.vstack([limits.following_limit_rad, limits.following_effort_a, output])
         self._memory = np.zeros((3, joints))
         self._since_s, self._idle_s, self._last_rad = self._memory
+        self._steady = np.zeros((5, joints))
         self.joint = -1
         """Joint of the newest reason to stop."""
         self.is_idle = False
@@ -58,6 +72,7 @@ class FollowingError:
         self._since_s[:] = np.nan
         self._idle_s[:] = 0.0
         self._last_rad[:] = np.nan
+        self._steady[:] = np.nan
         self._time_s = math.inf
 
     def update(self, state: JointState, goal_rad: Floats) -> str | None:
@@ -67,12 +82,20 @@ class FollowingError:
             *(goal_rad, state.position_rad, state.velocity_rad_s, state.current_a, state.valid),
             *(state.time_s, last_s, self._rules, self._memory),
         )
+        steady = _steady_joint(
+            *(goal_rad, state.position_rad, state.current_a, state.valid),
+            *(state.time_s, last_s, self._rules, self._steady),
+        )
+        self.is_idle = joint >= 0 and bool(self._idle_s[joint] >= IDLE_TIME_S)
+        if self.is_idle:
+            self.joint = joint
+            return self._idle_fault(state, goal_rad, joint)
+        if steady >= 0:
+            self.joint, self.is_idle = steady, True
+            return self._steady_fault(state, goal_rad, steady)
         if joint < 0:
             return None
         self.joint = joint
-        self.is_idle = bool(self._idle_s[joint] >= IDLE_TIME_S)
-        if self.is_idle:
-            return self._idle_fault(state, goal_rad, joint)
         for_s = state.time_s - self._since_s[joint]
         if not for_s >= self._limits.following_time_s:
             return None
@@ -92,6 +115,15 @@ class FollowingError:
             f"{state.current_a[joint]:.2f} A, expected about {expected_a:.2f} A: its motor does "
             "not push: dead output stage, loose motor wire, weakened by another program, or a dead "
             "current or position sensor"
+        )
+
+    def _steady_fault(self, state: JointState, goal_rad: Floats, joint: int) -> str:
+        since_s, _, _, low_a, high_a = self._steady[:, joint]
+        error_rad = abs(float(goal_rad[joint] - state.position_rad[joint]))
+        return (
+            f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal; its current "
+            f"stays at {state.current_a[joint]:.2f} A for {state.time_s - since_s:.2f} s, expected "
+            f"{low_a:.2f} to {high_a:.2f} A: dead current sensor, and its motor does not push"
         )
 
 
@@ -164,3 +196,71 @@ def _judge(
         if not np.isnan(memory[0, k]) and (longest < 0 or memory[0, k] < memory[0, longest]):
             longest = k
     return idle if idle >= 0 else longest
+
+
+@compiled(
+    f"int64({', '.join([_FLOATS] * 3)}, {readonly_array('boolean')}, float64, float64,"
+    " float64[:, ::1], float64[:, ::1])",
+    makes_arrays=False,
+)
+def _steady_joint(
+    goal_rad: Floats,
+    position_rad: Floats,
+    current_a: Floats,
+    valid: Bools,
+    time_s: float,
+    last_s: float,
+    rules: Floats,
+    steady: Floats,
+) -> int:
+    """Note for how long each joint stands with the same current, and the currents to expect.
+
+    A joint that was not read keeps its notes; a pause ends them.
+
+    Args:
+        goal_rad: (J,) goals that were sent before the state.
+        position_rad: (J,)
+        current_a: (J,)
+        valid: (J,) whether the joint was read.
+        time_s: time of the state.
+        last_s: time of the previous state; infinite for the first state.
+        rules: (5, J) as of ``_judge``.
+        steady: (5, J) time since which position and current are the same, or NaN; that position;
+            that current; least and greatest expected current since then, A.
+
+    Returns:
+        The first joint whose current did not change though its error did, else -1.
+
+    """
+    is_paused = time_s - last_s > LONGEST_STEP_S
+    found = -1
+    for k in range(len(goal_rad)):
+        full_a, limit_a = rules[3, k], rules[4, k]
+        change_a = min(CHANGED_OUTPUT * full_a, CHANGED_LIMIT * limit_a)
+        if is_paused:
+            steady[0, k] = np.nan
+        if not valid[k] or rules[2, k] <= 0.0:
+            continue
+        error = goal_rad[k] - position_rad[k]
+        share = min(abs(error) * rules[2, k], 1.0)
+        expected_a = min(share * full_a, limit_a)
+        if error < 0.0:
+            expected_a = -expected_a
+        is_same = (
+            abs(position_rad[k] - steady[1, k]) <= STANDING_RAD
+            and abs(current_a[k] - steady[2, k]) <= 0.5 * IDLE_SHARE * change_a
+        )
+        if np.isnan(steady[0, k]) or not is_same:
+            steady[0, k], steady[1, k], steady[2, k] = time_s, position_rad[k], current_a[k]
+            steady[3, k] = steady[4, k] = expected_a
+            continue
+        steady[3, k] = min(steady[3, k], expected_a)
+        steady[4, k] = max(steady[4, k], expected_a)
+        if (
+            found < 0
+            and share >= IDLE_OUTPUT
+            and time_s - steady[0, k] >= IDLE_TIME_S
+            and steady[4, k] - steady[3, k] >= change_a
+        ):
+            found = k
+    return found

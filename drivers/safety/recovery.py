@@ -164,7 +164,7 @@ class Recovery(Generic[C]):
             raise ChainError(f"{doubt}; check that it is the same robot, then start again")
         is_asked = self._policy == "confirm" or doubt is not None
         if is_asked and not (self._confirm and self._confirm(str(found))):
-            self._give_up("not confirmed")
+            self._give_up("not confirmed" if self._confirm else "not confirmed: nobody to ask")
             return None
         why = stopped()
         if why is not None:

@@ -1,7 +1,9 @@
 """The stop button: a small private file through which another program latches a run's safe link.
 
 A program that moves servos makes one, locks it and maps it into memory. An unlocked file is not a
-button. Reading it needs no system call, and pressing it cannot delay the run.
+button. Pressing it cannot delay the run. A run whose file is deleted or truncated stops, because
+nobody could stop it otherwise. The run reads the file, not its map: a look into the map of a
+truncated file kills a program.
 
 Layout: a byte that is 1 once pressed, and a byte that is 1 once the run has ended. Then come the
 name of the person who pressed it and the end of the run (length and text each), and a description
@@ -14,7 +16,7 @@ import mmap
 import os
 import stat
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -37,6 +39,8 @@ _WHO: Final = slice(16, 528)
 _END: Final = slice(528, 1552)
 _RUN: Final = slice(1552, _BYTES)
 _SUFFIX: Final = ".stop"
+_LOOK_EVERY: Final = 16
+"""Calls of ``pressed`` until it looks at the file again (ours)."""
 _OPEN_FLAGS: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
@@ -57,7 +61,8 @@ class StopButton:
     """The run's own button; a context manager, after which it does not exist any more.
 
     Raises:
-        InputError: the folder of buttons is not this user's alone.
+        InputError: the folder of buttons is not this user's alone, a file cannot be made in it, or
+            another run of this user is on the same URL, which no system locks.
 
     """
 
@@ -72,12 +77,18 @@ class StopButton:
         where = None if folder is None else str(folder.absolute())
         self.run = StoppableRun(os.getpid(), name, devices, where)
         place = button_folder()
+        _refuse_used_urls(devices)
         # locked and filled before it gets a name that others look for; Windows renames no open file
         kind = "" if _HAS_LOCKS else _SUFFIX
-        self._file, made = tempfile.mkstemp(kind, f"{os.getpid()}-", place)  # mode 0600
+        try:
+            self._file, made = tempfile.mkstemp(kind, f"{os.getpid()}-", place)  # mode 0600
+            # written, not truncated to its size: on a full disk a map of holes kills the program
+            os.write(self._file, bytes(_BYTES))
+        except OSError as error:
+            raise InputError(_cannot_be_made(place, error)) from None
         if _HAS_LOCKS:
             fcntl.flock(self._file, fcntl.LOCK_EX)
-        os.ftruncate(self._file, _BYTES)
+        self._calls = 0
         self._map = mmap.mmap(self._file, _BYTES)
         _write_text(self._map, _RUN, json.dumps(asdict(self.run)))
         self.path = Path(made).with_suffix(_SUFFIX)
@@ -99,10 +110,33 @@ class StopButton:
         self.end("; ".join([*told, *notes]) or (str(error) if error is not None else ""))
 
     def pressed(self) -> str | None:
-        """Why it was pressed, for ``SafeLink(stop_requested=...)``; None while it was not."""
-        if not self._map[_PRESSED]:
+        """Why to stop, for ``SafeLink(stop_requested=...)``; None while it was not pressed."""
+        if self._calls % _LOOK_EVERY == 0:
+            fault = self._fault()
+            if fault is not None:
+                return fault
+        self._calls += 1
+        if not self._is_pressed():
             return None
         return f"stop requested by {_read_text(self._map, _WHO) or 'an operator'}"
+
+    def _is_pressed(self) -> bool:
+        if not _HAS_LOCKS:  # Windows truncates no file that is mapped
+            return bool(self._map[_PRESSED])
+        return os.pread(self._file, 1, _PRESSED) == b"\1"
+
+    def _fault(self) -> str | None:
+        """Why the file is of no use any more; None if it is sound."""
+        info = os.fstat(self._file)
+        if info.st_size < _BYTES:
+            return f"{self.path}: the stop file was truncated: nobody could stop this run"
+        try:
+            is_there = os.path.samestat(info, os.stat(self.path, follow_symlinks=False))
+        except OSError:
+            is_there = False
+        if not is_there:
+            return f"{self.path}: the stop file was deleted or moved: nobody could stop this run"
+        return None
 
     def end(self, how: str) -> None:
         """Remove the button, and report the end to waiting programs; safe to call twice."""
@@ -110,8 +144,9 @@ class StopButton:
             return
         if _HAS_LOCKS:
             self.path.unlink(missing_ok=True)
-        _write_text(self._map, _END, how)
-        self._map[_ENDED] = 1
+        if os.fstat(self._file).st_size >= _BYTES:
+            _write_text(self._map, _END, how)
+            self._map[_ENDED] = 1
         self._map.close()
         os.close(self._file)
         if not _HAS_LOCKS:  # Windows deletes no open file, also if another program has it open
@@ -193,16 +228,19 @@ def button_folder() -> Path:
     """Return the folder of this user's buttons, made if need be.
 
     Raises:
-        InputError: it is another user's, or others may write to it.
+        InputError: it is another user's, others may write to it, or it cannot be made.
 
     """
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     own = Path(runtime) / "snakewalk" if runtime else None
     if own is None or not own.parent.is_dir():
         own = Path(tempfile.gettempdir()) / f"snakewalk-{_user()}"
-    with suppress(FileExistsError):
-        own.mkdir(mode=0o700)
-    info = own.lstat()
+    try:
+        with suppress(FileExistsError):
+            own.mkdir(mode=0o700)
+        info = own.lstat()
+    except OSError as error:
+        raise InputError(_cannot_be_made(own, error)) from None
     others_write = _HAS_LOCKS and info.st_mode & 0o022
     if not stat.S_ISDIR(info.st_mode) or not _is_mine(info) or others_write:
         raise InputError(
@@ -229,6 +267,24 @@ def stoppable_runs() -> Iterator[PressedButton]:
                 path.unlink(missing_ok=True)
                 button.close()
     yield from sorted(found, key=lambda button: button.since_s, reverse=True)
+
+
+def _refuse_used_urls(ports: Iterable[str]) -> None:
+    urls = {port for port in ports if is_url(port)}
+    for button in stoppable_runs() if urls else ():
+        with button:
+            for url in urls & set(button.run.ports):
+                raise InputError(
+                    f"{url}: the run {button.run.name} (process {button.run.process}) is on it; "
+                    f"stop it by: snakewalk stop --port {url}"
+                )
+
+
+def _cannot_be_made(place: Path, error: OSError) -> str:
+    return (
+        f"{place}: stop buttons cannot be made: {error.strerror}; name another folder by "
+        "XDG_RUNTIME_DIR"
+    )
 
 
 def _is_mine(info: os.stat_result) -> bool:

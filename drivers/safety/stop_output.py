@@ -4,6 +4,7 @@ It is a modem line of a serial port that switches a relay, or a program of the u
 opens the simulated supply instead.
 """
 
+import os
 import shlex
 import subprocess
 from collections.abc import Callable
@@ -90,8 +91,21 @@ class StopCommand(_Plain):
         """The command line."""
         return shlex.join(self.words)
 
+    def __enter__(self) -> Self:
+        """Check that the program can be started.
+
+        Raises:
+            PortError: it does not exist, or is not executable.
+
+        """
+        program = self.words[0]
+        if not Path(program).is_file() or not os.access(program, os.X_OK):
+            what = "is not executable" if Path(program).is_file() else "no such program"
+            raise PortError(f"stop output {self.name}: {what}; name a program that can be started")
+        return self
+
     def activate(self) -> None:
-        """Run the program.
+        """Run the program, in a session of its own: Ctrl-C in the terminal does not end it.
 
         Raises:
             OSError: it cannot be started, does not end within ``PATIENCE_S``, or fails.
@@ -99,7 +113,11 @@ class StopCommand(_Plain):
         """
         try:
             done = subprocess.run(
-                self.words, stdin=subprocess.DEVNULL, timeout=PATIENCE_S, check=False
+                self.words,
+                stdin=subprocess.DEVNULL,
+                timeout=PATIENCE_S,
+                check=False,
+                start_new_session=True,
             )
         except subprocess.TimeoutExpired:
             raise OSError(f"has not ended after {PATIENCE_S:g} s") from None
@@ -167,12 +185,17 @@ def parse_stop_output(text: str) -> StopOutput:
         ValueError: the text has another form.
 
     """
+    if "\0" in text:
+        raise ValueError(f"{text!r}: has a NUL character; leave it out")
     kind, found, rest = text.partition(":")
     line = kind.removeprefix("-")
     if found and rest and line in _LINES:
         return StopLine(rest, line, is_inverted=kind != line)
     if found and kind == "command":
-        words = tuple(shlex.split(rest))
+        try:
+            words = tuple(shlex.split(rest))
+        except ValueError as error:
+            raise ValueError(f"{text!r}: {error}; close the quotation") from None
         if words and Path(words[0]).is_absolute():
             return StopCommand(words)
         raise ValueError(f"{text!r}: the program needs its absolute path")

@@ -1,10 +1,13 @@
 """Placing a body on the ground or in water so that it lies still."""
 
+from dataclasses import dataclass
+from typing import Self
+
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import Water, WorldConfig
@@ -20,6 +23,27 @@ SETTLE_DAMPING_PER_S = 15.0
 """Rate at which motion is damped while the body settles."""
 STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
 SETTLE_MIN_S, SETTLE_MAX_S = 0.3, 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Balls:
+    """The balls of all bellies of a robot's spine."""
+
+    link: Ints
+    """(P,) link of each."""
+    along_m: Floats
+    """(P, 1) position along the link's axis, from its centre."""
+    aside_m: Floats
+    """(P, 1) position across the link's axis."""
+    radius_m: Floats
+    """(P,) radius."""
+
+    @classmethod
+    def of(cls, robot: RobotConfig) -> Self:
+        rows = [belly_points_m(robot, k).reshape(-1, 3) for k in range(robot.link_count)]
+        link = np.repeat(np.arange(robot.link_count), [len(row) for row in rows])
+        along_m, aside_m, _ = np.concatenate(rows).T[..., None]
+        return cls(link, along_m, aside_m, np.array(robot.link_radii_m)[link])
 
 
 def place(
@@ -42,9 +66,10 @@ def place(
     """
     model, data = m.model, m.data
     _pose(m, start_m, heading_rad, joint_rad)
+    balls = _Balls.of(robot)
     if ground is not None:
-        _drape(m, robot, ground)
-    data.qpos[2] -= float(_clearance_m(m, robot, ground).min())
+        _drape(m, robot, ground, balls)
+    data.qpos[2] -= float(_clearance_m(m, robot, ground, balls).min())
     _settle(m)
     data.qvel[:] = 0.0
     m.planes.lay(data)
@@ -70,7 +95,7 @@ def lay_down(
     model, data = m.model, m.data
     time_s = data.time
     _pose(m, start_m, heading_rad, joint_rad)
-    data.qpos[2] -= float(_clearance_m(m, robot, None).min())
+    data.qpos[2] -= float(_clearance_m(m, robot, None, _Balls.of(robot)).min())
     m.planes.lay(data)
     mujoco.mj_forward(model, data)
     m.start_at_rest()
@@ -99,7 +124,7 @@ def float_at(
     mujoco.mj_kinematics(m.model, m.data)
     height = floating_height_m(water, robot.body_radius_m)
     m.data.qpos[2] += height - float(m.data.xipos[1:, 2].mean())
-    if _clearance_m(m, robot, ground).min() < 0.0:
+    if _clearance_m(m, robot, ground, _Balls.of(robot)).min() < 0.0:
         return False
     mujoco.mj_forward(m.model, m.data)
     m.start_at_rest()
@@ -118,7 +143,7 @@ def _pose(
     m.data.qpos[7:] = q
 
 
-def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
+def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls) -> None:
     """Fit height, lean and pitch joints to the ground under the links: Gauss-Newton on clearances.
 
     Clearances are those of the bellies, which bridge a trench and rest on the edge of a step.
@@ -131,7 +156,7 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField) -> None:
     stiff[0] = 0.0
 
     def above_m() -> Floats:
-        clear = _clearance_m(m, robot, ground)
+        clear = _clearance_m(m, robot, ground, balls)
         return clear[np.isfinite(clear)]
 
     for _ in range(DRAPE_ROUNDS):
@@ -166,23 +191,21 @@ def _settle(m: Mechanics) -> None:
             break
 
 
-def _clearance_m(m: Mechanics, robot: RobotConfig, ground: HeightField | None) -> Floats:
+def _clearance_m(
+    m: Mechanics, robot: RobotConfig, ground: HeightField | None, balls: _Balls
+) -> Floats:
     """(L,) height by which each link's belly or foot clears the ground, negative below it.
 
     Infinite for links that support nothing: segments of a leg without a foot, links of length zero.
     """
     mujoco.mj_kinematics(m.model, m.data)
-    spine = robot.link_count
+    spine, link = robot.link_count, balls.link
     axes = np.asarray(m.data.xmat[1 : 1 + spine]).reshape(-1, 3, 3)
-    rows = [belly_points_m(robot, k).reshape(-1, 3) for k in range(spine)]
-    link = np.repeat(np.arange(spine), [len(row) for row in rows])
-    along, aside, _ = np.concatenate(rows).T[..., None]
     # products by hand: BLAS adds in another order on another processor
     centres = m.data.xipos[1 : 1 + spine][link]
-    points = centres + along * axes[link, :, 0] + aside * axes[link, :, 1]
-    radius_m = np.array(robot.link_radii_m)[link]
+    points = centres + balls.along_m * axes[link, :, 0] + balls.aside_m * axes[link, :, 1]
     clear = np.full(m.joint_count + 1, np.inf)
-    np.minimum.at(clear, link, points[:, 2] - _rest_height_m(ground, points, radius_m))
+    np.minimum.at(clear, link, points[:, 2] - _rest_height_m(ground, points, balls.radius_m))
     for foot in foot_geoms(m.model, robot):
         foot_m = m.model.geom_size[foot, :1]
         low = m.data.geom_xpos[foot : foot + 1]

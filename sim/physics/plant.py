@@ -42,7 +42,11 @@ def _pose(place: Floats, pose: Floats) -> None:
 
 
 class MujocoPlant:
-    """A chain on its ground; starts straight at the origin, heading along x, at rest."""
+    """A chain on its ground; starts straight at the origin, heading along x, at rest.
+
+    With ``is_placed=False`` it is nowhere until ``reset`` or ``set_state``; to lie down on hills
+    needs a quarter of a second.
+    """
 
     def __init__(
         self,
@@ -50,6 +54,8 @@ class MujocoPlant:
         world: WorldConfig,
         ground: HeightField | None = None,
         step_s: float | None = None,
+        *,
+        is_placed: bool = True,
     ) -> None:
         self.robot = robot
         self.world = world
@@ -69,7 +75,8 @@ class MujocoPlant:
         self._position_rad: Floats = self._data.qpos[7:]
         self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
-        self._place_body((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
+        if is_placed:
+            self._place_body((0.0, 0.0), 0.0, np.zeros(robot.joint_count))
         self.steps: Steps = make_steps(self.mechanics)
         """The loop that advances the body."""
 

@@ -20,8 +20,8 @@ class PlantTwin:
     """A ``MujocoPlant`` that runs with the robot, without servos of its own."""
 
     def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
-        """Lay a body of ``robot`` on the ground; its servos have torque and the robot's gains."""
-        self._plant = MujocoPlant(robot, world, ground, FLOOR_STEP_S)
+        """Make a body of ``robot``; its servos have torque and the robot's gains."""
+        self._plant = MujocoPlant(robot, world, ground, FLOOR_STEP_S, is_placed=False)
         motors = motors_of(robot)
         self._drive = make_drive(motors, robot.servo.supply_v)
         self._drive.torque_on[:] = 1.0

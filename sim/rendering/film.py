@@ -17,7 +17,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
-from snakewalk.sim.rendering.shade import SoftShade, link_surface_m
+from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m
 from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
 
 SMOOTHING_S = 1.2
@@ -149,7 +149,7 @@ class _Stage:
             look=look,
             fine=style.fine,
             hollow=marks.hollow,
-            shade=True,
+            additions=(add_sheet,),
         )
         self.shade = SoftShade(self.model, ground)
         self._faces = None if look is None else look.faces

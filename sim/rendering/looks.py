@@ -1,7 +1,7 @@
 """The looks of the body and its ground in pictures; they have no effect on the physics."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -16,7 +16,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.physics.body import finish, mjcf
-from snakewalk.sim.rendering.shade import SUN_DIRECTION, add_sheet
+from snakewalk.sim.rendering.shade import SUN_DIRECTION
 
 Rgba = tuple[float, float, float, float]
 BACK: tuple[Rgba, Rgba] = ((0.80, 0.56, 0.20, 1), (0.36, 0.22, 0.11, 1))
@@ -87,13 +87,13 @@ def dressed_model(
     fine: bool = False,
     prints: Sequence[FloorPrint] = (),
     hollow: bool = False,
-    shade: bool = False,
+    additions: Sequence[Callable[[mujoco.MjSpec], None]] = (),
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
     ``look`` is the skin; None is a capsule a link. ``fine`` smooths edges: three times the work of
     a software renderer. ``hollow`` waypoints, of a run whose arrivals are not measured, have a
-    dashed ring and no pole. ``shade`` adds the sheet of a ``SoftShade``.
+    dashed ring and no pole. ``additions`` add to the model before it is compiled.
 
     Raises:
         InputError: the installed MuJoCo cannot edit models.
@@ -115,8 +115,8 @@ def dressed_model(
         _skin(spec, robot)
     else:
         _animal(spec, look)
-    if shade:
-        add_sheet(spec)
+    for add in additions:
+        add(spec)
     _water(spec, world, ground)
     for k, sheet in enumerate(prints):
         _print(spec, f"print{k}", sheet)

@@ -46,7 +46,7 @@ class SoftShade:
 
         The texture changes in the model. ``Offscreen.reload`` passes it to the renderer.
         """
-        place = _under_sun(body_m, self._ground)
+        place = under_sun(body_m, self._ground)
         low, high = place.min(axis=0), place.max(axis=0)
         side_m = 1.25 * float((high - low).max()) + 1e-6
         corner = 0.5 * (low + high - side_m)
@@ -103,7 +103,7 @@ def shade_picture(place: Floats) -> Image:
     return picture
 
 
-def _under_sun(points_m: Floats, ground: HeightField | None) -> Floats:
+def under_sun(points_m: Floats, ground: HeightField | None) -> Floats:
     """(P, 2) where the sun's rays through points (P, 3) meet the ground, nearly."""
     slide = SUN_DIRECTION[:2] / -SUN_DIRECTION[2]
     level = np.zeros(len(points_m))
@@ -157,7 +157,7 @@ def add_shade(
 def _on_ground(links_m: Floats, ground: HeightField | None) -> tuple[Floats, Floats]:
     """Where the sun's rays through (L, 3) points meet the ground, and its normals (L, 3) there."""
     place = np.zeros_like(links_m)
-    place[:, :2] = _under_sun(links_m, ground)
+    place[:, :2] = under_sun(links_m, ground)
     if ground is None:
         return place, np.tile([0.0, 0.0, 1.0], (len(links_m), 1))
     place[:, 2] = ground.elevation_m(place[:, 0], place[:, 1])

@@ -14,6 +14,7 @@ from snakewalk.drivers.types import JointCommand
 
 from .rig import JOINTS, PATIENCE_S, ROBOT, SAFETY, Rig
 from .scenarios import CHANGES, NOISE, plan
+from .sensors import judge_sensors
 
 PERIOD_S = 0.02
 LONGEST_CYCLE_S = PATIENCE_S + 3.0
@@ -26,6 +27,8 @@ _ALARMS = ("does another program write to it", "exchanged")
 """In the reason of a trip that a changed register has caused."""
 _GOAL_ALARMS = ("second master", "ignores sync writes", "writes to it get lost")
 """In the reason of a trip that a goal has caused; noise may cause it, too."""
+_HARMLESS = {"constant velocity", "jumping velocity", "slow adapter"}
+"""Kinds that end no run: they are reported, or need no report."""
 _COMMANDED = "commanded nan"
 """In the reason of the only trip that a sound chain has: its commands are not numbers at times."""
 
@@ -80,7 +83,9 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
     operator looks at the chain and enables it again.
     """
     policy: Policy = "resume" if seed % 2 else "stop"
-    rig = Rig(plan(kinds, seed, cycles * PERIOD_S), policy)
+    faults = plan(kinds, seed, cycles * PERIOD_S)
+    rig = Rig(faults, policy)
+    trips: list[tuple[float, str]] = []
     tally = Tally(scenarios=1)
     rng = random.Random(seed)
     clock = rig.line.clock
@@ -101,6 +106,7 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
             tally.clamped += 0 if verdict is None else int(verdict.clamped.any())
         except SafetyTrippedError:
             tally.trips += 1
+            trips.append((clock.now_s(), str(rig.link.tripped)))
             rig.changes.end(rig.link)
             if _is_false_alarm(kinds, str(rig.link.tripped)):
                 tally.false_alarms += 1
@@ -124,6 +130,12 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
     tally.complaints += [f"{kinds} {seed}: {line}" for line in rig.changes.unnoticed]
     for name in ("noticed", "ended_otherwise"):
         setattr(tally, name, getattr(rig.changes, name))
+    if len(kinds) == 1:
+        sensors = judge_sensors(faults, rig.changes.reports, trips, clock.now_s())
+        tally.noticed += sensors.noticed
+        tally.ended_otherwise += sensors.ended_otherwise
+        tally.unnoticed += len(sensors.unnoticed)
+        tally.complaints += [f"{kinds} {seed}: {line}" for line in sensors.unnoticed]
     for name in ("beyond_limit", "too_fast", "old", "foreign", "not_held"):
         setattr(tally, name, getattr(rig.witness, name))
     tally.complaints += [f"{kinds} {seed}: {line}" for line in rig.witness.complaints]
@@ -152,8 +164,11 @@ def _is_false_alarm(kinds: tuple[str, ...], reason: str) -> bool:
     """Whether a trip of a scenario names what none of its faults can cause."""
     if not kinds:
         return _COMMANDED not in reason
-    alarms = () if CHANGING & set(kinds) else _ALARMS
-    if not (CHANGING | {*NOISE}) & set(kinds):
+    if len(kinds) == 1 and kinds[0] in _HARMLESS:
+        return _COMMANDED not in reason
+    changing = CHANGING | {"constant position", "jumping position"}  # as IDs that are exchanged
+    alarms = () if changing & set(kinds) else _ALARMS
+    if not (CHANGING | {*NOISE, "lost writes"}) & set(kinds):
         alarms += _GOAL_ALARMS
     if kinds == ("dip",):
         alarms += ("supply too low",)

@@ -232,12 +232,15 @@ class Rig:
         self._sent_at_s = 0.0
         self._steady = False
         self._recoveries = 0
+        self._faked_current = np.zeros(JOINTS, np.bool_)
+        """(J,) joints whose current was faked in a reply of this cycle."""
         self._stamp_readings()
         self.line.taps.append(self._overhear)
 
     def read(self) -> JointState:
         """One read under the witness's eyes."""
         self._cycle += 1
+        self._faked_current[:] = False
         before = self._seen
         state = self.link.read()
         self._seen = state
@@ -280,12 +283,15 @@ class Rig:
             sign = np.where(bank["Present Current"] < 0, -1, 1)
             stamp = self._cycle % _STAMPS * 8 + rows + 1
             bank["Present Current"][:] = np.where(firmware.no_output, 0, sign * stamp)
+            firmware._readings.apply()
+            self._faked_current |= self._is_faked("Present Current")
 
         firmware.refresh_motion = stamped  # type: ignore[method-assign]
 
     def _check_values(self, state: JointState, before: JointState | None) -> None:
         stamp = np.rint(np.abs(state.current_a) / self._units.a_per_current).astype(int)
         ok = state.valid & (stamp > 0)  # without an output stage there is no current to stamp
+        ok &= ~self._faked_current
         old = ok & ((stamp - 1) // 8 != self._cycle % _STAMPS)
         foreign = ok & ~old & ((stamp - 1) % 8 != np.arange(JOINTS)) & (not self.clashing)
         self._sin("old", old)
@@ -346,6 +352,7 @@ class Rig:
         far &= torque  # without it a goal counts when torque comes on
         if last is not None:  # the rate may let it come no nearer at once
             far &= np.abs(goal - known) >= np.abs(last - known)
+        far &= ~self._is_faked("Present Position")
         self._sin("beyond_limit", far)
         if last is not None and self._steady:
             dt_s = min(time_s - self._sent_at_s, self.limits.stale_limit_s) + 2e-3
@@ -353,8 +360,13 @@ class Rig:
             # a chain that was interrupted holds: its goals are where its joints are, or just were
             where = [rad for _, rad in self._was_rad]
             held = np.minimum.reduce([np.abs(goal - each) for each in where]) < HELD_RAD
-            self._sin("too_fast", fast & ~held & torque)
+            self._sin("too_fast", fast & ~held & torque & ~self._is_faked("Present Position"))
         self._sent, self._sent_at_s = goal, time_s
+
+    def _is_faked(self, register: str) -> np.ndarray:
+        """(J,) joints whose servos show a constant value: a hold can only use what they show."""
+        rows = self.line.firmware._readings._values.get(register, {})
+        return self._joints(np.isin(np.arange(JOINTS), list(rows)))
 
     def _sin(self, kind: str, bad: np.ndarray) -> None:
         if bad.any():

@@ -24,6 +24,8 @@ WRITES = {
     "direction": ("Drive Mode", (1,)),
     "shutdown": ("Shutdown", (0,)),
     "limits": ("Min Position Limit", (100, 1000)),
+    "hot limit": ("Temperature Limit", (90, 100)),
+    "velocity limit": ("Velocity Limit", (100, 900)),
 }
 """Registers that another program changes while the chain moves, and values that it may write."""
 GOALS = ("second master", "deaf")
@@ -32,8 +34,25 @@ CHANGES = ("exchange", *GOALS, *WRITES)
 OTHERS = ("remounted", "other robot", "cold sensor", "dip")
 """A servo without power gets another zero or direction; the port vanishes and another robot with
 the same IDs comes back; a temperature reads 0; the supply is too low for less than 0.3 s."""
+SENSORS = {
+    "constant current": ("Present Current", (0, 20, -20, 186, -700)),
+    "constant velocity": ("Present Velocity", (0, 100, -100)),
+    "constant position": ("Present Position", (None,)),
+    "constant heat": ("Present Temperature", (0, 60)),
+}
+"""Registers that show a constant value for seconds; None: the value at the beginning."""
+JUMPS = {
+    "jumping current": ("Present Current", (-900, 900)),
+    "jumping velocity": ("Present Velocity", (-300, 300)),
+    "jumping position": ("Present Position", (0, 4095)),
+    "jumping heat": ("Present Temperature", (0, 79)),
+}
+"""Registers that show a wrong value for a moment, again and again, between these limits."""
+LINES = ("lost writes", "slow adapter")
+"""Requests that get lost at a rate that the run tolerates; replies that all come late, in time."""
 BUS = ("heat", "supply", "unplug", "stall", "port")
-KINDS = (*NOISE, *SERVO, "clash", *TRIPS, *BUS, *OTHERS, *CHANGES)
+OLDER = (*NOISE, *SERVO, "clash", *TRIPS, *BUS, *OTHERS, *CHANGES)
+KINDS = (*OLDER, *SENSORS, *JUMPS, *LINES)
 SCENARIOS = ((), *((kind,) for kind in KINDS), *combinations(KINDS, 2))
 """None, each alone, each pair."""
 _EVERY_S = 2.5
@@ -59,6 +78,8 @@ def _how(kind: str, rng: random.Random) -> list[dict[str, Any]]:
     for_s = rng.choice((0.01, 0.03, 0.1, 0.3, 0.8))
     if kind in (*OTHERS, *GOALS):
         return _several(kind, ids, rng)
+    if kind in (*SENSORS, *JUMPS, *LINES):
+        return _newer(kind, ids, rng)
     return [_one(kind, ids, for_s, rng)]
 
 
@@ -83,6 +104,25 @@ def _several(kind: str, ids: list[int], rng: random.Random) -> list[dict[str, An
             return [{"kind": "reading", "ids": ids, **register, "for_s": for_s}]
         case _:
             return [{"kind": "supply", "volts": 9.7, "for_s": rng.choice((0.05, 0.15, 0.25))}]
+
+
+def _newer(kind: str, ids: list[int], rng: random.Random) -> list[dict[str, Any]]:
+    """Sensor faults of one servo, and faults of the line that the run tolerates."""
+    reading = {"kind": "reading", "ids": ids[:1]}
+    if kind in SENSORS:
+        register, values = SENSORS[kind]
+        return [{**reading, "register": register, "value": rng.choice(values), "for_s": 2.5}]
+    if kind in JUMPS:
+        register, (low, high) = JUMPS[kind]
+        times = sorted(rng.uniform(0.0, 1.2) for _ in range(rng.randint(3, 12)))
+        values = [rng.randint(low, high) for _ in times]
+        return [
+            {**reading, "register": register, "value": value, "at_s": at_s, "for_s": 0.02}
+            for at_s, value in zip(times, values, strict=True)
+        ]
+    if kind == "lost writes":
+        return [{"kind": "drop", "of": "questions", "chance": 0.1, "for_s": 1.0}]
+    return [{"kind": "delay", "by_s": rng.choice((5e-4, 1e-3, 1.5e-3)), "for_s": 2.0}]
 
 
 def _one(kind: str, ids: list[int], for_s: float, rng: random.Random) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import get_args
 
+import pytest
 from pytest_mock import MockerFixture
 
 from benchmarks.bus_fault_scenarios import SCENARIOS
@@ -11,7 +12,7 @@ from snakewalk.config import faults as plan
 
 
 def _named(name: str, tmp_path: Path) -> Result:
-    (scenario,) = [each for each in SCENARIOS if each.name.startswith(name)]
+    scenario = next(each for each in SCENARIOS if each.name.startswith(name))
     return try_scenario(scenario, tmp_path)
 
 
@@ -49,3 +50,24 @@ def test_a_report_of_a_sound_bus_is_counted(mocker: MockerFixture) -> None:
     (bus,) = sound_buses(1, 20)
     assert isinstance(bus, Sound)
     assert bus.alarms
+
+
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [
+        ("`reading`: current always 186, and `no_output`, amplitude 0.18", 40),
+        ("`reading`: current always 186, pitch joint, and `no_output`", 150),
+    ],
+)
+def test_a_dead_output_stage_behind_a_dead_current_sensor_ends_the_run(
+    name: str, limit: int, tmp_path: Path
+) -> None:
+    result = _named(name, tmp_path)
+    assert result.ended_by == "current at an error"
+    assert result.ended_after is not None
+    assert result.ended_after < limit
+
+
+def test_a_dead_current_sensor_of_a_joint_that_follows_is_reported(tmp_path: Path) -> None:
+    result = _named("`reading`: current always 186", tmp_path)
+    assert (result.detected_by, result.outcome) == ("motion sensors", "reported; goes on")

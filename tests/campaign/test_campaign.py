@@ -17,7 +17,7 @@ from . import rig
 from .campaign import Tally, campaign, run_scenario
 from .report import table
 from .rig import JOINTS, ROBOT, Rig
-from .scenarios import CHANGES, KINDS, OTHERS, SCENARIOS, WRITES, plan
+from .scenarios import CHANGES, JUMPS, KINDS, LINES, OTHERS, SCENARIOS, SENSORS, WRITES, plan
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -59,6 +59,18 @@ def test_a_temperature_that_is_not_reported_is_counted(mocker: MockerFixture) ->
     mocker.patch("snakewalk.drivers.chain.servo_chain.TemperatureSensors.update", return_value=[])
     mocker.patch.object(rig, "NOTICED_CYCLES", 10)
     assert run_scenario(("cold sensor",), 1, 200).unnoticed
+
+
+@pytest.mark.parametrize("seed", [40000, 40001])
+def test_a_constant_current_is_named(seed: int) -> None:
+    tally = run_scenario(("constant current",), seed, 240)
+    assert tally.noticed
+    assert tally.complaints == []
+
+
+def test_a_dead_sensor_that_is_not_reported_is_counted(mocker: MockerFixture) -> None:
+    mocker.patch("snakewalk.drivers.chain.servo_chain.MotionSensors.update", return_value=[])
+    assert run_scenario(("constant velocity",), 40000, 240).unnoticed
 
 
 def test_a_supply_that_is_too_low_for_a_moment_ends_no_run() -> None:
@@ -112,7 +124,7 @@ def test_some_pairs_of_faults() -> None:
 def test_all_kinds_and_all_pairs_are_in_the_campaign() -> None:
     assert len(SCENARIOS) == 1 + len(KINDS) + len(KINDS) * (len(KINDS) - 1) // 2
     known = str(FaultPlan.model_json_schema())
-    several = {*WRITES, *OTHERS, "second master"}
+    several = {*WRITES, *OTHERS, "second master", *SENSORS, *JUMPS, *LINES}
     assert all(f"'{kind}'" in known for kind in {*KINDS, "write", "reading"} - several)
     assert all(plan((kind,), 0, 5.0).fault for kind in KINDS)
 

@@ -32,7 +32,9 @@ TARGETS = {
         "test_safety_vet.py",
         "test_safe_link.py",
     ),
-    "snakewalk.drivers.safety.following_error": ("test_following_error.py",),
+    "snakewalk.drivers.safety.following_error": (
+        *("test_following_error.py", "test_constant_current.py"),
+    ),
     "snakewalk.drivers.safety.measured_step": ("test_measured_step.py",),
     "snakewalk.drivers.chain.goal_check": ("test_goal_check_edges.py",),
     "snakewalk.drivers.chain.fingerprint": ("test_fingerprint.py",),

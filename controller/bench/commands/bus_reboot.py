@@ -23,9 +23,8 @@ def reboot(
     facts: dict[str, object] = {}
     with open_lines(port, baud) as lines:
         buses = {each: lines.open_servo(each) for each in servo_id}
-        if yes or confirmed(
-            as_json, "torque goes off, and a load that these servos hold falls; reboot them?"
-        ):
+        question = "torque goes off, and a load that these servos hold falls; reboot them?"
+        if yes or confirmed("bus reboot", question, as_json=as_json):
             for each, bus in buses.items():
                 before, after = restart(bus, each)
                 facts[f"ID {each}"] = (

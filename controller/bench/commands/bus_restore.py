@@ -51,7 +51,11 @@ def restore(
                 for change in changes:
                     table.add_row(str(each), change.register, str(change.before), str(change.after))
             console.print(table if changed else "nothing to restore")
-        written = bool(changed) and not dry_run and (yes or confirmed(as_json))
+        written = (
+            bool(changed)
+            and not dry_run
+            and (yes or confirmed("bus restore", "write this?", as_json=as_json))
+        )
         if written:
             for each, changes in changed.items():
                 apply(buses[each], each, changes)

@@ -189,6 +189,7 @@ def _print_counts(traffic: LiveTable, server: "PtyServer") -> None:
         "answers": traffic.answers,
         "bytes": traffic.bytes,
         "missed_s": server.missed_s,
+        "latest_s": server.latest_s,
         "output_flushes": server.output_flushes,
     }
     print(json.dumps(counts | {"servos": traffic.registers()}), flush=True)

@@ -77,7 +77,11 @@ def bus_set(
         changes = plan(bus, servo_id, request)
         if not as_json:
             _show(servo_id, bus.table.model, changes)
-        written = bool(changes) and not dry_run and (yes or confirmed(as_json))
+        written = (
+            bool(changes)
+            and not dry_run
+            and (yes or confirmed("bus set", "write this?", as_json=as_json))
+        )
         if written:
             apply(bus, servo_id, changes)
             if file is not None and not note_changes(file, servo_id, changes):

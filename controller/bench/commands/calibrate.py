@@ -131,7 +131,9 @@ def _check_options(out: Path, current: float, *, homing_offset: bool, yes: bool)
     if not 0.0 < current <= 2.0:
         raise InputError(f"--current {current:g}: over 0 and at most 2 A")
     if homing_offset and not yes and not sys.stdin.isatty():
-        raise InputError("--homing-offset: asks before it writes, and nobody is there: say --yes")
+        raise InputError(
+            "calibrate --homing-offset asks first, but there is no terminal; add --yes"
+        )
     if yes and not homing_offset:
         raise InputError("--yes: goes with --homing-offset; the robot's file is always written")
 

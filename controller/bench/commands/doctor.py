@@ -1,7 +1,6 @@
 """``snakewalk doctor``: is this bus fit for a run, and what is to be done if not."""
 
 import json
-import sys
 from typing import Annotated
 
 import typer
@@ -10,6 +9,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.bench.adapter import permission
+from snakewalk.controller.bench.commands.bus_options import confirmed
 from snakewalk.controller.bench.doctor import examine, examine_segments
 from snakewalk.controller.bench.fingerprints import (
     differences,
@@ -152,7 +152,9 @@ def _accept(
     changed = differences(robot, known, found)
     for line in () if as_json else changed:
         typer.echo(line)
-    is_written = bool(changed) and (yes or _confirmed(file, as_json))
+    is_written = bool(changed) and (
+        yes or confirmed("doctor --accept", f"write this into {file.path}?", as_json=as_json)
+    )
     if is_written:
         file.write(found)
     if as_json:
@@ -162,9 +164,3 @@ def _accept(
         typer.echo(f"the servos are as in {file.path}")
     else:
         typer.echo(f"{file.path}: {'written' if is_written else 'nothing written'}")
-
-
-def _confirmed(file: FingerprintFile, as_json: bool) -> bool:
-    if as_json or not sys.stdin.isatty():
-        raise InputError("--accept: asks before it writes, and nobody is there; add --yes")
-    return typer.confirm(f"write this into {file.path}?", default=False, err=True)

@@ -8,7 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
-from snakewalk.controller.capture.film_parts import FilmParts
+from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, PartFolder
 from snakewalk.controller.capture.several.blobs import (
     Blobs,
     blobs_of,
@@ -97,25 +97,68 @@ def find_animals(
     return AnimalsFound(tuple(kept), len(every) - len(kept), usual, count)
 
 
-def capture_animals(
-    frames: Iterable[DeepImage],
-    detector: BodyDetector,
+def films_of(
     found: AnimalsFound,
     rate_hz: float,
-    *,
     name: str,
+    folder: PartFolder | None = None,
+    *,
+    resume: bool = False,
+    part_frames: int = PART_FRAMES,
+) -> list[FilmParts]:
+    """One film for each animal, with the parts that an interrupted capture has finished.
+
+    Raises:
+        InputError: a finished part is damaged.
+
+    """
+    out = []
+    for number in range(1, len(found.identities) + 1):
+        own = None if folder is None else folder.of_animal(number)
+        finished = [] if own is None or not resume else own.parts()
+        out.append(
+            FilmParts(
+                rate_hz,
+                found.frames,
+                f"{name}: animal {number}",
+                folder=own,
+                finished=finished,
+                part_frames=part_frames,
+            )
+        )
+    return out
+
+
+def capture_animals(
+    frames: Callable[[int], Iterable[DeepImage]],
+    detector: BodyDetector,
+    found: AnimalsFound,
+    films: Sequence[FilmParts],
+    *,
     on_progress: Callable[[], None] | None = None,
 ) -> list[CapturedAnimal]:
-    """Capture each animal as if it were alone; frames in which it is not alone have no points."""
+    """Capture each animal as if it were alone; frames in which it is not alone have no points.
+
+    Args:
+        frames: the frames from a number on.
+        detector: from ``detector_of_several``.
+        found: the animals.
+        films: from ``films_of``; frames of their finished parts are not captured again.
+        on_progress: called after each frame.
+
+    """
     plans = [_plan(one, found.frames) for one in found.identities]
-    films = [
-        FilmParts(rate_hz, found.frames, f"{name}: animal {number}")
-        for number in range(1, len(plans) + 1)
-    ]
-    for number, frame in enumerate(frames):
+    before = [one.done_frames for one in films]
+    first = min(before)
+    if on_progress is not None:
+        for _ in range(first):
+            on_progress()
+    for number, frame in enumerate(frames(first), start=first):
         ground = detector.ground_of(frame)
         blobs = blobs_of(frame, ground, detector, found.usual_px)
-        for plan, film in zip(plans, films, strict=True):
+        for plan, film, finished in zip(plans, films, before, strict=True):
+            if number < finished:
+                continue
             here = plan[number]
             if isinstance(here, FrameStatus):
                 film.skip(here)

@@ -6,8 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture import capturing
 from snakewalk.controller.capture.capture import CaptureFile
-from snakewalk.controller.capture.capturing import CaptureFacts, facts_of, marker_scale
+from snakewalk.controller.capture.capturing import (
+    CaptureFacts,
+    facts_of,
+    marker_scale,
+    part_folder,
+)
 from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import AUTO, CaptureOptions, check_options, track_files
@@ -18,6 +24,7 @@ from snakewalk.controller.capture.several.animal_films import (
     AnimalsFound,
     CapturedAnimal,
     capture_animals,
+    films_of,
     find_animals,
 )
 from snakewalk.controller.capture.several.blobs import detector_of_several
@@ -65,6 +72,8 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
 
     """
     check_options(options)
+    folder = part_folder(options)
+    folder.start(resume=options.resume, force=options.force)
     wanted = None if options.animals in {None, AUTO} else int(str(options.animals))
     if wanted is not None:
         refuse_to_overwrite(track_files(options, wanted), options.force)
@@ -90,16 +99,19 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
         )
         refuse_to_overwrite(track_files(options, len(found.identities)), options.force)
         bar.update(0, count, description="frames")
-        animals = capture_animals(
-            film.frames(),
-            detector,
+        films = films_of(
             found,
             film.footage.rate_hz,
-            name=name,
-            on_progress=bar.advance,
+            name,
+            folder,
+            resume=options.resume,
+            part_frames=capturing.PART_FRAMES,
         )
+        with folder.kept_if_interrupted():
+            animals = capture_animals(film.frames, detector, found, films, on_progress=bar.advance)
         held = _files(options, film, detector, animals)
         _write(options, film, held, bar, scale)
+    folder.clear()
     facts = _facts(options, film, detector, found, animals, held)
     _warn(options, facts)
     return facts

@@ -27,6 +27,9 @@ _STRETCH = 5  # stations that are averaged
 _ONE_SIDE, _BOTH_SIDES = 25, 10  # stations of a stretch that does not stand out
 _KNOWN = 0.4  # of the stations: with fewer that show ground a side is not judged
 _BEYOND = 0.5  # of the contrast at a tip: with more contrast beyond the tip the body goes on
+_FAINT_SAMPLE, _FEWEST_FAINT = 40, 6  # frames in which faint parts beyond a tip are searched
+_FAINT_BEYOND = 0.035  # of the usual contrast: something faint goes on beyond a tip
+_SAME_TIP = 0.85  # of these frames: beyond the same tip
 _LENGTH, _SPREADS = 0.08, 6.0  # of the usual length; standard deviations
 _FEWEST = 5
 _CONTRADICTS = 0.2  # margin of the ends from which one frame says which is which
@@ -71,6 +74,40 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
         if status is not FrameStatus.GOOD:
             out[k] = no_skeleton(status)
     return out
+
+
+def goes_on_faintly(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
+    """Whether something faint goes on beyond the same tip in most frames of a film.
+
+    The check of a single frame finds only strong parts. Noise and stains of the ground are alike
+    beyond both tips, so the difference between the tips over many frames shows a faint tail.
+
+    Args:
+        skeletons: (T) head first, those of ``verified``.
+        store: the frames.
+
+    """
+    used = [k for k, one in enumerate(skeletons) if one.status.has_points]
+    some = used[:: max(1, -(-len(used) // _FAINT_SAMPLE))]
+    profiles = [one for k in some if (one := _profile(skeletons[k], store, k)) is not None]
+    usual = _usual(profiles)
+    if usual is None:
+        return False
+    beyond = np.array([_along_a_ray(one.rings @ usual.direction) for one in profiles])
+    apart = (beyond[:, 1] - beyond[:, 0])[np.isfinite(beyond).all(axis=1)]
+    if len(apart) < _FEWEST_FAINT:
+        return False
+    middle = float(np.median(apart))
+    same = float(np.mean(np.sign(apart) == np.sign(middle)))
+    least = max(_LEAST_LEVELS, _FAINT_BEYOND * float(usual.contrast.mean()))
+    return same >= _SAME_TIP and abs(middle) > least
+
+
+def _along_a_ray(rings: Floats) -> Floats:
+    """(2,) contrast that goes on through all rings (2, rings, angles) in one direction."""
+    known = np.isfinite(rings).any(axis=2)
+    lowest = np.nanmin(np.where(known[..., None], rings, np.inf), axis=1)
+    return np.where(known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan)
 
 
 def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:

@@ -42,6 +42,12 @@ def crowd(
             "--detail/--no-detail", help="reduce detail with distance and skip hidden animals"
         ),
     ] = True,
+    separate: Annotated[
+        bool,
+        typer.Option(
+            "--separate/--no-separate", help="let an animal wait instead of entering another one"
+        ),
+    ] = True,
     seed: Annotated[int, typer.Option(min=0, help="seed of places, sizes and choices")] = 0,
     force: Force = False,
     as_json: Json = False,
@@ -55,7 +61,9 @@ def crowd(
     ground = build_ground(place)
     if ground is None:
         raise InputError(f"world {place.name}: has no hills; there are jacksboro-basin and others")
-    scene = CrowdScene(repertoire, robot, ground, bodies, seed=seed, detail=detail)
+    scene = CrowdScene(
+        repertoire, robot, ground, bodies, seed=seed, detail=detail, separate=separate
+    )
     with atomic_write(out) as part, ProgressBar("film", seconds * FPS, transient=True) as bar:
         frames = film_crowd(
             scene,

@@ -20,17 +20,15 @@ from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.truth import TruthLog
-from snakewalk.sim.feetech.line import FeetechLine
-from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import Plant
-from snakewalk.sim.serve.bench_line import feetech_line
 from snakewalk.sim.serve.watched_plant import WatchedPlant
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import motors_of
 from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 if TYPE_CHECKING:
+    from snakewalk.sim.feetech.line import FeetechLine
     from snakewalk.sim.imu import Imu
     from snakewalk.sim.physics.plant import MujocoPlant
 
@@ -85,23 +83,12 @@ def simulated_line(
     deviation: Deviation = NO_DEVIATION,
     imu: "Imu | None" = None,
     baud: int | None = None,
-) -> SimLine | FeetechLine:
+) -> "SimLine | FeetechLine":
     """Return the robot's servos on the shafts of a body, behind a simulated line."""
     rate = baud or robot.servo.baud
     facts = robot.servo_records[0]
     if facts.protocol == "feetech":
-        servos = FeetechServos(
-            robot.servo_ids,
-            plant,
-            facts,
-            robot.servo.supply_v,
-            deviation.mounting(robot),
-            motors_of(robot),
-        )
-        feetech = feetech_line(servos, rate)
-        if deviation.torque is not None:
-            servos.drive.torque_constant_n_m_a[:] *= deviation.torque
-        return feetech
+        return _feetech_line(robot, plant, deviation, rate)
     line = SimLine(
         ServoBank(robot.servo_ids, robot.servo_records, rate),
         plant,
@@ -114,6 +101,25 @@ def simulated_line(
     if deviation.torque is not None:
         line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque
     return line
+
+
+def _feetech_line(
+    robot: RobotConfig, plant: Plant, deviation: Deviation, baud: int
+) -> "FeetechLine":
+    from snakewalk.sim.feetech.servos import FeetechServos  # noqa: PLC0415  loops that few robots use
+    from snakewalk.sim.serve.bench_line import feetech_line  # noqa: PLC0415  loops that few robots use
+
+    servos = FeetechServos(
+        robot.servo_ids,
+        plant,
+        robot.servo_records[0],
+        robot.servo.supply_v,
+        deviation.mounting(robot),
+        motors_of(robot),
+    )
+    if deviation.torque is not None:
+        servos.drive.torque_constant_n_m_a[:] *= deviation.torque
+    return feetech_line(servos, baud)
 
 
 class ServedRobot:
@@ -132,7 +138,8 @@ class ServedRobot:
         self._robot, self._deviation = robot, deviation
         ground = build_ground(world)
         self.body: MujocoPlant = physics.MujocoPlant(
-            deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s
+            *(deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s),
+            is_placed=False,
         )
         straight = (0.0,) * robot.joint_count
         servo_rad = np.array(straight if place.joint_rad is None else place.joint_rad)

@@ -9,6 +9,7 @@ import pytest
 from snakewalk.controller.cli.main import main
 from snakewalk.drivers.chain.fingerprint import FINGERPRINT
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
+from snakewalk.drivers.protocol.control_table import load_control_table
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.line_port import OpenedLine, line_port
@@ -74,9 +75,13 @@ def test_bus_set_shows_asks_and_writes(
 ) -> None:
     words = ("bus", "set", "--port", device, "--id", "16", "--new-id", "40")
     code, out, err = call(monkeypatch, capsys, *words)
-    assert code == 0
-    assert "nothing written" in out
-    assert "say --yes" in err
+    assert code == 2  # 0 although it had done nothing
+    assert "ID" in out
+    assert "bus set asks first, but there is no terminal; nothing is changed; add --yes" in err
+    assert line.bank["ID"][15] == 16
+    code, out, err = call(monkeypatch, capsys, *words, "--json")
+    assert (code, out) == (2, "")
+    assert "--json is for programs" in err
     code, out, _ = call(monkeypatch, capsys, *words, "--dry-run", "--yes", "--json")
     assert not json.loads(out)["written"]
     assert line.bank["ID"][15] == 16
@@ -134,7 +139,10 @@ def robot_file(tmp_path: Path, line: OpenedLine) -> Path:
     path = tmp_path / "mine.toml"
     path.write_text('name = "mine"\njoint_axes = "yyyyyyyyyyyyyyyy"\n', encoding="utf-8")
     bank = line.bank
-    known = {i: {n: int(bank[n][i - 1]) for n in FINGERPRINT} for i in range(1, 17)}
+    known = {
+        i: {n: int(bank[n][i - 1]) for n in FINGERPRINT if n in load_control_table("XM430-W350")}
+        for i in range(1, 17)
+    }
     FingerprintFile(path).write(known)
     return path
 

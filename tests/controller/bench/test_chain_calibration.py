@@ -340,7 +340,7 @@ def test_zeros_go_into_the_servos_and_the_file_has_none(trio: Trio) -> None:
 
 
 def test_nothing_moves_where_nobody_can_say_yes(trio: Trio) -> None:
-    assert "say --yes" in str(trio("--homing-offset").exception)
+    assert "add --yes" in str(trio("--homing-offset").exception)
     assert "goes with --homing-offset" in str(trio("--yes").exception)
     assert trio.line.clock.now_s() == 0.0
     assert not list(trio.folder.glob("mine*"))

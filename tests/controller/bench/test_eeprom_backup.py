@@ -68,7 +68,8 @@ def test_what_was_set_comes_back_and_nothing_else_is_touched(
         "3": {"Homing Offset": [0, -200]},
     }
     assert bank["Homing Offset"].tolist() == [0, 0]
-    assert call("restore", file)[0] == 0  # nobody to ask: nothing is written
+    assert "bus restore asks first" in str(call("restore", file)[2])  # nobody to ask
+    assert "--json is for programs" in str(call("restore", file, "--json")[2])
     assert bank["Homing Offset"].tolist() == [0, 0]
     assert call("restore", file, "--id", 3, "--yes")[0] == 0
     assert bank["Homing Offset"].tolist() == [0, -200]
@@ -104,7 +105,7 @@ def test_a_file_that_is_not_of_these_servos_is_refused_before_anything_is_writte
 def test_a_reboot_clears_an_alarm_and_asks_first(line: SimLine, call: Call) -> None:
     line.bank["Hardware Error Status"][0] = 0x20
     line.bank["Torque Enable"][1] = 1
-    assert call("reboot", "--id", 7)[0] == 0  # nobody to ask
+    assert "bus reboot asks first" in str(call("reboot", "--id", 7)[2])  # nobody to ask
     assert line.bank["Hardware Error Status"][0] == 0x20
     code, out, _ = call("reboot", "--id", 7, "--yes")
     assert code == 0

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from benchmarks.crossings import compare, identities_in
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture import capturing
 from snakewalk.controller.capture.capture import capture, load_capture, save_capture
+from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
 from snakewalk.controller.capture.several.tracklets import Tracklet
-from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.body_detector import Detection, make_detector
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_file
@@ -169,3 +171,40 @@ def test_what_does_not_fit_several_animals_is_rejected(
     with pytest.raises(InputError, match="--review"):
         capture_several(replace(plain, output=tmp_path / "t.csv", review=tmp_path / "r.html"))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_capture_of_several_animals_is_continued(
+    dish: tuple[Path, AnimalsFacts], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(capturing, "PART_FRAMES", 6)
+    folder, facts = dish
+    plain = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz", animals="2")
+    seen: list[int] = []
+    add, most = FilmParts.add, [18]
+
+    def counted(self: FilmParts, frame: DeepImage, detection: Detection) -> None:
+        if len(seen) == most[0]:
+            raise KeyboardInterrupt
+        seen.append(0)
+        add(self, frame, detection)
+
+    monkeypatch.setattr(FilmParts, "add", counted)
+    with pytest.raises(KeyboardInterrupt) as stop:
+        capture_several(plain)
+    assert "continue by --resume" in stop.value.__notes__[0]
+    with pytest.raises(InputError, match="its capture has other values of animals"):
+        capture_several(replace(plain, resume=True, animals="auto"))
+    seen.clear()
+    most[0] = 10**6
+    again = capture_several(replace(plain, resume=True))
+    used = [one.capture.frames_used for one in again.animals if one.capture is not None]
+    assert len(used) == 2
+    assert len(seen) < sum(used), "finished parts are not captured again"
+    assert not (tmp_path / "t.npz.part").exists()
+    for number, one in enumerate(facts.animals, start=1):
+        assert one.capture is not None
+        before = load_capture(Path(one.capture.track)).captured
+        after = load_capture(tmp_path / f"t-{number}.npz").captured
+        both = before.used & after.used
+        assert both.sum() >= before.used.sum() - 2
+        assert float(np.abs(after.points_px - before.points_px)[both].max()) < 1.0

@@ -278,7 +278,7 @@ ROWS = [
     ),
     ("calibrate -o file.txt --port /dev/nosuch", "file.txt: a robot's file ends in .toml"),
     ("calibrate -o r.toml --port /dev/nosuch --current -1", "over 0 and at most 2 A"),
-    ("calibrate -o r.toml --port /dev/nosuch --homing-offset", "nobody is there: say --yes"),
+    ("calibrate -o r.toml --port /dev/nosuch --homing-offset", "there is no terminal; add --yes"),
     ("calibrate -o r.toml --port /dev/nosuch --yes", "--yes: goes with --homing-offset"),
     ("bus backup -o file.txt --port /dev/nosuch", "file.txt: exists; --force overwrites it"),
     ("bus backup -o a.json --port /dev/nosuch", "/dev/nosuch: no such port"),

@@ -75,6 +75,13 @@ def noted(found: FileMap, words: str) -> bool:
 UTM = CRS.from_epsg(32632).to_wkt()
 
 
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read intact files here; the command and the broken files show the process of its own."""
+    monkeypatch.setattr(las_file, "run_child", lambda words: json.loads(child(words)))
+
+
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("ending", ["las", "laz"])
 def test_the_points_of_the_ground_are_used_and_the_others_counted(
     tmp_path: Path, ending: str
@@ -91,6 +98,7 @@ def test_the_points_of_the_ground_are_used_and_the_others_counted(
     assert everything.relief_m > 290.0
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_without_a_class_of_ground_all_but_noise_counts(tmp_path: Path) -> None:
     points, kinds = cloud()
     kinds = np.where(kinds == 2, 1, kinds)
@@ -99,6 +107,7 @@ def test_without_a_class_of_ground_all_but_noise_counts(tmp_path: Path) -> None:
     assert noted(found, "left out: 60 of class 7 (low noise); --classes chooses")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_withheld_points_are_left_out(tmp_path: Path) -> None:
     points, _ = cloud()
     held_back = np.zeros(COUNT, bool)
@@ -107,6 +116,7 @@ def test_withheld_points_are_left_out(tmp_path: Path) -> None:
     assert noted(read(file, height="lowest"), "50 withheld points are left out")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_units_are_those_that_the_file_states(tmp_path: Path) -> None:
     points, _ = cloud()
     kinds = np.full(COUNT, 2)
@@ -143,6 +153,7 @@ def test_units_are_those_that_the_file_states(tmp_path: Path) -> None:
     assert read(degrees).size_m == pytest.approx((40 * 0.7885, 30 * 1.1113), rel=1e-2)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_file_without_a_system_is_asked_about(tmp_path: Path) -> None:
     points, kinds = cloud()
     file = write(tmp_path / "a.las", points, kinds)
@@ -152,6 +163,7 @@ def test_a_file_without_a_system_is_asked_about(tmp_path: Path) -> None:
     assert read(file, unit="ft").size_m == pytest.approx((40 * 0.3048, 30 * 0.3048), rel=1e-2)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_web_mercator_points_have_true_lengths(tmp_path: Path) -> None:
     points, kinds = cloud()
     file = write(
@@ -163,6 +175,7 @@ def test_web_mercator_points_have_true_lengths(tmp_path: Path) -> None:
     assert noted(found, "the projection has no true lengths")
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_crop_is_cut_while_the_file_is_read(tmp_path: Path) -> None:
     points, kinds = cloud()
     file = write(tmp_path / "a.laz", np.add(points, [5e5, 4e6, 0]), kinds, wkt=UTM)
@@ -172,11 +185,11 @@ def test_a_crop_is_cut_while_the_file_is_read(tmp_path: Path) -> None:
         read(file, crop=(100.0, 100.0, 110.0, 110.0))
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_too_many_points_are_asked_to_be_cropped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(las_file, "MOST_POINTS", 1000)
-    monkeypatch.setattr(las_file, "run_child", lambda words: json.loads(child(words)))
     points, kinds = cloud()
     file = write(tmp_path / "a.laz", points, kinds, wkt=UTM)
     with pytest.raises(InputError, match="over 1000 points are left of 6000: --crop a part"):

@@ -61,7 +61,7 @@ def test_the_start_into_the_first_shape_is_no_distance(record: RunRecord) -> Non
     assert first > 20
     swung_m = pose.centre_m.copy()
     rest = np.arange(first - 10)
-    swung_m[rest, 1] += 0.3 * np.sin(0.15 * rest)  # as a delay that is not known yet
+    swung_m[rest, 1] += 0.3 * np.sin(0.05 * rest)  # as a delay that is not known yet
     swung = dataclasses.replace(record, pose=dataclasses.replace(pose, centre_m=swung_m))
     assert travelled_m(swung.pose) > travelled_m(pose) + 0.2
     assert summary(swung).travelled_m == pytest.approx(summary(record).travelled_m, rel=0.01)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record_action
 from snakewalk.controller.repertoire.replay import replay, replay_all
 from snakewalk.controller.repertoire.secondary import SecondaryController
 
@@ -153,6 +155,22 @@ def test_no_turn_changes_the_direction_of_travel(
     control = SecondaryController(repertoire)
     assert repertoire.segments[control.nearest(*asked)].name == name
     assert control.missing(*asked) == missing
+
+
+def test_slow_turns_and_turns_of_a_body_that_goes_backward(repertoire: Repertoire) -> None:
+    slow = tuple(one for one in ACTIONS if one.frequency_hz == 0.4)
+    robot, world = load_robot("yaw16"), load_world("flat")
+    more = tuple(record_action(robot, world, one) for one in slow)
+    both = replace(repertoire, segments=repertoire.segments + more)
+    assert not both.contradictions()
+    control = SecondaryController(both)
+    asked = [(0.3, 0.3), (0.3, -0.3), (-0.3, 0.3), (-0.3, -0.3), (-0.4, 0.0), (0.6, 0.4)]
+    chosen = [both.segments[control.nearest(*one)].name for one in asked]
+    assert chosen == [
+        *("left-slow", "right-slow", "reverse-left", "reverse-right", "reverse", "left-gentle"),
+    ]
+    assert [control.missing(*one) for one in asked] == [""] * 6
+    assert all(0.15 < abs(segment.turn_rad_s) < 0.5 for segment in more)
 
 
 def test_a_repertoire_without_a_direction_never_goes_the_other_way(repertoire: Repertoire) -> None:

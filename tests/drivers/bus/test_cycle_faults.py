@@ -224,6 +224,35 @@ def test_a_dead_line_costs_a_bounded_time(servos: Servos) -> None:
     assert port.clock.now_s() == pytest.approx(wire_s + 2 * 0.004)
 
 
+@pytest.mark.parametrize("is_fast", [True, False])
+@pytest.mark.parametrize("silent_reads", [1, 3, 5, 7])
+def test_the_first_reply_after_silent_reads_of_all_servos_is_accepted(
+    servos: Servos, silent_reads: int, *, is_fast: bool
+) -> None:
+    """After three silent plain reads the next request had the length of a pending reply."""
+    cycle = ControlCycle(ScriptedPort(servos), IDS, fast=is_fast)
+    cycle.read()
+    servos.silent = set(IDS)
+    for _ in range(silent_reads):
+        assert not cycle.read().valid.any()
+    servos.silent = set()
+    reply = cycle.read()
+    assert reply.valid.all()
+    assert (reply.data == servos.asked).all()
+
+
+@pytest.mark.parametrize("silent_reads", [8, 30, 70])
+def test_a_long_silence_costs_one_reply_at_most(servos: Servos, silent_reads: int) -> None:
+    cycle = ControlCycle(ScriptedPort(servos), IDS, fast=False)
+    servos.silent = set(IDS)
+    for _ in range(silent_reads):
+        assert not cycle.read().valid.any()
+    servos.silent = set()
+    first, second = cycle.read(), cycle.read()
+    assert first.valid.all() or not first.valid.any()
+    assert second.valid.all()
+
+
 def test_noise_in_front_of_a_reply_does_not_cost_it(servos: Servos) -> None:
     port = ScriptedPort(servos)
     cycle = ControlCycle(port, IDS, fast=False)

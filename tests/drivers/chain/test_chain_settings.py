@@ -233,6 +233,10 @@ FINGERPRINT_CHANGES = [
     ("Min Position Limit", 2000, "Min Position Limit is 2000"),
     ("PWM Limit", 300, "PWM Limit is 300, was 885"),
     ("Current Limit", 100, "Current Limit is 100, was 1193"),
+    ("Velocity Limit", 900, "Velocity Limit is 900, was 200"),
+    ("Temperature Limit", 100, "Temperature Limit is 100, was 80"),
+    ("Min Voltage Limit", 96, "Min Voltage Limit is 96, was 95"),
+    ("Max Voltage Limit", 155, "Max Voltage Limit is 155, was 160"),
 ]
 
 

@@ -54,6 +54,10 @@ def test_a_missing_file_is_created_and_reported_once(line: SimLine, file: Finger
         ("Drive Mode", 1, "Drive Mode is 1, was 0: it turns the other way round"),
         ("Current Limit", 500, "Current Limit is 500, was 1193"),
         ("PWM Limit", 500, "PWM Limit is 500, was 885"),
+        ("Velocity Limit", 900, "Velocity Limit is 900, was 200"),
+        ("Temperature Limit", 100, "Temperature Limit is 100, was 80"),
+        ("Min Voltage Limit", 100, "Min Voltage Limit is 100, was 95"),
+        ("Max Voltage Limit", 150, "Max Voltage Limit is 150, was 160"),
     ],
 )
 def test_a_servo_that_differs_from_the_last_start_is_refused_before_torque(
@@ -91,6 +95,24 @@ def test_a_servo_that_is_new_is_added(line: SimLine, file: FingerprintFile) -> N
         f"{file.path}: updated: servos were added, or limits follow the robot's file"
     ]
     assert file.read() == known
+
+
+def test_a_file_of_an_older_version_is_reported_and_completed(
+    line: SimLine, file: FingerprintFile
+) -> None:
+    """A Temperature Limit of 100 C was accepted: the file did not hold it."""
+    start(line, file)
+    known = file.read()
+    assert known is not None
+    added = ("Temperature Limit", "Velocity Limit")
+    file.write({i: {n: v for n, v in each.items() if n not in added} for i, each in known.items()})
+    line.bank["Temperature Limit"][2] = 79
+    assert start(line, file) == [
+        f"{file.path}: had no Velocity Limit, Temperature Limit; completed with the present values"
+    ]
+    line.bank["Temperature Limit"][2] = 80
+    with pytest.raises(ChainError, match="Temperature Limit is 80, was 79"):
+        start(line, file)
 
 
 @pytest.mark.parametrize(

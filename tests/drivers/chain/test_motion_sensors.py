@@ -13,6 +13,7 @@ from snakewalk.drivers.chain.motion_sensors import (
     CURRENT_READS,
     CURRENT_TRAVEL_RAD,
     LONGEST_STEP_S,
+    OVER_LIMIT,
     SATURATED,
     SPEED_READS,
     MotionSensors,
@@ -87,6 +88,12 @@ def test_a_current_that_stays_the_same_while_the_joint_turns_back_is_reported_on
 def test_a_current_at_its_limit_may_stay_the_same() -> None:
     assert swing(hold(0, 0.5 * SATURATED, joint=1)) == []
     assert len(swing(hold(0, 0.5 * SATURATED, joint=0))) == 1  # a yaw joint has no limit
+
+
+def test_a_constant_current_above_its_limit_is_reported() -> None:
+    """The campaign's 0.5 A of a joint whose limit is 0.2 A was taken for saturation."""
+    assert swing(hold(0, -0.5 * OVER_LIMIT, joint=1)) == []
+    assert len(swing(hold(0, -0.51 * OVER_LIMIT, joint=1))) == 1
 
 
 @pytest.mark.parametrize("speed_rad_s", [0.0, 2.4, -785.0])

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
@@ -102,3 +103,19 @@ def test_every_name_of_a_robot_makes_a_model(name: str) -> None:
     robot = RobotConfig(name=name, joint_axes="yy")
     made = mujoco.MjModel.from_xml_string(mjcf(robot, FLAT, None, 0.002))
     assert made.names[: len(name.encode())] == name.encode()
+
+
+def test_a_body_that_is_placed_once_lies_as_one_that_is_placed_again() -> None:
+    robot, world = load_robot("alternating16"), load_world("random-10")
+    ground, at = build_ground(world), ((0.3, -0.2), 0.4, np.zeros(robot.joint_count))
+    states = []
+    for is_placed in (True, False):
+        body = MujocoPlant(robot, world, ground, is_placed=is_placed)
+        body.reset(*at)
+        loads = body.mechanics.load_n.copy()
+        for k in range(5):
+            body.advance(0.02 * (k + 1), drive())
+        states.append((loads, body.qpos.copy()))
+    (loads_again, qpos_again), (loads_once, qpos_once) = states
+    np.testing.assert_array_equal(loads_once, loads_again)
+    np.testing.assert_array_equal(qpos_once, qpos_again)

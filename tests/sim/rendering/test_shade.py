@@ -8,7 +8,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.sim.rendering.looks import dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
-from snakewalk.sim.rendering.shade import SHADE, SUN_DIRECTION, SoftShade, shade_picture
+from snakewalk.sim.rendering.shade import SHADE, SUN_DIRECTION, SoftShade, add_sheet, shade_picture
 
 
 def disc(x: float, y: float, radius: float) -> np.ndarray:
@@ -40,7 +40,9 @@ def test_a_ball_in_the_air_darkens_the_ground_where_the_sun_puts_it(hills: bool)
     ground = None
     if hills:
         ground = HeightField(0.2 * np.random.default_rng(0).random((41, 41)), 0.2, -4.0, -4.0)
-    model = dressed_model(load_robot("alternating16"), load_world("flat"), ground, shade=True)
+    model = dressed_model(
+        load_robot("alternating16"), load_world("flat"), ground, additions=(add_sheet,)
+    )
     data, option, camera = mujoco.MjData(model), mujoco.MjvOption(), mujoco.MjvCamera()
     mujoco.mj_forward(model, data)
     camera.lookat[:], camera.distance, camera.elevation = (2.0, 2.0, 0.0), 2.0, -90.0

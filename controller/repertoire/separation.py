@@ -1,0 +1,200 @@
+"""Bodies of a crowd that do not intersect: a body that would enter another one waits.
+
+A body is a chain of capsules along its links, seen from above. A frame is tried for all bodies.
+While two of them intersect, the one whose motion alone makes them meet returns to where it was.
+Bodies that all return are apart, as they were before, so a start without intersections keeps its
+property for ever.
+"""
+
+from typing import Final
+
+import numpy as np
+from numba import njit
+
+from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.controller.repertoire.crowd import Crowd
+
+NONE: Final = -1
+YIELDING_FRAMES: Final = 6
+"""After which a body that waits moves sideways, too (ours)."""
+YIELDING_LENGTHS: Final = 0.005
+"""By this much in a frame, body lengths (ours)."""
+
+
+class SeparatedCrowd:
+    """Moves the bodies of a crowd, each only where no other body is."""
+
+    def __init__(self, crowd: Crowd, radius_m: Floats, length_m: float) -> None:
+        """Separate bodies of a crowd.
+
+        ``radius_m`` (L,) are half the widths of the recorded body at its links, ``length_m`` is its
+        length. All bodies of the crowd have to be visible: the links of others are stale.
+        """
+        self._crowd = crowd
+        self._length_m = length_m
+        self._radius_m = np.asarray(radius_m, dtype=float)
+        self.blocker: Ints = np.full(len(crowd.scale), NONE)
+        """(N,) the body that stops each body in this frame; -1: it moved."""
+        self.met: Floats = np.zeros(len(crowd.scale))
+        """(N,) where along itself each body was last stopped: 0 at the head, 1 at the tail."""
+        self.held: Ints = np.zeros(len(crowd.scale), dtype=np.int64)
+        """(N,) frames for which each body has waited."""
+
+    def step(self) -> Bools:
+        """Go on by a frame; (N,) bodies that moved."""
+        crowd = self._crowd
+        before = crowd.snapshot()
+        crowd.step()
+        self.blocker[:] = NONE
+        while True:
+            stopped = self._stopped(before[-1])
+            if not len(stopped):
+                break
+            crowd.restore(before, stopped)
+        moved = self.blocker == NONE
+        self.held[moved] = 0
+        self.held[~moved] += 1
+        for body in np.flatnonzero(self.held >= YIELDING_FRAMES).tolist():
+            self._yield(body)
+        return moved
+
+    def _yield(self, body: int) -> None:
+        """Shift a body away from the one that stops it, unless it would meet another one."""
+        crowd, links = self._crowd, len(self._radius_m)
+        place = crowd.points_m[body, :2, round(self.met[body] * (links - 1))]
+        other = crowd.points_m[self.blocker[body], :2, :links]
+        away = place - other[:, np.linalg.norm(other.T - place, axis=1).argmin()]
+        away = away.astype(float) / max(float(np.linalg.norm(away)), 1e-9)
+        move = YIELDING_LENGTHS * crowd.scale[body] * self._length_m * away
+        before = crowd.origin_m[body].copy(), crowd.points_m[body].copy()
+        crowd.shift(body, move)
+        if not _is_clear(crowd.points_m, crowd.scale, self._radius_m, body):
+            crowd.origin_m[body], crowd.points_m[body] = before
+
+    def intersecting(self) -> Ints:
+        """(P, 2) pairs of bodies that intersect now."""
+        pairs = np.empty((len(self.held), 2), dtype=np.int64)
+        count = _find_pairs(self._crowd.points_m, self._crowd.scale, self._radius_m, pairs)
+        return pairs[:count]
+
+    def _stopped(self, old_m: Floats) -> Ints:
+        """Mark further bodies that have to return to links ``old_m``, and return them."""
+        known, points = self.blocker.copy(), self._crowd.points_m
+        _stop(points, old_m, self._crowd.scale, self._radius_m, known, self.blocker, self.met)
+        return np.flatnonzero(self.blocker != known)
+
+
+@njit(cache=True, error_model="numpy")
+def _segment_gap(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
+    """Distance of the segments ab and cd in the plane, 0 if they cross."""
+    ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
+    one = ux * (cy - ay) - uy * (cx - ax)
+    two = ux * (dy - ay) - uy * (dx - ax)
+    three = vx * (ay - cy) - vy * (ax - cx)
+    four = vx * (by - cy) - vy * (bx - cx)
+    if one * two < 0.0 and three * four < 0.0:
+        return 0.0
+    least = np.inf
+    for k in range(4):
+        if k < 2:
+            px, py = (cx, cy) if k == 0 else (dx, dy)
+            qx, qy, wx, wy = ax, ay, ux, uy
+        else:
+            px, py = (ax, ay) if k == 2 else (bx, by)
+            qx, qy, wx, wy = cx, cy, vx, vy
+        size = wx * wx + wy * wy
+        share = ((px - qx) * wx + (py - qy) * wy) / size if size > 0.0 else 0.0
+        share = min(max(share, 0.0), 1.0)
+        least = min(least, np.hypot(px - qx - share * wx, py - qy - share * wy))
+    return least
+
+
+@njit(cache=True, error_model="numpy")
+def _meeting(one, scale_one, other, scale_other, radius):  # type: ignore[no-untyped-def]
+    """Links of two bodies that intersect, nearest to a head first; -1, -1 if there are none."""
+    links = len(radius)
+    for k in range(2 * links - 3):  # the sum of both link numbers
+        for a in range(max(0, k - links + 2), min(k, links - 2) + 1):
+            b = k - a
+            gap = _segment_gap(
+                one[0, a], one[1, a], one[0, a + 1], one[1, a + 1],
+                other[0, b], other[1, b], other[0, b + 1], other[1, b + 1],
+            )  # fmt: skip
+            wide = scale_one * max(radius[a], radius[a + 1])
+            if gap < wide + scale_other * max(radius[b], radius[b + 1]):
+                return a, b
+    return NONE, NONE
+
+
+@njit(cache=True, error_model="numpy")
+def _boxes(points, scale, radius):  # type: ignore[no-untyped-def]
+    """(N, 4) least and largest x and y of each body with its width."""
+    links = len(radius)
+    box = np.empty((len(points), 4))
+    for b in range(len(points)):
+        wide = scale[b] * radius.max()
+        x, y = points[b, 0, :links], points[b, 1, :links]
+        box[b, 0], box[b, 1] = x.min() - wide, x.max() + wide
+        box[b, 2], box[b, 3] = y.min() - wide, y.max() + wide
+    return box
+
+
+@njit(cache=True, error_model="numpy")
+def _apart(box, i, j):  # type: ignore[no-untyped-def]
+    """Whether two boxes have no common point."""
+    across = box[i, 0] > box[j, 1] or box[j, 0] > box[i, 1]
+    return across or box[i, 2] > box[j, 3] or box[j, 2] > box[i, 3]
+
+
+@njit(cache=True, error_model="numpy")
+def _stop(  # type: ignore[no-untyped-def]
+    points, old, scale, radius, known, blocker, met
+):  # fmt: skip
+    """Write into ``blocker`` who has to return; those of ``known`` have returned already."""
+    box = _boxes(points, scale, radius)
+    last = len(radius) - 1.0
+    for i in range(len(points)):
+        for j in range(i):
+            if (known[i] != NONE and known[j] != NONE) or _apart(box, i, j):
+                continue
+            at_i, at_j = _meeting(points[i], scale[i], points[j], scale[j], radius)
+            if at_i == NONE:
+                continue
+            if known[i] != NONE or known[j] != NONE:
+                stops_i = known[j] != NONE
+            else:
+                by_i = _meeting(points[i], scale[i], old[j], scale[j], radius)[0] != NONE
+                by_j = _meeting(old[i], scale[i], points[j], scale[j], radius)[0] != NONE
+                stops_i = by_i if by_i != by_j else at_i <= at_j
+            if stops_i:
+                blocker[i], met[i] = j, at_i / last
+            else:
+                blocker[j], met[j] = i, at_j / last
+
+
+@njit(cache=True, error_model="numpy")
+def _is_clear(points, scale, radius, i):  # type: ignore[no-untyped-def]
+    """Whether body i intersects no other one."""
+    box = _boxes(points, scale, radius)
+    for j in range(len(points)):
+        if j == i or _apart(box, i, j):
+            continue
+        if _meeting(points[i], scale[i], points[j], scale[j], radius)[0] != NONE:
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _find_pairs(points, scale, radius, pairs):  # type: ignore[no-untyped-def]
+    """Write the pairs that intersect into ``pairs``, as many as it holds; return their number."""
+    box, count = _boxes(points, scale, radius), 0
+    for i in range(len(points)):
+        for j in range(i):
+            if count == len(pairs):
+                return count
+            if _apart(box, i, j):
+                continue
+            if _meeting(points[i], scale[i], points[j], scale[j], radius)[0] != NONE:
+                pairs[count, 0], pairs[count, 1] = i, j
+                count += 1
+    return count

@@ -1,0 +1,106 @@
+"""Doubts that a capture reports: a contradicted head, faint tails, frames that are not used."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capturing import warning_of
+from snakewalk.controller.capture.identity import align_ends, head_end
+from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.verification.film_check import goes_on_faintly
+from snakewalk.controller.capture.verification.frame_store import FrameStore
+from snakewalk.controller.images.body_detector import BodyDetector, make_detector
+from snakewalk.controller.images.silhouette import Polarity
+from snakewalk.controller.track.frame_status import FrameStatus
+from tests.oracles.rendered_snake import SnakeScene, empty, film, half_width, true_midlines
+from tests.oracles.skeleton_accuracy import point_error
+
+SCENE = SnakeScene(rows=240, columns=320, frames=10, rate_hz=3.75, wave_hz=0.6, length_px=100.0)
+OPTIONS = CaptureOptions(Path("film.avi"), Path("track.npz"))
+
+
+def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
+    scene = replace(SCENE, frames=20, rate_hz=15.0)
+    points = true_midlines(scene)
+    radius = np.tile(half_width(scene), (20, 1))
+    score, by = head_end(points, radius, 15.0, None, fixed=True)
+    assert by == "travel"
+    assert score > 0.9
+    backwards, by = head_end(points[::-1], radius, 15.0, None, fixed=True)
+    assert by == "travel"
+    assert -0.3 < backwards < 0.0
+    even = np.ones_like(radius)
+    assert head_end(points[::-1], even, 15.0, None, fixed=True)[0] < -0.9
+
+
+def test_a_slow_larva_with_a_faint_tail_is_seen_whole() -> None:
+    scene = replace(SCENE, head=1.8, faint=0.15, tip=0.05, taper=0.6, slender=18.0)
+    frames, truth = list(film(scene)), true_midlines(scene)
+    seen = capture(frames, make_detector(frames[::2]), scene.rate_hz)
+    off = np.array([point_error(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.used)])
+    assert seen.used.sum() >= 9
+    assert np.nanmedian(seen.length_px) > 0.85 * scene.length_px
+    assert (off < 2.0 * seen.expected_px[seen.used]).mean() > 0.9
+
+
+def captured(status: list[FrameStatus], expected_px: float = 0.5) -> Capture:
+    used = np.array([one.has_points for one in status])
+    frames = len(status)
+    nan = np.where(used, 1.0, np.nan)
+    return Capture(
+        points_px=np.ones((frames, 101, 2)) * nan[:, None, None],
+        radius_px=np.ones((frames, 101)) * nan[:, None],
+        length_px=100.0 * nan,
+        status=tuple(status),
+        expected_px=expected_px * nan,
+        distractors=np.zeros(frames),
+        margin=nan,
+        rate_hz=10.0,
+        time_s=np.arange(frames) / 10.0,
+        head_by="travel",
+        head_sure=0.9,
+    )
+
+
+def test_many_unused_frames_are_reported_with_their_usual_reason() -> None:
+    good, bad = FrameStatus.GOOD, FrameStatus.EMPTY
+    assert warning_of(OPTIONS, captured([good] * 8 + [bad] * 2)) is None
+    assert warning_of(OPTIONS, captured([good] * 3 + [FrameStatus.NOTHING] * 7)) is None
+    text = warning_of(OPTIONS, captured([good] * 5 + [bad] * 4 + [FrameStatus.KNOT]))
+    assert text is not None
+    assert text.startswith("film.avi: 5 of 10 frames are not used")
+    assert str(bad) in text
+
+
+def test_a_large_expected_error_is_reported() -> None:
+    rough = [FrameStatus.ROUGH] * 10
+    assert warning_of(OPTIONS, captured(rough, 2.0)) is None
+    text = warning_of(OPTIONS, captured(rough, 5.0))
+    assert text is not None
+    assert "off by 5.0% of the body" in text
+
+
+TAILS: dict[str, tuple[dict[str, Any], bool]] = {
+    "the tail is too faint": ({"head": 1.8, "faint": 0.07, "taper": 0.6}, True),
+    "pointed": ({"tip": 0.0}, False),
+    "shadow": ({"shadow": 0.4}, False),
+    "stains": ({"stains": 40.0}, False),
+}
+
+
+@pytest.mark.parametrize("kind", TAILS)
+def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
+    change, expected = TAILS[kind]
+    scene = replace(SCENE, frames=8, rate_hz=3.0, **change)
+    detector = BodyDetector(empty(scene), Polarity.DARK, "given", search_faint_parts=False)
+    store, found = FrameStore(), []
+    for number, frame in enumerate(film(scene)):
+        body = detector.detect(frame).skeleton
+        assert body.status is FrameStatus.GOOD
+        store.put(number, frame, body.points_px, body.length_px)
+        found.append(body)
+    assert goes_on_faintly(align_ends(found).skeletons, store) is expected
