@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import Any, ClassVar
 
 import numpy as np
@@ -170,6 +171,5 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
 
 def _warp_bodies(device: str | None) -> MakeBodies:
     require_extra("the batch of robots needs", "warp", "mujoco_warp")
-    from snakewalk.sim.batch.warp_bodies import WarpBodies  # noqa: PLC0415  an extra
-
-    return partial(WarpBodies, device=device)
+    module = import_module("snakewalk.sim.batch.warp_bodies")  # it imports the packages
+    return partial(module.WarpBodies, device=device)
