@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 
-.PHONY: setup lock loops fallbacks run test lint types unit docs bench campaign lerobot failures clean
+.PHONY: setup lock loops fallbacks run test lint types unit docs bench campaign lerobot warp failures clean
 
 setup: $(STAMP)
 
@@ -63,6 +63,12 @@ LEROBOT_VENV ?= .venv-lerobot
 
 lerobot:
 	.ci/lerobot $(PY) $(LEROBOT_VENV)
+
+# make warp      MuJoCo-Warp against the compiled simulator, in an environment of its own
+WARP_VENV ?= .venv-warp
+
+warp:
+	.ci/warp $(PY) $(WARP_VENV)
 
 # make failures  where the walk still fails and why: maps over grounds, frictions and robots (hours; SEEDS=1
 # is a first look; docs/failures.md). A stopped one goes on where it was; FAILURES is where the tables are.

@@ -30,6 +30,8 @@ EXTRAS: Final = {
     "rosbags": ("rosbags", "export"),
     "pyarrow": ("pyarrow", "export"),
     "rclpy": ("rclpy", "ros"),
+    "warp": ("Warp", "warp"),
+    "mujoco_warp": ("MuJoCo-Warp", "warp"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
 BASE: Final = frozenset(

@@ -21,3 +21,8 @@ register(
     entry_point="snakewalk.controller.learning.policy_environment:PolicyEnvironment",
     max_episode_steps=500,
 )
+register(
+    id="snakewalk/SnakeBatch-v0",
+    vector_entry_point=("snakewalk.controller.learning.batch_environment:SnakeBatchEnvironment"),
+    max_episode_steps=500,
+)

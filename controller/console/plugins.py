@@ -22,7 +22,7 @@ ENTRY_POINTS: Final = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
 KINDS: Final = (
     *("command", "run", "motion", "joints", "pose", "map", "observer", "look", "planner"),
-    "results",
+    *("results", "backend"),
 )
 """Kinds of plug-ins."""
 OWN: Final = "snakewalk"

@@ -5,8 +5,8 @@ chain turns them into packets, simulated servos answer on a simulated line. A po
 here has met clamps, wire time, quantised readings and servo lag.
 """
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import gymnasium
 import numpy as np
@@ -20,14 +20,16 @@ from snakewalk.config.loader import checked, load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.run.backend import Backend, simulated
+from snakewalk.controller.run.backend import simulated
 from snakewalk.controller.run.prepared_run import PathlessRun, pose_with
-from snakewalk.drivers.clock import WallClock
+from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
+from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.errors import SafetyTrippedError
+from snakewalk.drivers.link import JointLink
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.types import JointCommand, JointState
+from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.chase_view import ChaseView, ChaseWindow
@@ -37,6 +39,35 @@ _SPEED_RAD_S: Final = 20.0
 _SPEED_M_S: Final = 3.0
 _CURRENT_A: Final = 10.0
 """Ends of the observation space (ours): far beyond what a body of such servos does."""
+
+
+class SimulatedRobot(Protocol):
+    """Servos and body of an episode; a ``Backend`` is one."""
+
+    @property
+    def chain(self) -> JointLink:
+        """The joints."""
+        ...
+
+    @property
+    def clock(self) -> Clock:
+        """Time of the robot."""
+        ...
+
+    @property
+    def pose(self) -> Callable[[], BodyPose] | None:
+        """Return the true pose of the head."""
+        ...
+
+    @property
+    def qpos(self) -> Callable[[], Floats] | None:
+        """Return the simulator's coordinates."""
+        ...
+
+    @property
+    def energy(self) -> Callable[[], MotorEnergy]:
+        """Return the energy of the motors so far."""
+        ...
 
 
 METADATA: Final[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
@@ -129,7 +160,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.observation_names = _names(body)
         """Name of each number of an observation, with its unit."""
         self._limits = SafetyLimits.from_config(body, run.safety)
-        self._backend: Backend | None = None
+        self._backend: SimulatedRobot | None = None
         self._link: SafeLink | None = None
         self._due_s, self._taken_j = 0.0, 0.0
         self._view: BodyView | None = None
@@ -172,10 +203,10 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         if options:
             raise InputError(f"reset knows no options, but got {', '.join(options)}")
         joints, heading = self._spread_rad
-        robot, run = self._prepared.robot, self._prepared.run
+        robot = self._prepared.robot
         start_rad = self.np_random.uniform(-joints, joints, robot.joint_count)
         initial = pose_with(robot, float(self.np_random.uniform(-heading, heading)), start_rad)
-        backend = simulated(run, robot, self._prepared.world, self._prepared.ground, initial)
+        backend = self._open(initial)
         link = SafeLink(backend.chain, self._limits, backend.clock)
         state = link.enable()
         self._backend, self._link = backend, link
@@ -196,6 +227,18 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             gymnasium.error.InvalidAction: its shape is not that of ``action_space``.
 
         """
+        self._send(action)
+        assert self._backend is not None
+        self._backend.clock.sleep_until_s(self._due_s)
+        return self._result()
+
+    def _open(self, initial: InitialPose) -> SimulatedRobot:
+        """Put a robot on the ground."""
+        prepared = self._prepared
+        return simulated(prepared.run, prepared.robot, prepared.world, prepared.ground, initial)
+
+    def _send(self, action: NDArray[np.floating[Any]]) -> None:
+        """Send the goals of a step; ``_result`` needs the time at its end."""
         backend, link = self._backend, self._link
         if backend is None or link is None or link.tripped:
             raise gymnasium.error.ResetNeeded("call reset before step")
@@ -208,7 +251,12 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         else:
             if link.last_verdict is not None:
                 self._sent_rad = link.last_verdict.goal_rad
-        backend.clock.sleep_until_s(self._due_s)
+
+    def _result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Read all servos at the end of a step, and return what ``step`` returns."""
+        backend, link = self._backend, self._link
+        assert backend is not None
+        assert link is not None
         observation, progress_m = self._observe(backend, link.read())
         taken_j = backend.energy().electrical_j
         reward = progress_m - self._energy_weight_m_j * (taken_j - self._taken_j)
@@ -254,7 +302,9 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._shown_s = self._clock.now_s()
         self.render()
 
-    def _observe(self, backend: Backend, state: JointState) -> tuple[NDArray[np.float32], float]:
+    def _observe(
+        self, backend: SimulatedRobot, state: JointState
+    ) -> tuple[NDArray[np.float32], float]:
         """Observation, and how far the centre of mass came along x since the one before."""
         assert backend.pose is not None  # a simulated one
         pose = backend.pose()

@@ -179,7 +179,7 @@ class _Execution:
             "%s on %s; the plan keeps the limits; log: %s",
             *(prepared.robot.name, backend.name, log_path),
         )
-        torque_constant_n_m_a, winding = _motor(prepared.robot)
+        torque_constant_n_m_a, winding = motor_constants(prepared.robot)
         ports = None if port is None else real_ports(robot) or [port]
         made = StopButton(prepared.run.name, ports, self.folder) if stoppable else nullcontext()
         with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
@@ -421,7 +421,7 @@ def _current_gain_a_rad(robot: RobotConfig) -> float:
     return max(gains_a_rad)
 
 
-def _motor(robot: RobotConfig) -> tuple[float, Winding | None]:
+def motor_constants(robot: RobotConfig) -> tuple[float, Winding | None]:
     """Torque constant (N m/A) and winding of the robot's servos.
 
     NaN and None where the simulator has no such model, or the servos are of several.

@@ -76,7 +76,8 @@ def _no_long_collections() -> Iterator[None]:
 
 
 PoseSource = Callable[[JointState], BodyPose]
-_SETTLE_S = 0.3
+SETTLE_S = 0.3
+"""Time between the ramp and the motion."""
 BATTERY_S = 1.0
 """Time between two rows of the supply (ours)."""
 _LATCHED = suppress(SafetyTrippedError)
@@ -224,7 +225,7 @@ class Drive:
             )
             start_s = self._start_s = clock.now_s()
             log.event(start_s, "start", f"torque on; ramp of {ramp.duration_s:.1f} s to the shape")
-            walk_s = start_s + ramp.duration_s + _SETTLE_S
+            walk_s = start_s + ramp.duration_s + SETTLE_S
             self._end_s = walk_s + self._run.time_limit_s
             for tick in ticks(clock, period_s, lambda: self._end_s):
                 try:

@@ -11,9 +11,13 @@ import numpy as np
 from snakewalk.config.errors import InputError
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.effort import effort
+from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.metrics.travel import Travel
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.prepared_run import GroundedRun
+from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.sweep_points import Point
 
 P = TypeVar("P", bound=GroundedRun)
@@ -57,28 +61,55 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
     ``vary`` draws other friction (up to 15 % off) and another supply (5 %), by its seed.
     """
     try:
-        prepared = prepare_gait(
-            point.gait,
-            robot=point.robot,
-            world=point.world,
-            parameters=dict(point.parameters),
-            seconds=point.seconds,
-            seed=point.seed,
-            keys=dict(point.keys),
-        )
+        prepared = prepared_point(point)
         if vary is not None:
             prepared = varied(prepared, np.random.default_rng(vary))
         with TemporaryDirectory() as folder:
             finished = execute(prepared, Path(folder), stoppable=False)
     except InputError as error:
         return Measurement(f"refused: {error.faults[0]}")
-    numbers, record = finished.summary, finished.record
+    return measurement(
+        finished.record,
+        finished.summary,
+        finished.travel,
+        tripped=finished.outcome.tripped,
+        least_rate=finished.outcome.least_rate,
+    )
+
+
+def prepared_point(point: Point) -> GaitRun:
+    """Return the run of a point.
+
+    Raises:
+        InputError: the robot cannot make it.
+
+    """
+    return prepare_gait(
+        point.gait,
+        robot=point.robot,
+        world=point.world,
+        parameters=dict(point.parameters),
+        seconds=point.seconds,
+        seed=point.seed,
+        keys=dict(point.keys),
+    )
+
+
+def measurement(
+    record: RunRecord,
+    numbers: RunSummary,
+    travelled: Travel,
+    *,
+    tripped: str | None,
+    least_rate: float,
+) -> Measurement:
+    """Return the results of a gait run from its log, summary and travel."""
     if not numbers.is_measured:
         return Measurement(f"refused: {numbers.pose_evidence} pose; a sweep needs a measured one")
-    moved = finished.travel.gait or gait_displacement(record)
-    cost = effort(record, finished.travel)
+    moved = travelled.gait or gait_displacement(record)
+    cost = effort(record, travelled)
     return Measurement(
-        ended=finished.outcome.tripped or "ran to its end",
+        ended=tripped or "ran to its end",
         cycles=moved.cycles,
         ran_hz=_digits(moved.frequency_hz),
         forward_bl_cycle=_digits(moved.forward_bl),
@@ -94,7 +125,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
         peak_torque_n_m=_digits(numbers.peak_torque_n_m),
         peak_temperature_c=_digits(numbers.peak_temperature_c),
         tracking_max_rad=_digits(numbers.tracking_max_rad),
-        least_rate=_digits(finished.outcome.least_rate),
+        least_rate=_digits(least_rate),
         pose_evidence=numbers.pose_evidence,
         pose_source=numbers.pose_source,
     )

@@ -35,7 +35,7 @@ ORDER: Final = {
     ),
     "sim": (
         *("sim", "sim.servo", "sim.line", "sim.faults", "sim.sniff", "sim.ax12", "sim.feetech"),
-        *("sim.serve", "sim.physics", "sim.rendering"),
+        *("sim.serve", "sim.physics", "sim.batch", "sim.rendering"),
     ),
     "controller": tuple(f"controller.{name}" for name in (*CORE, *FEATURES)),
 }

@@ -65,6 +65,7 @@ NEEDY = [
     (("bus", "serve", "--robot", "yaw16"), "sim"),
     (("sweep", "rolling", "--points", "1"), "sim"),
     (("sweep", "rolling", "--points", "1", "--dask", "tcp://localhost:1"), "sweep"),
+    (("sweep", "rolling", "--points", "1", "--backend", "warp"), "warp"),
     (("tune", "rolling"), "sim"),
     (("trials", "flat-slalom", "--seeds", "1"), "sim"),
     (("repertoire", "record"), "sim"),

@@ -9,17 +9,15 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import MOTION, command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Dask, Force, Json, Set, console, key_values
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
-from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.studies.commands.pictures import pictures
-from snakewalk.controller.studies.sweep_measure import measure
+from snakewalk.controller.studies.sweep_backends import open_backend
 from snakewalk.controller.studies.sweep_points import plan_sweep
 from snakewalk.controller.studies.sweep_table import KINDS, digest, read_table, table_rows
 from snakewalk.controller.studies.sweep_table import SweepTable as Sweep
@@ -73,6 +71,9 @@ def sweep(
     seed: Annotated[int, typer.Option(min=0, help="seed of the choice of points")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
     dask: Dask = None,
+    backend: Annotated[
+        str, typer.Option(help="simulator: processes, warp, warp:DEVICE, or a plug-in")
+    ] = "processes",
     out: Annotated[
         Path,
         typer.Option("--out", "-o", help="write the table here; runs that it contains are skipped"),
@@ -91,7 +92,7 @@ def sweep(
     check_parquet(parquet)
     keys = key_values("--set", set_)
 
-    require_extra("a sweep needs", "mujoco" if dask is None else "distributed")
+    simulator = open_backend(backend, workers, dask)
     planned = plan_sweep(gaits, robot, points, seed=seed, seconds=seconds, keys=keys)
     table = Sweep(out)
     for line in () if as_json else planned.left_out:
@@ -100,7 +101,7 @@ def sweep(
     missing = table.missing(planned.points)
     with table:
         for point, row in show_progress(
-            each(measure, missing, workers=workers, dask=dask),
+            simulator.measure(missing),
             str(out),
             len(planned.points),
             done=len(planned.points) - len(missing),
