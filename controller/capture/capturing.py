@@ -37,7 +37,7 @@ from snakewalk.controller.images.video import Footage, in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import UNSURE_HEAD
 
-_MANY = 1.0 / 3.0  # of the frames: if so many are not used, the capture needs a look
+_MANY = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
 _EXPLAINED = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED, FrameStatus.LEFT_OUT}
 _INACCURATE = 0.03  # of the length: a larger expected error needs a look
 

@@ -47,7 +47,7 @@ class Detection:
     may_have_faint_parts: bool = False
     """Whether something fainter than the silhouette goes on beyond it."""
     core_threshold: float | None = None
-    """Of a body with faint parts: half of the contrast of its strongest part."""
+    """Half of the contrast of the strongest part, for a body with faint parts; None for others."""
 
     @property
     def contrast_threshold(self) -> float:

@@ -62,10 +62,10 @@ class _RowEnvironment(SnakeEnvironment):
         return self._result()
 
 
-class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], Any]):
+class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], Any]):  # type: ignore[misc]
     """W snakes on a level floor; action, observation and reward are ``SnakeEnvironment``'s.
 
-    There is no bus: goals reach the servos at once. A robot whose episode has ended starts again in
+    It has no bus: goals reach the servos at once. A robot whose episode has ended starts again in
     the next step, which returns its first observation and reward 0 (``AutoresetMode.NEXT_STEP``).
 
     Args:
@@ -80,7 +80,7 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
 
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(
         self,

@@ -15,9 +15,9 @@ from snakewalk.controller.repertoire.separation import SeparatedCrowd
 
 STEEP_RAD = 0.6
 """Slopes beyond are avoided (ours)."""
-ROOM_LENGTHS = 0.6
+CLEAR_LENGTHS = 0.6
 """Clearance to the centre of another body, body lengths (ours)."""
-ROOM_BESIDE_LENGTHS = 0.25
+CLEAR_SIDE_LENGTHS = 0.25
 """Clearance to head, middle and tail of bodies that do not intersect, body lengths (ours)."""
 AHEAD_LENGTHS = 1.0
 """How far ahead a body looks (ours)."""
@@ -55,7 +55,7 @@ class Wandering:
         intersect. Without it they pass through each other.
 
         Raises:
-            InputError: the ground is steep everywhere, or has no room for so many bodies.
+            InputError: the ground is steep everywhere, or is too small for the bodies.
 
         """
         count = len(sizes)
@@ -113,7 +113,7 @@ class Wandering:
             for body, place in zip(bodies.tolist(), self._places(len(bodies)), strict=True):
                 self.crowd.shift(body, place - self.crowd.origin_m[body, :2])
         raise InputError(
-            f"crowd of {len(separated.held)} bodies: the ground has no room for so many; use fewer"
+            f"crowd of {len(separated.held)} bodies: the ground is too small for them; use fewer"
         )
 
     def _evade(self, held: Ints) -> None:
@@ -155,10 +155,10 @@ class Wandering:
         free = self._safe(ahead + at[:, None])
         gap = self._gap_m(bodies, ahead + at[:, None])
         if self.separated is None:
-            free &= gap > ROOM_LENGTHS * reach[:, None]
+            free &= gap > CLEAR_LENGTHS * reach[:, None]
         else:
-            gap = np.minimum(gap, self._gap_m(bodies, 0.5 * ahead + at[:, None]))
-            free &= gap > ROOM_BESIDE_LENGTHS * reach[:, None]
+            gap = np.minimum(gap, self._gap_m(bodies, at[:, None] + 0.5 * ahead)).astype(float)
+            free &= gap > CLEAR_SIDE_LENGTHS * reach[:, None]
         widest = 0 if self.separated is None else gap.argmax(axis=1)
         first = np.where(free.any(axis=1), free.argmax(axis=1), widest)
         return wrap(tried[np.arange(len(bodies)), first] - heading)
@@ -167,7 +167,7 @@ class Wandering:
         """(n, directions) from points (n, directions, 2) to the nearest part of another body."""
         others = self.crowd.origin_m[:, None, :2]
         if self.separated is not None:
-            others = self.crowd.points_m[:, :2, self._parts].transpose(0, 2, 1)
+            others = self.crowd.points_m[:, :2, self._parts].transpose(0, 2, 1).astype(float)
         gap = np.full(ahead_m.shape[:2], np.inf)
         for part in range(others.shape[1]):
             to = np.linalg.norm(ahead_m[:, :, None] - others[None, None, :, part], axis=3)

@@ -66,7 +66,7 @@ class CrowdScene:
             separate: bodies do not intersect.
 
         Raises:
-            InputError: the ground has no room.
+            InputError: the ground is too small for the bodies.
 
         """
         sizes = np.random.default_rng(seed).uniform(*SIZES, bodies)

@@ -51,7 +51,7 @@ class SeparatedCrowd:
             if not len(stopped):
                 break
             crowd.restore(before, stopped)
-        moved = self.blocker == NONE
+        moved: Bools = np.asarray(self.blocker == NONE)
         self.held[moved] = 0
         self.held[~moved] += 1
         for body in np.flatnonzero(self.held >= YIELDING_FRAMES).tolist():
@@ -111,7 +111,7 @@ def _segment_gap(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def
 
 @njit(cache=True, error_model="numpy")
 def _meeting(one, scale_one, other, scale_other, radius):  # type: ignore[no-untyped-def]
-    """Links of two bodies that intersect, nearest to a head first; -1, -1 if there are none."""
+    """Links of two bodies that intersect, nearest to a head first; -1, -1 without such links."""
     links = len(radius)
     for k in range(2 * links - 3):  # the sum of both link numbers
         for a in range(max(0, k - links + 2), min(k, links - 2) + 1):

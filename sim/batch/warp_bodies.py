@@ -34,7 +34,7 @@ class WarpBodies(BatchBodies):
     """Bodies on a Warp device; ``device`` is its name, None the first GPU, or the CPU without one.
 
     Raises:
-        InputError: the robot's gears or the world are not supported, or there is no such device.
+        InputError: the robot's gears or the world are not supported, or the device does not exist.
 
     """
 

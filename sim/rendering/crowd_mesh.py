@@ -1,7 +1,7 @@
 """Meshes of many bodies at several levels of detail, and their shadows, drawn in few calls.
 
 A body is a tube around its centre line: ``rings`` x ``sides`` corners. All bodies of one kind and
-level are one MuJoCo skin with room for each of them; only the faces in use are drawn.
+level are one MuJoCo skin that can hold them all; only the faces in use are drawn.
 """
 
 from dataclasses import dataclass
@@ -93,19 +93,20 @@ class TubeGrid:
         corner = centre[:, :, None] + (bulge * radius)[:, :, None, None] * normal
         normal[:, 0], normal[:, -1] = ahead[:, :1], -ahead[:, -1:]
         count = len(points_m)
-        return corner.reshape(count, -1, 3), normal.reshape(count, -1, 3)
+        corners: Floats = np.asarray(corner, float).reshape(count, -1, 3)
+        return corners, np.asarray(normal, float).reshape(count, -1, 3)
 
     def _round_rad(self) -> Floats:
-        return np.arange(self.sides) * (2.0 * np.pi / self.sides)
+        return np.arange(self.sides, dtype=float) * (2.0 * np.pi / self.sides)
 
 
 class CrowdMeshes:
     """Skins of one model that hold every body of a frame; ``add_to`` prepares the model."""
 
     def __init__(self, bodies: int) -> None:
-        """Make room for ``bodies`` at any level."""
+        """Reserve the memory of ``bodies`` at any level."""
         self._bodies = bodies
-        self._room = -(-bodies // len(COLOURS))
+        self._capacity = -(-bodies // len(COLOURS))
         self._grids = tuple(TubeGrid(*mesh) for mesh in MESHES)
         self._ribbon = _ribbon_faces(), _ribbon_uv()
 
@@ -114,7 +115,14 @@ class CrowdMeshes:
         for kind, (back, band) in enumerate(COLOURS):
             _material(spec, f"crowd{kind}", _banded(back, band), alpha=False)
             for level, grid in enumerate(self._grids):
-                _skin(spec, f"crowd{kind}-{level}", f"crowd{kind}", grid.faces, grid.uv, self._room)
+                _skin(
+                    spec,
+                    f"crowd{kind}-{level}",
+                    f"crowd{kind}",
+                    grid.faces,
+                    grid.uv,
+                    self._capacity,
+                )
         _material(spec, "crowd-shadow", _soft_edge(), alpha=True)
         _skin(spec, "crowd-shadow", "crowd-shadow", *self._ribbon, self._bodies)
 
@@ -233,19 +241,19 @@ def _material(spec: mujoco.MjSpec, name: str, picture: Image, *, alpha: bool) ->
 
 
 def _skin(
-    spec: mujoco.MjSpec, name: str, material: str, faces: Ints, uv: Floats, room: int
+    spec: mujoco.MjSpec, name: str, material: str, faces: Ints, uv: Floats, capacity: int
 ) -> None:
-    """Add a skin with room for several copies of a mesh."""
+    """Add a skin that can hold several copies of a mesh."""
     corners = len(uv)
     skin = spec.add_skin(name=name, material=material, rgba=[1.0, 1.0, 1.0, 1.0])
-    shift = corners * np.arange(room)[:, None, None]
+    shift = corners * np.arange(capacity)[:, None, None]
     skin.face = (faces[None] + shift).ravel().tolist()
-    skin.vert = np.tile(np.column_stack([uv, np.zeros(corners)]), (room, 1)).ravel()
-    skin.texcoord = np.tile(uv, (room, 1)).ravel()
+    skin.vert = np.tile(np.column_stack([uv, np.zeros(corners)]), (capacity, 1)).ravel()
+    skin.texcoord = np.tile(uv, (capacity, 1)).ravel()
     skin.bodyname = ["world"]
     skin.bindpos, skin.bindquat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    skin.vertid = [list(range(corners * room))]
-    skin.vertweight = [[1.0] * (corners * room)]
+    skin.vertid = [list(range(corners * capacity))]
+    skin.vertweight = [[1.0] * (corners * capacity)]
 
 
 def _draw(
@@ -254,10 +262,10 @@ def _draw(
     """Fill the first places of a skin with meshes (B, V, 3), and add it to the scene."""
     skin = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SKIN, name)
     start, used = int(model.skin_vertadr[skin]), corner.shape[0] * corner.shape[1]
-    room = int(model.skin_vertnum[skin]) // corner.shape[1]
+    capacity = int(model.skin_vertnum[skin]) // corner.shape[1]
     scene.skinvert.reshape(-1, 3)[start : start + used] = corner.reshape(-1, 3)
     scene.skinnormal.reshape(-1, 3)[start : start + used] = normal.reshape(-1, 3)
-    scene.skinfacenum[skin] = int(model.skin_facenum[skin]) // room * corner.shape[0]
+    scene.skinfacenum[skin] = int(model.skin_facenum[skin]) // capacity * corner.shape[0]
     geom = scene.geoms[scene.ngeom]
     material = int(model.skin_matid[skin])
     mujoco.mjv_initGeom(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture import capturing
+from snakewalk.controller.capture import film_parts
 from snakewalk.controller.capture.capture import CaptureFile
 from snakewalk.controller.capture.capturing import (
     CaptureFacts,
@@ -105,7 +105,7 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
             name,
             folder,
             resume=options.resume,
-            part_frames=capturing.PART_FRAMES,
+            part_frames=film_parts.PART_FRAMES,
         )
         with folder.kept_if_interrupted():
             animals = capture_animals(film.frames, detector, found, films, on_progress=bar.advance)

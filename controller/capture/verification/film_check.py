@@ -105,9 +105,9 @@ def goes_on_faintly(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
 
 def _along_a_ray(rings: Floats) -> Floats:
     """(2,) contrast that goes on through all rings (2, rings, angles) in one direction."""
-    known = np.isfinite(rings).any(axis=2)
+    known: Bools = np.asarray(np.isfinite(rings).any(axis=2))
     lowest = np.nanmin(np.where(known[..., None], rings, np.inf), axis=1)
-    return np.where(known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan)
+    return np.asarray(np.where(known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan))
 
 
 def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:

@@ -145,7 +145,7 @@ class BatchRow:
 
     @property
     def drive(self) -> ServoDrive:
-        """What the servos give to the motors."""
+        """Output of the servos for the motors."""
         return self._firmware.drive
 
     # the shafts, as the servos see them

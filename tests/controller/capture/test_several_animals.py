@@ -11,7 +11,7 @@ import pytest
 from benchmarks.crossings import compare, identities_in
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture import capturing
+from snakewalk.controller.capture import film_parts
 from snakewalk.controller.capture.capture import capture, load_capture, save_capture
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
@@ -176,7 +176,7 @@ def test_what_does_not_fit_several_animals_is_rejected(
 def test_an_interrupted_capture_of_several_animals_is_continued(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(capturing, "PART_FRAMES", 6)
+    monkeypatch.setattr(film_parts, "PART_FRAMES", 6)
     folder, facts = dish
     plain = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz", animals="2")
     seen: list[int] = []

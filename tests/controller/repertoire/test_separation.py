@@ -118,5 +118,5 @@ def test_a_crowd_wanders_without_intersections(repertoire: Repertoire) -> None:
 
 def test_a_ground_without_room_is_rejected(repertoire: Repertoire) -> None:
     small = HeightField(np.zeros((4, 4)), 0.5, 0.0, 0.0)
-    with pytest.raises(InputError, match="no room for so many"):
+    with pytest.raises(InputError, match="too small for them"):
         Wandering(repertoire, small, np.ones(40), radius_m=RADIUS_M)
