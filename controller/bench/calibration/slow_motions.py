@@ -64,6 +64,9 @@ _POSE_READS = 40
 """Reads until the pose of all servos is complete (ours)."""
 _MOTION_TRIES = 10
 """Tries of a motion that the line ends (ours)."""
+_LOST_CYCLES = 5
+"""Cycles that were skipped or had no reply: a small motion then does not show a blocked servo
+(ours)."""
 _CYCLE_S = 0.02
 Push = Callable[[int, int, float, Callable[[float | None], None]], None]
 """Pushes a joint: row, side, reach in rad, and a function that gets the distance to its stop."""
@@ -142,6 +145,7 @@ class CalibrationBench:
 
         Raises:
             InputError: it does not move.
+            LineLostError: its replies were missing in every try.
             DriverError: safety has latched.
 
         """
@@ -149,14 +153,19 @@ class CalibrationBench:
 
     def _wiggle(self, row: int) -> None:
         with self._link() as (link, here):
-            most = 0.0
+            most, seen = 0.0, 0
             for time_s, state in self._cycles(link, 2.0 * WIGGLE_S):
+                seen += bool(state.valid[row])
                 most = max(most, float(state.position_rad[row] - here[row]))
                 share = cubic(max(0.0, min(time_s, 2.0 * WIGGLE_S - time_s)) / WIGGLE_S)
                 self._write(link, here, row, here[row] + WIGGLE_RAD * share)
         if most < MOVED_SHARE * WIGGLE_RAD:
+            servo = f"ID {self._robot.servo_ids[row]}"
+            lost = round(2.0 * WIGGLE_S / _CYCLE_S) - seen
+            if lost >= _LOST_CYCLES:  # the servo may not have received its goals, either
+                raise LineLostError(f"{servo}: {lost} cycles of its motion are missing")
             raise InputError(
-                f"ID {self._robot.servo_ids[row]}: moved by {most:.2f} of {WIGGLE_RAD:g} rad: is "
+                f"{servo}: moved by {most:.2f} of {WIGGLE_RAD:g} rad: is "
                 f"it held, or too weak for its load? {_HANG_UP}, or raise --current"
             )
 
