@@ -53,6 +53,8 @@ class Tally:
     old: int = 0
     foreign: int = 0
     not_held: int = 0
+    raced: int = 0
+    """See ``Witness``."""
     too_long: int = 0
     """Cycles that took longer than ``LONGEST_CYCLE_S`` of simulated time."""
     noticed: int = 0
@@ -136,7 +138,7 @@ def run_scenario(kinds: tuple[str, ...], seed: int, cycles: int) -> Tally:
         tally.ended_otherwise += sensors.ended_otherwise
         tally.unnoticed += len(sensors.unnoticed)
         tally.complaints += [f"{kinds} {seed}: {line}" for line in sensors.unnoticed]
-    for name in ("beyond_limit", "too_fast", "old", "foreign", "not_held"):
+    for name in ("beyond_limit", "too_fast", "old", "foreign", "not_held", "raced"):
         setattr(tally, name, getattr(rig.witness, name))
     tally.complaints += [f"{kinds} {seed}: {line}" for line in rig.witness.complaints]
     with suppress(DriverError):

@@ -21,6 +21,7 @@ _COLUMNS = {
     "ended_otherwise": "ended otherwise",
     "unnoticed": "unnoticed",
     "false_alarms": "false alarms",
+    "raced": "raced",
 }
 
 

@@ -45,6 +45,7 @@ NOTICED_CYCLES = 4 * SLOW_EVERY
 """A register is compared every third round at the latest; one more for an answer that is lost."""
 _STAMPS = 60
 _GOALS = (116).to_bytes(2, "little") + (4).to_bytes(2, "little")
+_SYNC_READS = (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ)
 _TORQUE = (64).to_bytes(2, "little") + (1).to_bytes(2, "little")
 
 
@@ -63,12 +64,21 @@ class Witness:
     """Values taken for one servo's that are another's."""
     not_held: int = 0
     """Values that changed, or grew younger, without having been read."""
+    raced: int = 0
+    """Goals beyond a limit that another program wrote between the last reading of the goals and
+    torque. No order of packets prevents it, so it is counted and is no violation."""
     complaints: list[str] = field(default_factory=list)
 
     @property
     def violations(self) -> int:
         """All of them."""
         return self.beyond_limit + self.too_fast + self.old + self.foreign + self.not_held
+
+
+def _covers_goals(params: bytes) -> bool:
+    """Whether a group read of these parameters contains Goal Position."""
+    first, count = int.from_bytes(params[:2], "little"), int.from_bytes(params[2:4], "little")
+    return first <= 116 and first + count >= 120
 
 
 def rows_by_id(bank: ServoBank) -> np.ndarray | None:
@@ -225,6 +235,8 @@ class Rig:
         self._units = ServoUnits.of(self.bus.table.facts)
         self._low, self._high = self._raw_limits()
         self._cycle = 0
+        self._goals_at_read: np.ndarray | None = None
+        """Goals when the host read them last; None if it has written goals since."""
         self._seen: JointState | None = None
         self._was_rad: deque[tuple[float, np.ndarray]] = deque()
         """When, and where the servos of the joints were then."""
@@ -320,9 +332,12 @@ class Rig:
         for packet in PacketParser().feed(data):
             if not isinstance(packet, InstructionPacket):
                 continue
+            if packet.instruction in _SYNC_READS and _covers_goals(packet.params):
+                self._goals_at_read = self.line.bank["Goal Position"].copy()
             if packet.instruction != Instruction.SYNC_WRITE:
                 continue
             if packet.params[:4] == _GOALS:
+                self._goals_at_read = None
                 block = np.frombuffer(packet.params, np.uint8, offset=4).reshape(-1, 5)
                 self._check_goals(time_s, block[:, 1:].copy().view("<i4")[:, 0])
             elif packet.params[:4] == _TORQUE and packet.params[5]:
@@ -338,7 +353,11 @@ class Rig:
         goal = self._units.position_rad(self._joints(self.line.bank["Goal Position"]))
         limp = self._joints(self.line.bank["Torque Enable"]) == 0
         far = np.abs(goal - self._here_rad()) > self.limits.goal_lead_rad + TICK_RAD
-        self._sin("beyond_limit", far & limp)
+        before = self._goals_at_read
+        now = self.line.bank["Goal Position"]
+        later = self._joints(np.zeros_like(limp) if before is None else now != before)
+        self.witness.raced += int((far & limp & later).sum())
+        self._sin("beyond_limit", far & limp & ~later)
 
     def _check_goals(self, time_s: float, raw: np.ndarray) -> None:
         goal = self._units.position_rad(raw)

@@ -205,6 +205,18 @@ def test_the_witness_judges_a_goal_when_there_is_torque(*, limp: bool) -> None:
     assert rig.witness.beyond_limit == JOINTS
 
 
+def test_a_goal_that_is_written_behind_the_last_reading_is_a_race() -> None:
+    rig = Rig(FaultPlan(), "stop")
+    rig.link.enable()
+    rig.read()
+    rig.link.disable()
+    rig.chain._identified.positions_and_goals(3, ask_again=True)
+    rig.line.bank["Goal Position"][:] = 3000
+    rig.bus.sync_write(ROBOT.servo_ids, "Torque Enable", 1)
+    rig.line.drain_until_quiet(1e-3)
+    assert (rig.witness.raced, rig.witness.violations) == (JOINTS, 0)
+
+
 def test_ids_that_are_exchanged_behind_the_goals_of_a_start_are_found_before_torque() -> None:
     tally = run_scenario(("voltage", "exchange"), 7001, 240)
     assert tally.trips
