@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from snakewalk.controller.rehearsal.rehearsal import RUNS, START_SD_DEG, START_SD_M
+from snakewalk.controller.rehearsal.rehearsal import RUNS, generator, moved
 from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
 from snakewalk.controller.run.external.served_robot import place_of
 from snakewalk.controller.run.factory import prepare_job
@@ -36,10 +36,9 @@ VOID_S = 0.1
 
 def rehearsed(run: str, seed: int) -> dict[str, Any]:
     """Serve a run's robot, run it on the pseudo-terminal, and return a row of the file."""
-    rng = np.random.default_rng([seed, 0x42])
-    place = place_of(prepare_job(run, seed=seed))
-    x_m, y_m = np.array(place.start_m) + START_SD_M * rng.standard_normal(2)
-    heading_deg = np.degrees(place.heading_rad) + START_SD_DEG * rng.standard_normal()
+    place = moved(place_of(prepare_job(run, seed=seed)), generator(seed))
+    x_m, y_m = place.start_m
+    heading_deg = np.degrees(place.heading_rad)
     with TemporaryDirectory() as folder:
         serve = ["bus", "serve", "--run", run, "--link", "tty", "--pose-out", UDP, "--json"]
         serve += ["--truth", "truth.jsonl", "--seed", str(seed)]

@@ -16,7 +16,7 @@ from snakewalk.controller.rehearsal.metric_errors import metric_errors
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
+from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.runlog.truth import read_truth
 
@@ -102,18 +102,27 @@ def errors_of(robot: RobotConfig, rng: np.random.Generator) -> Deviation:
     )
 
 
+def generator(seed: int) -> np.random.Generator:
+    """Return the generator of a rehearsal's start and errors, which are drawn in this order."""
+    return np.random.default_rng([seed, 0x42])
+
+
+def moved(start: Place, rng: np.random.Generator) -> Place:
+    """Draw where the robot truly is laid down; the run does not know it."""
+    moved_m = START_SD_M * rng.standard_normal(2)
+    turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
+    return replace(
+        start,
+        start_m=(start.start_m[0] + float(moved_m[0]), start.start_m[1] + float(moved_m[1])),
+        heading_rad=start.heading_rad + float(turned_rad),
+    )
+
+
 def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     try:
         prepared = prepare_job(case.run, seed=case.seed, pose="udp:9870", **changes)
-        rng = np.random.default_rng([case.seed, 0x42])
-        moved_m = START_SD_M * rng.standard_normal(2)
-        turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
-        start = place_of(prepared)
-        place = replace(
-            start,
-            start_m=(start.start_m[0] + float(moved_m[0]), start.start_m[1] + float(moved_m[1])),
-            heading_rad=start.heading_rad + float(turned_rad),
-        )
+        rng = generator(case.seed)
+        place = moved(place_of(prepared), rng)
         deviation = errors_of(prepared.robot, rng) if case.has_errors else NO_DEVIATION
         serving = Serving(case.tracker, deviation, LATE_S if case.has_errors else 0.0, case.seed)
         truth = folder / "truth.jsonl"
