@@ -7,13 +7,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from snakewalk.config.colours import AMBER, INK
+from snakewalk.config.colours import INK, PALE, SERIES
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.gaits.registry import GAITS
@@ -24,10 +21,12 @@ ROBOT = "alternating16"
 GAITS_SHOWN = ("sidewinding", "rolling", "concertina", "lateral-undulation")
 STEP_S = 0.02
 STAY_S = 5.0
+JOINTS_SHOWN = (1, 2, 5, 10)
+"""From the head; odd: yaw, even: pitch. All sixteen would fill the panels."""
 
 
 def draw(out: Path) -> None:
-    """Draw angles and speeds of all joints over four gaits, and rest."""
+    """Draw angles and speeds of four joints over four gaits, and rest."""
     with style():
         _draw(out)
 
@@ -48,24 +47,22 @@ def _draw(out: Path) -> None:
     time_s = STEP_S * np.arange(len(angles))
     figure = Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
-    colours = colormaps["viridis"](np.linspace(0.0, 1.0, robot.joint_count))
     for axis, rows, limit in (
         (axes[0], np.array(angles), max(robot.limit_rad)),
         (axes[1], np.array(speeds), robot.joint_speed_limit_rad_s),
     ):
-        for joint, colour in enumerate(colours):
-            axis.plot(time_s, rows[:, joint], color=colour, linewidth=0.6)
+        for joint, colour in zip(JOINTS_SHOWN, SERIES, strict=False):
+            axis.plot(time_s, rows[:, joint - 1], color=colour, lw=0.9, label=f"joint {joint}")
         for bound in (-limit, limit):
             axis.axhline(bound, color=INK, linewidth=0.8, linestyle="--")
         for start_s, _, taken_s in changes:
-            axis.axvspan(start_s, start_s + taken_s, color=AMBER, alpha=0.2, linewidth=0)
+            axis.axvspan(start_s, start_s + taken_s, color=PALE, alpha=0.6, linewidth=0, zorder=0)
     for start_s, name, _ in changes:
-        axes[0].annotate(name, (start_s, 1.02), xycoords=("data", "axes fraction"), fontsize=9)
+        axes[0].annotate(name, (start_s, 1.02), xycoords=("data", "axes fraction"), fontsize=7.5)
     axes[0].set_ylabel("joint angle (rad)")
     axes[1].set_ylabel("joint speed (rad/s)")
-    axes[1].set_xlabel("time (s); amber: the change; dashed: limits")
-    scale = ScalarMappable(Normalize(1, robot.joint_count), "viridis")
-    figure.colorbar(scale, ax=list(axes), pad=0.02, aspect=30, label="joint, 1: the head")
+    axes[1].set_xlabel("time (s); grey: change to the next gait; dashed: limits")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     save_picture(figure, out, dpi=110)
 
 

@@ -34,7 +34,7 @@ def main(folder: Path, file: Path) -> None:
     pose, waypoints = record.pose, np.array(record.header.run.waypoints_m)
     low, high = pose.links_m[..., :2].min(axis=(0, 1)), pose.links_m[..., :2].max(axis=(0, 1))
     with style():
-        figure = Figure(figsize=(WIDTH_IN, 7.0), layout="constrained")
+        figure = Figure(figsize=(WIDTH_IN, 4.9), layout="constrained")
         axes = figure.subplots(2, 3, sharex=True, sharey=True)
         moments_s = np.linspace(pose.time_s[0], record.end_s, PANELS)
         for axis, time_s in zip(axes.flat, moments_s.tolist(), strict=True):
