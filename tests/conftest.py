@@ -56,6 +56,30 @@ def own_stop_buttons(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def all_figures() -> Iterator[tuple[object, ...]]:
+    """Return the figures of a report; reports of tests that do not read them have the first only.
+
+    To draw them all takes longer than most runs of tests. ``whole_report`` is for tests that read.
+    """
+    from snakewalk.controller.report.figures import sections  # noqa: PLC0415  it imports matplotlib
+
+    figures = sections._ALL
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sections, "_ALL", figures[:1])
+        yield figures
+
+
+@pytest.fixture(scope="module")
+def whole_report(all_figures: tuple[object, ...]) -> Iterator[None]:
+    """Draw every figure of the reports of a module's tests."""
+    from snakewalk.controller.report.figures import sections  # noqa: PLC0415  as above
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sections, "_ALL", all_figures)
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of recordings made by other people; its tests are skipped where it is absent."""

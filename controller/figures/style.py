@@ -177,11 +177,12 @@ def data_uri(figure: Figure) -> str:
 def _lay_out(canvas: FigureCanvasBase, dpi: float) -> None:
     """Place the panels of a figure once and for all, for a canvas and its resolution.
 
-    ``savefig`` would draw the whole figure twice, the first time only to place its panels.
+    ``savefig`` would draw the whole figure twice, the first time only to place its panels; with an
+    engine that is switched off by ``"none"`` it does so, too.
     """
     figure = canvas.figure
     engine = figure.get_layout_engine()
     if engine is not None:
         figure.set_dpi(dpi)
         engine.execute(figure)
-        figure.set_layout_engine("none")
+        figure.set_layout_engine(None)

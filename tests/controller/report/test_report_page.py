@@ -28,7 +28,7 @@ from snakewalk.controller.report.page import Section, film_on_page, page
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Event, RunRecord
 
-pytestmark = pytest.mark.usefixtures("legible_figures")
+pytestmark = pytest.mark.usefixtures("legible_figures", "whole_report")
 
 Make = Callable[..., Path]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
