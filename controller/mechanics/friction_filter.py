@@ -25,9 +25,11 @@ STEP = 0.1
 _MOST = 0.3
 """By which a span moves an estimate at most (ours)."""
 _BOUND = math.log(4.0)
-_DOUBT, _TRUST = 9.21, 1.39
+DOUBT_99, DOUBT_95 = 9.21, 5.99
 """Squared distance of the file from the estimate, in standard deviations, from which on the file is
-out, and below which it holds again: 99 % and 50 % of chi square with two degrees of freedom."""
+out: 99 % and 95 % of chi square with two degrees of freedom."""
+_TRUST = 1.39
+"""The same below which the file holds again: 50 %."""
 _NORMAL_95 = 1.96
 _ROOT = math.sqrt(0.5)
 
@@ -78,6 +80,12 @@ def ratio_evidence(information: float, pull: float, square: float, rows: int) ->
     return SlideEvidence(_Square(0.0, 0.0, information), 0.0, pull, square, rows)
 
 
+def slide_evidence(information: Floats, pull: Floats, square: float, rows: int) -> SlideEvidence:
+    """Return the evidence of an information (2, 2) and a pull (2,) on u and v."""
+    uu, uv, vv = (float(information[k]) for k in ((0, 0), (0, 1), (1, 1)))
+    return SlideEvidence(_Square(uu, uv, vv), float(pull[0]), float(pull[1]), square, rows)
+
+
 @dataclass(frozen=True, slots=True)
 class FoundFriction:
     """Results so far."""
@@ -90,6 +98,12 @@ class FoundFriction:
     differs: bool
     """Whether the file's friction is out."""
 
+    @property
+    def spread(self) -> float:
+        """Greater one of the two factors between the ends of an interval."""
+        (low, high), (least, most) = self.along_95, self.across_95
+        return max(high / low, most / least)
+
 
 class FrictionFilter:
     """Estimates the friction along and across a body.
@@ -99,7 +113,11 @@ class FrictionFilter:
     """
 
     def __init__(
-        self, file: FrictionConfig, sigma: Sequence[float] = (), prior: float = PRIOR
+        self,
+        file: FrictionConfig,
+        sigma: Sequence[float] = (),
+        prior: float = PRIOR,
+        doubt: float = DOUBT_99,
     ) -> None:
         """Begin at the file's friction.
 
@@ -107,9 +125,10 @@ class FrictionFilter:
             file: of the world.
             sigma: three standard deviations of the model's predictions, in the unit of ``update``.
             prior: standard deviation of the logarithms about the file's.
+            doubt: squared distance from which on the file is out.
 
         """
-        self._file = file
+        self._file, self._doubt = file, doubt
         self._weights = [1.0 / each**2 for each in sigma]
         self._prior = _Square(prior**2, 0.0, prior**2)
         self._u = self._v = 0.0
@@ -145,7 +164,7 @@ class FrictionFilter:
         self._u = min(max(kept * self._u, -_BOUND), _BOUND)
         self._v = min(max(kept * self._v, -_BOUND), _BOUND)
         away = self._covariance.inverse.about(self._u, self._v)
-        self._differs = away > (_TRUST if self._differs else _DOUBT)
+        self._differs = away > (_TRUST if self._differs else self._doubt)
         return self.found
 
     def _evidence(

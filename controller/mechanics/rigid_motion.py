@@ -397,30 +397,47 @@ def planar_slide(
     heading_rad: float,
     along: float,
     across: float,
+    load: Floats | None = None,
 ) -> tuple[float, float, float]:
-    """Where a body slides on a level floor whose shape goes through ``n`` given ones.
+    """Where a body slides whose shape goes through ``n`` given ones.
 
     Args:
         headings_rad: (n, L) of the links, about the body's.
         points_m: (n, L, 2) their centres about the body's, in its frame.
         step_s: (n - 1,) between the shapes.
         heading_rad: of the body at the begin.
-        along: friction along the links; every link carries the same weight.
+        along: friction along the links.
         across: likewise.
+        load: (n, L, 3) gravity on each link in weights of a link, x and y along the ground in the
+            world and z into it. None: a level floor, on which every link carries the same weight.
 
     Returns:
-        Way (2) of the body's centre, m, and its heading at the end.
+        Way (2) of the body's centre, m, and its heading at the end. Where friction holds the body
+        no more, it slides with inertia.
 
     """
+    shapes, links = headings_rad.shape
+    if load is None:
+        load = np.zeros((shapes, links, 3))
+        load[:, :, 2] = 1.0
     return _slide_through(
-        *(headings_rad, points_m, step_s, heading_rad, along, across),
-        link_table(headings_rad.shape[1]),
+        *(headings_rad, points_m, step_s, heading_rad, along, across, load, link_table(links))
     )
+
+
+@compiled("void(float64[::1], int64, float64[::1])", makes_arrays=False)
+def _note_movement(table: Floats, links: int, velocity: Floats) -> None:
+    """Write how each link moves, for a next step with inertia."""
+    for k in range(links):
+        at = k // LANES * OTHERS + k % LANES
+        x, y = table[at + POINT_X], table[at + POINT_Y]
+        table[at + MOVING_X] = table[at + SHAPE_X] + velocity[0] - velocity[2] * y
+        table[at + MOVING_Y] = table[at + SHAPE_Y] + velocity[1] + velocity[2] * x
 
 
 @compiled(
     "UniTuple(float64, 3)(float64[:, ::1], float64[:, :, ::1], float64[::1], float64, float64,"
-    " float64, float64[::1])"
+    " float64, float64[:, :, ::1], float64[::1])"
 )
 def _slide_through(
     headings: Floats,
@@ -429,6 +446,7 @@ def _slide_through(
     heading: float,
     along: float,
     across: float,
+    load: Floats,
     table: Floats,
 ) -> tuple[float, float, float]:
     """``planar_slide`` with a ``link_table``, which is overwritten."""
@@ -437,17 +455,27 @@ def _slide_through(
     work, x_m, y_m = np.empty((6, 3)), 0.0, 0.0
     for n in range(len(step_s)):
         dt, c, s = step_s[n], np.cos(heading), np.sin(heading)
+        linear[:] = 0.0
         for k in range(links):
             at = k // LANES * OTHERS + k % LANES
             here, there = points[n, k], points[n + 1, k]
             x, y = 0.5 * (here[0] + there[0]), 0.5 * (here[1] + there[1])
-            table[at + POINT_X], table[at + POINT_Y] = c * x - s * y, s * x + c * y
+            east, north = c * x - s * y, s * x + c * y
+            table[at + POINT_X], table[at + POINT_Y] = east, north
             x, y = (there[0] - here[0]) / dt, (there[1] - here[1]) / dt
             table[at + SHAPE_X], table[at + SHAPE_Y] = c * x - s * y, s * x + c * y
             angle = heading + 0.5 * (headings[n, k] + headings[n + 1, k])
             table[at + FORWARD_X], table[at + FORWARD_Y] = np.cos(angle), np.sin(angle)
-            table[at + NORMAL] = 1.0
-        balance(table, OTHERS, links, along, across, linear, quadratic, velocity, work)
+            pull = load[n, k]
+            table[at + NORMAL] = pull[2]
+            linear[0] += pull[0]
+            linear[1] += pull[1]
+            linear[2] += east * pull[1] - north * pull[0]
+        quadratic[:] = 0.0
+        if not balance(table, OTHERS, links, along, across, linear, quadratic, velocity, work):
+            add_inertia(table, OTHERS, links, dt, linear, quadratic)
+            balance(table, OTHERS, links, along, across, linear, quadratic, velocity, work)
+        _note_movement(table, links, velocity)
         x_m, y_m = x_m + velocity[0] * dt, y_m + velocity[1] * dt
         heading += velocity[2] * dt
     return x_m, y_m, heading

@@ -1,4 +1,4 @@
-"""Friction from noisy poses of the head over a window of time, on a level floor.
+"""Friction from noisy poses of the head over a window of time.
 
 The joints give the shape of the body in each cycle, and the balance of friction gives how a body of
 these shapes moves. The pose of the head is measured many times in the window, each time with noise.
@@ -14,7 +14,12 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.mechanics.friction_filter import STEP, SlideEvidence, ratio_evidence
+from snakewalk.controller.mechanics.friction_filter import (
+    STEP,
+    SlideEvidence,
+    ratio_evidence,
+    slide_evidence,
+)
 from snakewalk.controller.mechanics.rigid_motion import planar_slide
 
 BIN_S: Final = 0.25
@@ -62,6 +67,8 @@ class SlideWindow:
     """(C, L, 2) centres of the links about the body's."""
     start: Floats
     """(3,) x, y and mean heading in the first cycle: a first estimate."""
+    load: Floats | None = None
+    """(C, L, 3) gravity on the links, as ``planar_slide`` accepts it; None on a level floor."""
 
     @property
     def knots(self) -> list[int]:
@@ -78,6 +85,7 @@ class SlideWindow:
             x, y, heading = planar_slide(
                 *(self.headings_rad[at], self.points_m[at], np.diff(self.time_s[at])),
                 *(float(rows[-1][2]), friction.along, friction.across),
+                None if self.load is None else self.load[at],
             )
             rows.append(np.array([rows[-1][0] + x, rows[-1][1] + y, heading]))
         return np.array(rows)
@@ -92,7 +100,7 @@ class SlideWindow:
         return np.column_stack([x + c * ahead - s * left, y + s * ahead + c * left, heading + bend])
 
     def evidence(
-        self, readings: HeadReadings, track: Floats, by_ratio: Floats
+        self, readings: HeadReadings, track: Floats, by_ratio: Floats, by_both: Floats | None = None
     ) -> SlideEvidence | None:
         """Return what the readings show about the friction; None if they are too few.
 
@@ -100,13 +108,15 @@ class SlideWindow:
             readings: within the window.
             track: of ``track``, under the friction that the filter estimates.
             by_ratio: likewise, one step farther along the filter's second axis.
+            by_both: likewise along its first axis; None on a level floor, where it has no effect.
 
         """
         knots_s = self.time_s[self.knots]
         bins = np.clip(np.searchsorted(knots_s, readings.time_s, "right") - 1, 0, len(knots_s) - 2)
         counts = np.bincount(bins, minlength=len(knots_s) - 1)
         kept = np.flatnonzero(counts)
-        if len(kept) < FEWEST or not (np.isfinite(track).all() and np.isfinite(by_ratio).all()):
+        tracks = [by_ratio] if by_both is None else [by_both, by_ratio]
+        if len(kept) < FEWEST or not all(np.isfinite(each).all() for each in (track, *tracks)):
             return None
 
         def averages(values: Floats) -> Floats:
@@ -116,18 +126,18 @@ class SlideWindow:
         here = self.heads(track, readings.time_s)
         off = readings.place - here
         off[:, 2] = np.arctan2(np.sin(off[:, 2]), np.cos(off[:, 2]))
-        slope = (self.heads(by_ratio, readings.time_s) - here) / STEP
         independent = np.minimum(counts[kept], BIN_S / NOISE_S)
         noise = averages(readings.variance) / independent[:, None]
         covariance = _model_covariance(averages(here), track[:-1], kept) + np.diag(noise.ravel())
-        gap, along = averages(off).ravel(), averages(slope).ravel()
-        solved = np.linalg.solve(covariance, np.column_stack([gap, along]))
-        return ratio_evidence(
-            float(along @ solved[:, 1]),
-            float(along @ solved[:, 0]),
-            float(gap @ solved[:, 0]),
-            len(gap) - 3,
-        )
+        slopes = [
+            averages((self.heads(each, readings.time_s) - here) / STEP).ravel() for each in tracks
+        ]
+        columns = np.column_stack([averages(off).ravel(), *slopes])
+        products = columns.T @ np.linalg.solve(covariance, columns)
+        square, rows = float(products[0, 0]), len(columns) - 3
+        if by_both is None:
+            return ratio_evidence(float(products[1, 1]), float(products[1, 0]), square, rows)
+        return slide_evidence(products[1:, 1:], products[1:, 0], square, rows)
 
 
 def _model_covariance(heads: Floats, track: Floats, kept: np.ndarray) -> Floats:

@@ -2,19 +2,28 @@
 
 The filtered pose of a run cannot show it: between two measurements it follows dead reckoning, which
 assumes the friction. The estimator compares the measured poses with the motion that the balance of
-friction predicts for the joints. This is valid on a level floor.
+friction and gravity predicts for the joints. This is valid where the ground under the body is a
+plane, because only there all links bear the body: other motion shows nothing.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.mechanics.friction_filter import FoundFriction, FrictionFilter
+from snakewalk.controller.mechanics.friction_filter import (
+    DOUBT_95,
+    DOUBT_99,
+    FoundFriction,
+    FrictionFilter,
+)
 from snakewalk.controller.mechanics.slide_window import HeadReadings, SlideWindow
+from snakewalk.controller.mechanics.slope_load import slope_load
 from snakewalk.controller.pose.external_pose import MeasuredHeads, TimedHead
 from snakewalk.controller.runtime.friction_monitor import FrictionEstimator
 
@@ -26,6 +35,12 @@ PRIOR: Final = 0.56
 """Standard deviation of the logarithms about the file's friction (ours): a third to three times
 the file's in 95 %. On a level floor only the ratio of both frictions can be measured; the rest of
 an interval comes from here."""
+ROUGH_M: Final = 0.005
+"""Root mean square distance of the ground under the links from a plane, above which the motion does
+not count (ours): a link is 7 cm long."""
+SPREAD: Final = 3.0
+"""On a slope, the largest factor between the ends of an interval with which the estimate is used
+(ours)."""
 
 
 class _Cycle(NamedTuple):
@@ -33,6 +48,7 @@ class _Cycle(NamedTuple):
     place: Floats
     headings_rad: Floats
     points_m: Floats
+    links_m: Floats
 
 
 class MeasuredFriction(FrictionEstimator):
@@ -43,6 +59,7 @@ class MeasuredFriction(FrictionEstimator):
         file: FrictionConfig,
         measured: Callable[[], MeasuredHeads],
         use: Callable[[FrictionConfig], None],
+        ground: HeightField | None = None,
     ) -> None:
         """Begin with the file's friction.
 
@@ -51,11 +68,13 @@ class MeasuredFriction(FrictionEstimator):
             measured: returns the measured poses since the last call.
             use: called with the friction to use when it changes. This is the file's until the run
                 contradicts it.
+            ground: None is a level floor.
 
         """
         super().__init__(file, use)
-        self._measured = measured
-        self._filter = FrictionFilter(file, prior=PRIOR)
+        self._measured, self._ground = measured, ground
+        doubt = DOUBT_99 if ground is None else DOUBT_95
+        self._filter = FrictionFilter(file, prior=PRIOR, doubt=doubt)
         self._cycles: list[_Cycle] = []
         self._heads: list[TimedHead] = []
         self._steps: Iterator[FoundFriction | None] = iter(())
@@ -86,15 +105,29 @@ class MeasuredFriction(FrictionEstimator):
     def _steps_of(
         self, cycles: list[_Cycle], heads: list[TimedHead]
     ) -> Iterator[FoundFriction | None]:
-        times, places, headings, points = (np.array(each) for each in zip(*cycles, strict=True))
-        window = SlideWindow(times, headings, points, places[0])
-        here, _, by_ratio = self._filter.hypotheses()
+        columns = (np.array(each) for each in zip(*cycles, strict=True))
+        times, places, headings, points, links = columns
+        window, ground = SlideWindow(times, headings, points, places[0]), self._ground
+        if ground is not None:
+            if any(_roughness_m(ground, each) > ROUGH_M for each in links[window.knots]):
+                yield self._filter.absorb(None, WINDOW_S)
+                return
+            window = replace(window, load=np.array([_load(ground, each) for each in links]))
+            yield None
+        here, by_both, by_ratio = self._filter.hypotheses()
         track = window.track(here)
         yield None
         farther = window.track(by_ratio)
         yield None
-        evidence = window.evidence(_readings(heads), track, farther) if heads else None
+        other = None if ground is None else window.track(by_both)
+        evidence = window.evidence(_readings(heads), track, farther, other) if heads else None
         yield self._filter.absorb(evidence, WINDOW_S)
+
+    def accept(self, found: FoundFriction) -> None:
+        """Use a finding as ``FrictionEstimator``; on a slope only if its intervals are narrow."""
+        if self._ground is not None and found.spread > SPREAD:
+            found = replace(found, differs=False)
+        super().accept(found)
 
 
 def _cycle(time_s: float, view: BodyView) -> _Cycle:
@@ -104,7 +137,22 @@ def _cycle(time_s: float, view: BodyView) -> _Cycle:
     c, s = np.cos(mean), np.sin(mean)
     x, y = points[:, 0], points[:, 1]
     turned = np.column_stack([c * x + s * y, c * y - s * x])
-    return _Cycle(time_s, np.array([*view.centre_m[:2], mean]), headings - mean, turned)
+    place = np.array([*view.centre_m[:2], mean])
+    return _Cycle(time_s, place, headings - mean, turned, view.link_m[:, :2])
+
+
+def _load(ground: HeightField, links_m: Floats) -> Floats:
+    """Return gravity (L, 3) on links at (L, 2), as ``planar_slide`` accepts it."""
+    return np.column_stack(slope_load(ground, links_m))
+
+
+def _roughness_m(ground: HeightField, links_m: Floats) -> float:
+    """Return the root mean square distance in height of the ground at (L, 2) from a plane."""
+    offset_m = links_m - links_m.mean(axis=0)
+    table = np.column_stack([offset_m, np.ones(len(offset_m))])
+    height_m = ground.plane(links_m[:, 0], links_m[:, 1])[0]
+    away_m = height_m - table @ np.linalg.lstsq(table, height_m, rcond=None)[0]
+    return float(np.sqrt(np.mean(away_m**2)))
 
 
 def _readings(heads: list[TimedHead]) -> HeadReadings:

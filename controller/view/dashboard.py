@@ -13,7 +13,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.ground_slope import carrier_share, ground_slope
 from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import CurveValues, panel_curves
-from snakewalk.controller.runlog.record import Event, Header, RunRecord
+from snakewalk.controller.runlog.record import POSE_CHECK, Event, Header, RunRecord
 from snakewalk.controller.runlog.topics import TABLES
 from snakewalk.controller.view.scene import contour_step_m
 
@@ -48,8 +48,24 @@ class Dashboard:
         self._picture: viser.GuiImageHandle | None = None
         self._state = gui.add_html("")
         self.follow = gui.add_checkbox("follow the body", not header.run.waypoints_m)
-        self.goals = gui.add_checkbox("show goals", True, hint="amber, where joints should be")
+        self._checks_pose = header.backend == POSE_CHECK
+        self.goals = gui.add_checkbox(
+            "show goals",
+            not self._checks_pose,
+            hint="amber, where joints should be",
+            visible=not self._checks_pose,
+        )
         self.tabs = tabs = gui.add_tab_group()
+        if self._checks_pose:
+            with tabs.add_tab("pose"):
+                self._feed = gui.add_html("")
+        else:
+            self._add_joints(gui, tabs)
+        with tabs.add_tab("events"):
+            self._events = gui.add_html("")
+
+    def _add_joints(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
+        """Add the tabs of a run, whose joints are known."""
         with tabs.add_tab("servos"):
             self._bars = gui.add_html("")
         with tabs.add_tab("curves"):
@@ -67,8 +83,6 @@ class Dashboard:
             }
             for each in self._panels.values():
                 each.visible = False
-        with tabs.add_tab("events"):
-            self._events = gui.add_html("")
 
     def show_picture(self, jpeg: bytes) -> None:
         """Show what the run's camera saw; the first makes the tab."""
@@ -95,7 +109,7 @@ class Dashboard:
             facts.append(f"{where.speed_m_s[pose]:.2f} m/s")
         if self._ground is not None:
             ahead_rad, steepest_rad = ground_slope(self._ground, where.links_m[pose][None])
-            if np.isfinite(ahead_rad[0]):
+            if np.isfinite(ahead_rad[0]) and not self._checks_pose:
                 ahead, steepest = np.degrees([ahead_rad[0], steepest_rad[0]])
                 facts.append(f"slope {steepest:.0f}°, {ahead:+.0f}° ahead")
         if np.isfinite(share := carrier_share(record)):
@@ -110,7 +124,9 @@ class Dashboard:
         )
 
     def show_servos(self, record: RunRecord, cycle: int, slow: int | None) -> None:
-        """Show a row of bars for each servo."""
+        """Show a row of bars for each servo; a check of a pose knows none."""
+        if self._checks_pose:
+            return
         rows, period_s = record.cycle, 1.0 / self._run.cycle_hz
         heat, volts = np.full((2, self._robot.joint_count), np.nan)
         if slow is not None:
@@ -146,7 +162,9 @@ class Dashboard:
         )
 
     def show_curves(self, record: RunRecord, cycle: int) -> None:
-        """Show the last seconds up to a row."""
+        """Show the last seconds up to a row; a check of a pose has no curves."""
+        if self._checks_pose:
+            return
         rows = record.cycle
         first = int(np.searchsorted(rows.time_s, rows.time_s[cycle] - SPAN_S))
         pick = _spread(first, cycle)
@@ -164,12 +182,29 @@ class Dashboard:
                 plot.data = (time_s, *_newest(panel, curves, time_s))
 
     def show_events(self, events: tuple[Event, ...]) -> None:
-        """Show the newest events, the newest first."""
+        """Show the newest events, the newest first; of a checked pose, its facts as well."""
+        if self._checks_pose:
+            self._feed.content = _feed_lines(events)
         self._events.content = "".join(
             f"<div style='padding:.15em .8em;font-size:12px;color:{_LEVELS.get(each.level, _INK)}'>"
             f"{each.time_s:.1f} s &nbsp;{escape(each.kind)}: {escape(each.text)}</div>"
             for each in reversed(events[-_EVENTS:])
         )
+
+
+def _feed_lines(events: Sequence[Event]) -> str:
+    """Return the newest facts of a checked pose, one a line, and the faults reported with them."""
+    begins = [k for k, each in enumerate(events) if each.kind == "pose"]
+    newest = events[begins[-1] :] if begins else ()
+    lines = [
+        (_LEVELS.get(each.level, _INK), text)
+        for each in newest
+        for text in (each.text.split("; ") if each.kind == "pose" else (each.text,))
+    ]
+    return "".join(
+        f"<div style='padding:.15em .8em;color:{colour}'>{escape(text)}</div>"
+        for colour, text in lines
+    )
 
 
 def _plot(

@@ -1,11 +1,13 @@
-"""A body without inertia that slides on a level floor by a friction."""
+"""A body without inertia that slides on a plane by a friction."""
 
 import numpy as np
 
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world, mean_heading_rad
 from snakewalk.controller.mechanics.rigid_motion import rigid_velocity
+from snakewalk.controller.mechanics.slope_load import slope_load
 from snakewalk.drivers.types import BodyPose
 
 ROBOT = load_robot("yaw16")
@@ -30,19 +32,28 @@ def joints_rad(time_s: float) -> np.ndarray:
 
 
 def sliding(
-    friction: FrictionConfig, seconds: float, later: FrictionConfig | None = None
+    friction: FrictionConfig,
+    seconds: float,
+    later: FrictionConfig | None = None,
+    ground: HeightField | None = None,
 ) -> list[BodyView]:
-    """A body that slides by a friction, from half of the time on by another, a cycle a step."""
+    """A body that slides by a friction, from half of the time on by another, a cycle a step.
+
+    The ground is a plane, None a level floor.
+    """
     centre_m, heading = np.zeros(2), 0.3
     views = [posed(joints_rad(0.0), heading, centre_m)]
     for k in range(round(seconds / CYCLE_S)):
         here = views[-1]
         there = posed(joints_rad((k + 1) * CYCLE_S), heading, centre_m)
+        tangential, normal = slope_load(ground, here.link_m)
         velocity = rigid_velocity(
             (0.5 * (here.link_m + there.link_m) - here.centre_m)[:, :2],
             0.5 * (here.headings_rad + there.headings_rad),
             (there.link_m - here.link_m)[:, :2] / CYCLE_S,
             friction if later is None or k * CYCLE_S < 0.5 * seconds else later,
+            tangential=tangential,
+            normal=normal,
         )
         centre_m = centre_m + velocity[:2] * CYCLE_S
         heading += float(velocity[2]) * CYCLE_S

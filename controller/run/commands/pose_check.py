@@ -19,7 +19,7 @@ from snakewalk.controller.pose.feed_statistics import FeedStatistics
 from snakewalk.controller.pose.first_pose import start_fault
 from snakewalk.controller.pose.sample import PoseFeed, PoseSample
 from snakewalk.controller.run.external.external_source import ExternalSource, ground_height
-from snakewalk.controller.run.external.pose_check_page import PoseCheckPage
+from snakewalk.controller.run.external.pose_check_page import PoseCheckPage, feed_words
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.pose_provider import pose_plugin
 from snakewalk.controller.run.prepared_run import PreparedRun
@@ -124,10 +124,11 @@ def _line(found: FeedStatistics) -> str:
     if "position_m" not in facts:
         return f"no pose; {found.last_fault or 'nothing arrived'}"
     x_m, y_m, z_m = facts["position_m"]
-    return (
+    place = (
         f"x {x_m:+.3f}  y {y_m:+.3f}  z {z_m:+.3f} m   heading {facts['heading_deg']:+.1f} deg   "
-        f"up {facts['up'][2]:+.2f}   {facts['rate_hz']} Hz   frame {facts['frame']}"
+        f"up {facts['up'][2]:+.2f}"
     )
+    return "   ".join([place, *feed_words(facts)])
 
 
 def _print(line: str) -> None:

@@ -20,16 +20,21 @@ FACTS: Final = (
     ("jitter_mean_s", "delay beyond the quickest {} s"),
     ("longest_gap_s", "longest gap {} s"),
     ("noise_m", "noise {} m"),
-    ("noise_deg", "{} deg"),
+    ("noise_deg", "noise {} deg"),
     ("frame", "frame {}"),
 )
-"""Facts of the feed that the page shows, and their words."""
+"""Facts of the feed that the page and the terminal show, and their words."""
+
+
+def feed_words(facts: dict[str, Any]) -> list[str]:
+    """Return the facts of a feed that are known, in words."""
+    return [text.format(facts[key]) for key, text in FACTS if facts.get(key) is not None]
 
 
 class PoseCheckPage:
     """Shows poses in a page that accepts the rows of a log.
 
-    The joint angles are unknown before torque, so the body is straight.
+    The joint angles are unknown before torque, so the body is drawn straight.
     """
 
     def __init__(self, log: RunLog, prepared: PreparedRun, config: PoseConfig, source: str) -> None:
@@ -55,10 +60,10 @@ class PoseCheckPage:
         straight, count = self._straight, len(self._straight)
         unknown, no = np.full(count, np.nan), np.zeros(count, np.uint8)
         state = JointState(
-            time_s, straight, unknown, unknown, unknown, unknown, no, no, unknown, no == 1, unknown
+            time_s, unknown, unknown, unknown, unknown, unknown, no, no, unknown, no == 1, unknown
         )
         self._log.cycle(
-            time_s, straight, straight, state, deadline_s=time_s, lateness_s=0.0,
+            time_s, unknown, unknown, state, deadline_s=time_s, lateness_s=0.0,
             wire_busy_s=float("nan"), electrical_j=float("nan"), mechanical_j=float("nan"),
             yield_rad=None, verdict="pass", reason="", joints=[],
         )  # fmt: skip
@@ -74,7 +79,7 @@ class PoseCheckPage:
 
     def report(self, time_s: float, facts: dict[str, Any], faults: list[str]) -> None:
         """Show the facts of the feed, and its faults, as events."""
-        words = [text.format(facts[key]) for key, text in FACTS if facts.get(key) is not None]
+        words = feed_words(facts)
         offset = ", ".join(f"{value:g}" for value in self._config.offset_m)
         words.append(f"mount: link {self._config.link}, offset {offset} m")
         self._log.event(time_s, "pose", "; ".join(words))

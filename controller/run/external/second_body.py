@@ -63,9 +63,9 @@ def second_body(
     """Let a bare snake that walks ground that is known use a second body, where there is one.
 
     Returns:
-        The estimator of the friction under a walk: on a level floor on paper, elsewhere on that
-            body. None if the pose assumes the friction (the joints, an IMU), and on hills for an
-            external pose: its noise would look like friction there.
+        The estimator of the friction under a walk. From an external pose it is on paper, where the
+            ground under the body is a plane; else on a level floor on paper, elsewhere on that
+            body. None if the pose assumes the friction (the joints, an IMU).
 
     """
     run, world, robot = prepared.run, prepared.world, prepared.robot
@@ -80,7 +80,10 @@ def second_body(
     is_level = isinstance(world.ground, FlatGround) and world.obstacle is None
     use = cast(UsesFriction, source).use_friction
     if pose.measured_heads is not None:
-        return MeasuredFriction(world.friction, pose.measured_heads, use) if is_level else None
+        if world.obstacle is not None or not (is_level or prepared.ground):
+            return None
+        ground = None if is_level else prepared.ground
+        return MeasuredFriction(world.friction, pose.measured_heads, use, ground)
     if run.pose != "camera" and (not run.pose_is_true or backend.pose is None):
         return None
     if is_level:

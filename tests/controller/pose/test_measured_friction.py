@@ -1,8 +1,11 @@
 """Friction from measured poses of the head: noise is not taken for friction."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.mechanics.friction_filter import FoundFriction
@@ -27,7 +30,10 @@ def seen(time_s: float, view: BodyView, rng: np.random.Generator) -> TimedHead:
 
 
 def estimated(
-    views: list[BodyView], seed: int, lost: tuple[float, float] = (0.0, 0.0)
+    views: list[BodyView],
+    seed: int,
+    lost: tuple[float, float] = (0.0, 0.0),
+    ground: HeightField | None = None,
 ) -> tuple[list[FoundFriction], list[FrictionConfig]]:
     """Return the findings from noisy, late poses, and the frictions to use.
 
@@ -36,7 +42,7 @@ def estimated(
     rng, used = np.random.default_rng(seed), list[FrictionConfig]()
     late = round(DELAY_S / CYCLE_S)
     arrived = MeasuredHeads(0.0, [])
-    monitor = MeasuredFriction(FILE, lambda: arrived, used.append)
+    monitor = MeasuredFriction(FILE, lambda: arrived, used.append, ground)
     found = []
     for k, true in enumerate(views):
         now_s, measured_s = k * CYCLE_S, (k - late) * CYCLE_S
@@ -79,3 +85,47 @@ def test_a_gap_in_the_poses_does_not_move_the_estimate() -> None:
     found, used = estimated(sliding(FILE, 9.0), 2, lost=(1.0, 2.5))
     assert used == []
     assert found[-1].friction.along == pytest.approx(0.1, rel=0.15)
+
+
+def slope(degrees: float) -> HeightField:
+    """A plane that rises along x."""
+    x_m = np.linspace(-4.0, 4.0, 81)
+    return HeightField(np.tile(np.tan(np.radians(degrees)) * x_m, (81, 1)), 0.1, -4.0, -4.0)
+
+
+@pytest.mark.parametrize(("along", "across"), [(0.1, 0.7), (0.06, 0.3)])
+def test_a_slope_shows_both_frictions(along: float, across: float) -> None:
+    """Gravity sets the scale: both are found, and used when they contradict the file."""
+    ground = slope(5.0)
+    views = sliding(FrictionConfig(along=along, across=across), 25.0, ground=ground)
+    found, used = estimated(views, 3, ground=ground)
+    last = found[-1]
+    assert last.along_95[0] < along < last.along_95[1]
+    assert last.across_95[0] < across < last.across_95[1]
+    assert last.friction.across == pytest.approx(across, rel=0.25)
+    assert bool(used) == (across != 0.7)
+
+
+def test_motion_on_rough_ground_shows_nothing() -> None:
+    """Few links bear a body there, so its motion is not that of the balance."""
+    plane = slope(5.0)
+    rough = HeightField(
+        plane.z_m + 0.01 * np.random.default_rng(1).standard_normal(plane.z_m.shape),
+        *(plane.spacing_m, plane.x0_m, plane.y0_m),
+    )
+    views = sliding(FrictionConfig(along=0.3, across=0.3), 9.0, ground=plane)
+    found, used = estimated(views, 4, ground=rough)
+    assert used == []
+    assert found[-1].friction == FILE
+
+
+def test_a_wide_interval_is_not_used() -> None:
+    """A contradiction counts on a slope only when both intervals are narrow."""
+    used = list[FrictionConfig]()
+    monitor = MeasuredFriction(FILE, lambda: MeasuredHeads(0.0, []), used.append, slope(5.0))
+    other = FrictionConfig(along=0.05, across=0.35)
+    wide = FoundFriction(other, (0.02, 0.09), (0.2, 0.5), differs=True)
+    monitor.accept(wide)
+    assert used == []
+    monitor.accept(replace(wide, along_95=(0.04, 0.06)))
+    assert used == [other]

@@ -80,6 +80,36 @@ def test_facts_mount_and_faults_are_events(rows: dict[str, list[dict[str, Any]]]
     assert ("pose fault", "the robot is elsewhere") in events
 
 
+def test_no_joint_is_claimed(rows: dict[str, list[dict[str, Any]]]) -> None:
+    """The joints are unknown before torque: neither an angle nor a goal of 0."""
+    for row in rows[CycleTable.topic.name]:
+        for name in ("asked_rad", "sent_rad", "measured_rad"):
+            assert set(row[name]) == {None}
+
+
+def test_the_page_shows_the_facts_and_no_servos(rows: dict[str, list[dict[str, Any]]]) -> None:
+    """Rate, delay, noise, frame and mount, a line each; the newest ones, and the fault in red."""
+    viser = pytest.importorskip("viser")
+    from snakewalk.controller.view.dashboard import Dashboard
+
+    names = (ConfigTable, CycleTable, PoseTable, EventTable)
+    record = record_of({t.topic.name: rows[t.topic.name] for t in names}, complete=False, note="")
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        board = Dashboard(server, record.header)
+        board.show_servos(record, -1, None)
+        board.show_curves(record, -1)
+        board.show_events(record.events)
+        shown = board._feed.content
+    finally:
+        server.stop()
+    words = ("rate 5", "delay beyond", "noise 0.0 m", "noise 0.0 deg", "frame lab", "mount: link 0")
+    for part in words:
+        assert shown.count(part) == 1
+    assert shown.count("the robot is elsewhere") == 1
+    assert not hasattr(board, "_bars")
+
+
 def test_axes_are_drawn_on_the_ground_and_on_the_head(
     rows: dict[str, list[dict[str, Any]]],
 ) -> None:
