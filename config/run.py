@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import Name, Strict
+from snakewalk.config.base import STOP_OUTPUT_PATTERN, Name, Strict
 from snakewalk.config.camera import CameraConfig, MappingConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
@@ -181,7 +181,7 @@ class SafetyConfig(Strict):
     )
     stop_output: str | None = Field(
         None,
-        pattern=r"^(-?(rts|dtr):.+|command:/.+)$",
+        pattern=STOP_OUTPUT_PATTERN,
         description="activated if torque off is not confirmed: rts:PORT or dtr:PORT sets this line "
         "of a serial port, -rts:PORT or -dtr:PORT clears it, command:/PROGRAM ARGUMENT starts a "
         "program; a simulated run opens the simulated supply",

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
 from snakewalk.config.archive import read_text
+from snakewalk.config.base import PATTERNS_IN_WORDS
 from snakewalk.config.errors import ConfigError
 
 M = TypeVar("M", bound=BaseModel)
@@ -154,13 +155,29 @@ def _meant(model: type[BaseModel], key: str, others: Schemas) -> str:
 
 
 def _pattern_in_words(pattern: str) -> str:
-    letters = re.fullmatch(r"\^\[(\w+)\](?:\*|\{(\d+),(\d+)\})\$", pattern)
-    if letters is None:
-        return "holds '/', a control character or a leading dot"
-    which, least, most = letters.groups()
-    return f"must have the letters {' and '.join(which)} only" + (
-        f", {least} to {most} of them" if least else ""
-    )
+    """Return the message for a text that does not match."""
+    if pattern in PATTERNS_IN_WORDS:
+        return PATTERNS_IN_WORDS[pattern]
+    letters = re.fullmatch(r"\^\[([a-z]+)\](?:\*|\{(\d+),(\d+)\})\$", pattern)
+    if letters is not None:
+        which, least, most = letters.groups()
+        return f"must have the letters {' and '.join(which)} only" + (
+            f", {least} to {most} of them" if least else ""
+        )
+    classes = re.fullmatch(r"\^(?:\[([^]]+)\])?\[([^]]+)\][*+]\$", pattern)
+    if classes is None:
+        return f"must match {pattern}"
+    first, others = classes.groups()
+    begin = f"must begin with {_class_in_words(first)}, and " if first else "must "
+    return f"{begin}have only {_class_in_words(others)}"
+
+
+def _class_in_words(characters: str) -> str:
+    ranges = {"a-z": "small letters", "A-Z": "capital letters", "0-9": "digits"}
+    words = [name for each, name in ranges.items() if each in characters]
+    rest = re.sub("a-z|A-Z|0-9", "", characters)
+    listed = words + [repr(each) for each in rest]
+    return " or ".join([", ".join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)
 
 
 def _line(

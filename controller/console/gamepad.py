@@ -71,7 +71,7 @@ class Gamepad:
             raise InputError(f"{path}: is a file; a gamepad is such as /dev/input/js0")
         self._path = path
         self._pad = Pad()
-        self._gone = False
+        self._gone = self._is_written = False
 
     @property
     def gone(self) -> str | None:
@@ -102,7 +102,10 @@ class Gamepad:
                 more = os.read(self._file, 512)
                 data += more
                 if not more:
+                    # a pipe has no end before its first writer comes
+                    self._gone = self._gone or self._is_written
                     break
+                self._is_written = True
         except BlockingIOError:
             return self._pad.keys(data)
         except OSError:  # unplugged, or its radio is out of reach

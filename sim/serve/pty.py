@@ -152,10 +152,14 @@ class PtyServer:
             line.settle()
         arrived = line.read_until(CHUNK_BYTES, line.clock.now_s())
         if arrived:
-            try:
-                os.write(self._master, arrived)
-            except BlockingIOError:  # no client reads: a UART's buffer would overrun, too
-                self.overrun_bytes += len(arrived)
+            self._send(arrived)
+
+    def _send(self, arrived: bytes) -> None:
+        """Hand bytes to the kernel, which hands them to the client."""
+        try:
+            os.write(self._master, arrived)
+        except BlockingIOError:  # no client reads: a UART's buffer would overrun, too
+            self.overrun_bytes += len(arrived)
 
     def _receive(self) -> bytes:
         """Bytes of the client; empty if the kernel reports something else."""

@@ -1,11 +1,15 @@
-"""The servos' pseudo-terminals and our serial ports on them: one thread, simulated time."""
+"""The servos' pseudo-terminals and our serial ports on them: one thread, simulated time.
+
+The kernel hands the bytes of a pseudo-terminal over in a thread of its own, later on a busy
+machine. Simulated time stops until it has, in both directions: no result depends on the machine.
+"""
 
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve.pty import IDLE_S, PtyServer
 
 HAND_OVER_S = 1e-3
-"""Real time that the operating system is given to hand bytes over, at each look."""
+"""Real time between two looks for bytes that the kernel has not handed over."""
 LOOK_S = 2.5e-4
 """Simulated time between two looks."""
 _TRIES = 300
@@ -18,21 +22,30 @@ class ServedClock(SimClock):
     def __init__(self) -> None:
         super().__init__()
         self.servers: list[PtyServer] = []
+        self.arriving: dict[PtyServer, int] = {}
+        """Bytes that a server has sent and its client has not read."""
         self._outstanding = 0
 
     def serve(self, server: PtyServer) -> None:
-        """Let a server run, too, and count what it receives."""
+        """Let a server run, too, and count what it receives and sends."""
+        self.arriving[server] = 0
         if server in self.servers:
             return
         self.servers.append(server)
-        receive = server._receive
+        receive, send = server._receive, server._send
 
         def counted() -> bytes:
             received = receive()
             self._outstanding -= len(received)
             return received
 
+        def counting(arrived: bytes) -> None:
+            overrun = server.overrun_bytes
+            send(arrived)
+            self.arriving[server] += len(arrived) - (server.overrun_bytes - overrun)
+
         server._receive = counted  # type: ignore[method-assign]
+        server._send = counting  # type: ignore[method-assign]
 
     def on_sent(self, count: int) -> None:
         """Expect as many bytes at the servers."""
@@ -66,7 +79,7 @@ class PtyPort(SerialPort):
     def __init__(self, server: PtyServer, baud: int, clock: ServedClock) -> None:
         super().__init__(server.path, baud, clock)
         self.descriptor = None  # compiled code would wait for real time
-        self._served = clock
+        self._served, self._server = clock, server
         clock.serve(server)
 
     def write(self, data: bytes) -> None:
@@ -78,9 +91,29 @@ class PtyPort(SerialPort):
         """As ``BytePort`` says."""
         got = b""
         while True:
-            self._served.look(HAND_OVER_S)
-            got += super().read_until(count - len(got), self._served.now_s())
+            self._served.deliver()
+            self._served.look(0.0)
+            got += self._handed_over(count - len(got))
             left_s = deadline_s - self._served.now_s()
             if len(got) == count or left_s <= 0.0:
                 return got
             self._served.advance(min(LOOK_S, left_s))
+
+    def clearPort(self) -> None:
+        """As ``BytePort`` says; bytes on their way are discarded, too."""
+        self._handed_over(self._served.arriving[self._server])
+        super().clearPort()
+
+    def _handed_over(self, count: int) -> bytes:
+        """Return up to ``count`` bytes of those sent; wait in real time until they are there."""
+        arriving = self._served.arriving
+        count = min(count, arriving[self._server])
+        got = b""
+        for _ in range(_TRIES):
+            got += super().read_until(count - len(got), self._served.now_s())
+            if len(got) == count:
+                arriving[self._server] -= count
+                return got
+            self._readable.poll(HAND_OVER_S * 1e3)
+        arriving[self._server] = 0  # another reader, or a flush, has the rest
+        return got

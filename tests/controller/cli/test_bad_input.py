@@ -114,6 +114,7 @@ ROWS = [
     ("plan flat-square --set run.behavior.sliding=0", "did you mean behaviour?"),
     ("plan flat-square --set run.name=../x", "name: holds '/'"),
     ("plan flat-square --set robot.joint_axes=yxy", "must have the letters y and p only"),
+    ("plan flat-square --set run.safety.stop_output=rts", "stop_output: must be rts:PORT, -rts:"),
     ('plan flat-square --set run.name=""', "name: must not be empty"),
     ("plan flat-slalom --with repertoire --set run.seed=3", "does not use --motion"),
     ("play worm-like --set run.robot=yaw16", "run.robot: is given by --robot"),

@@ -235,6 +235,22 @@ def test_a_pad_tells_whether_a_shoulder_is_held_and_one_that_is_gone_holds_none(
         assert not device.held
 
 
+def test_a_pipe_whose_writer_has_ended_is_a_gamepad_that_is_gone(tmp_path: Path) -> None:
+    fifo = tmp_path / "js0"
+    os.mkfifo(fifo)
+    with Gamepad(fifo) as device:
+        assert device.pressed() == []
+        assert device.gone is None, "no program has opened the pipe yet"
+        with fifo.open("wb", buffering=0) as file:
+            file.write(event(1, 1, 4))
+            assert device.pressed() == []
+            assert device.held
+            assert device.gone is None
+        assert device.pressed() == []
+        assert device.gone is not None
+        assert not device.held
+
+
 @pytest.mark.parametrize(
     "command",
     [

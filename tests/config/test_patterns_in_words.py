@@ -1,0 +1,40 @@
+"""Each pattern of a schema is described by words in the message for a text that does not match."""
+
+import json
+import re
+
+import pytest
+
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.strict_toml import _pattern_in_words
+from snakewalk.config.world import WorldConfig
+
+
+@pytest.mark.parametrize(
+    ("pattern", "words"),
+    [
+        ("^[yr]{1,4}$", "must have the letters y and r only, 1 to 4 of them"),
+        ("^[A-Za-z0-9_]+$", "must have only small letters, capital letters, digits or '_'"),
+        (
+            "^[a-z][a-z0-9_-]*$",
+            "must begin with small letters, and have only small letters, digits, '_' or '-'",
+        ),
+        ("^(on|off)$", "must match ^(on|off)$"),
+    ],
+)
+def test_a_pattern_in_words(pattern: str, words: str) -> None:
+    assert _pattern_in_words(pattern) == words
+
+
+@pytest.mark.parametrize("schema", [RobotConfig, RunConfig, ServoModel, WorldConfig])
+def test_every_pattern_of_a_file_has_words(
+    schema: type[RobotConfig | RunConfig | ServoModel | WorldConfig],
+) -> None:
+    text = json.dumps(schema.model_json_schema())
+    patterns = {
+        json.loads(f'"{each}"') for each in re.findall(r'"pattern": "((?:\\.|[^"])*)"', text)
+    }
+    assert patterns
+    assert [each for each in patterns if _pattern_in_words(each).startswith("must match")] == []
