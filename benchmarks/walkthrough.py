@@ -4,6 +4,7 @@
 
 python -m benchmarks.walkthrough                    # tables, as Markdown
 python -m benchmarks.walkthrough --write FOLDER     # pictures and positions.toml of the same route
+python -m benchmarks.walkthrough --motorcycle FOLDER  # a real pair as a single position
 python -m benchmarks.walkthrough --picture FILE     # stages as one picture
 python -m benchmarks.walkthrough --positions 2      # the first step alone
 """
@@ -34,6 +35,7 @@ from snakewalk.controller.mapping.mosaic.scale_flow import (
 )
 from snakewalk.controller.mapping.mosaic.scale_matches import SCALES, match_over_scale
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk, read_walk
+from tests.oracles.motorcycle import true_depth, write_motorcycle
 from tests.oracles.ravine import Camera, Station, station, write_route
 
 PLACES_M = (0.0, 0.7, 1.4, 2.1, 2.8, 3.5)
@@ -131,6 +133,28 @@ def pose_table(walk: StereoWalk) -> None:
         )
 
 
+def real_pair(folder: Path) -> None:
+    """Write the motorcycle pair, and print errors of its model and of a film around it."""
+    file = write_motorcycle(folder)
+    print(file)
+    walk = read_walk(file, load(file, WalkthroughConfig))
+    (model,), truth = walk.models, true_depth()
+    known = np.isfinite(truth)
+    error = np.abs(model.points_m[..., 2] / truth - 1.0)[known & model.valid]
+    camera = picture_camera(walk, (640, 480))
+    holes = [
+        1.0 - render(walk, view, camera, (640, 480)).drawn.mean() for view in views_along(walk, 4)
+    ]
+    print("| valid | depth error, median | within 1 % | within 5 % | holes of the film |")
+    print("| ---: | ---: | ---: | ---: | ---: |")
+    print(
+        f"| {100 * model.valid.mean():.0f} % | {100 * np.median(error):.2f} % | "
+        f"{100 * (error < 0.01).mean():.0f} % | {100 * (error < 0.05).mean():.0f} % | "
+        f"{100 * np.mean(holes):.0f} % |"
+    )
+    print(provenance(f"python -m benchmarks.walkthrough --motorcycle {folder.name}"))
+
+
 def stages(walk: StereoWalk, file: Path) -> None:
     """Draw the first step: photograph, morph at 0, 0.5 and 1, next photograph, scale map, Psi."""
     morph = walk.morphs[0]
@@ -163,12 +187,16 @@ def _depth_picture(depth: Floats) -> Image:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", type=Path)
+    parser.add_argument("--motorcycle", type=Path)
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--positions", type=int, default=len(PLACES_M))
     chosen = parser.parse_args()
     if chosen.write is not None:
         chosen.write.mkdir(parents=True, exist_ok=True)
         print(write_route(chosen.write, PLACES_M, CAMERA))
+        return
+    if chosen.motorcycle is not None:
+        real_pair(chosen.motorcycle)
         return
     with tempfile.TemporaryDirectory() as folder:
         file = write_route(Path(folder), PLACES_M[: chosen.positions], CAMERA)
