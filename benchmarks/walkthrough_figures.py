@@ -12,6 +12,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from matplotlib import colormaps
 from scipy.spatial.transform import Rotation
 
 from benchmarks.provenance import provenance
@@ -277,13 +278,16 @@ def cut(found: Mosaic, truth: Floats) -> float:
 
 
 def figures(walk: StereoWalk, file: Path) -> None:
-    """Draw Fig. 5 to 7: depths, rendered views, and mosaics, each (a) to (c) in a row."""
+    """Draw Fig. 5 to 7: errors of depths, rendered views with the real one, and mosaics.
+
+    Red is too far, blue too near; the darkest colours are 2 % off.
+    """
     morph = walk.morphs[0]
     kept = unmorphed(morph)
     only = np.where(morph.common, morph.destination_m[..., 2], np.nan)
-    depths = [
-        _grey(each) for each in (only, kept.destination_m[..., 2], morph.destination_m[..., 2])
-    ]
+    truth = CAMERA.look(station(PLACES_M[0]), fine=1)[1]
+    maps = (only, kept.destination_m[..., 2], morph.destination_m[..., 2])
+    depths = [error_picture(each, truth) for each in maps]
     views = list(views_along(walk, PER_STEP))
     bare = replace(walk, morphs=tuple(unmorphed(each) for each in walk.morphs))
     late = look(walk, views[3])
@@ -301,9 +305,12 @@ def figures(walk: StereoWalk, file: Path) -> None:
     cv2.imwrite(str(file), np.vstack(rows)[..., ::-1])
 
 
-def _grey(depth: Floats) -> Image:
-    grey = np.clip(255.0 * 0.6 / np.nan_to_num(depth, nan=1e9), 0, 255).astype(np.uint8)
-    return np.repeat(grey[..., None], 3, axis=2)
+def error_picture(depth: Floats, truth: Floats) -> Image:
+    """Relative errors of depths as colours; black without a depth."""
+    off = depth / truth - 1.0
+    shown = np.rint(255 * colormaps["coolwarm"](0.5 + off / 0.04)[..., :3]).astype(np.uint8)
+    shown[~np.isfinite(off)] = 0
+    return np.asarray(shown)
 
 
 def main() -> None:
