@@ -1,7 +1,10 @@
-"""Walk-through of a rendered ravine: errors of each stage ([KP] Fig. 3 to 7), and time per frame.
+"""Walk-through of a rendered ravine: poses, matches, flow ([KP] Fig. 3, 4), and time per frame.
+
+``benchmarks.walkthrough_figures`` measures Fig. 5 to 7.
 
 python -m benchmarks.walkthrough                    # tables, as Markdown
 python -m benchmarks.walkthrough --write FOLDER     # pictures and positions.toml of the same route
+python -m benchmarks.walkthrough --motorcycle FOLDER  # a real pair as a single position
 python -m benchmarks.walkthrough --picture FILE     # stages as one picture
 python -m benchmarks.walkthrough --positions 2      # the first step alone
 """
@@ -20,8 +23,7 @@ from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.loader import load
 from snakewalk.config.walkthrough import WalkthroughConfig
 from snakewalk.controller.mapping.mosaic.labelling import cheapest, descend, energy, labelled
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
-from snakewalk.controller.mapping.mosaic.mosaic import mosaic
+from snakewalk.controller.mapping.mosaic.local_model import project
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.route import picture_camera, render, views_along
 from snakewalk.controller.mapping.mosaic.scale_flow import (
@@ -33,6 +35,7 @@ from snakewalk.controller.mapping.mosaic.scale_flow import (
 )
 from snakewalk.controller.mapping.mosaic.scale_matches import SCALES, match_over_scale
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk, read_walk
+from tests.oracles.motorcycle import true_depth, write_motorcycle
 from tests.oracles.ravine import Camera, Station, station, write_route
 
 PLACES_M = (0.0, 0.7, 1.4, 2.1, 2.8, 3.5)
@@ -116,82 +119,6 @@ def flow_table(walk: StereoWalk, known: list[Truth], off_m: float) -> None:
     flow_row("aggregated paths, one scale", one, solve_flow(one).flow_px, known[0], "")
 
 
-def morph_table(walk: StereoWalk) -> None:
-    """Fig. 5 and 6: steps of the destination across the edge of Psi, and pictures halfway."""
-    print("| positions | step, not filled | step, Poisson | Z error | halfway | first only |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: |")
-    views = list(views_along(walk, 2))
-    camera = picture_camera(walk, CAMERA.size_px)
-    for k, morph in enumerate(walk.morphs):
-        plain = np.where(morph.common[..., None], morph.destination_m, morph.first.points_m)
-        steps = []
-        for points in (plain, morph.destination_m):
-            gap = np.linalg.norm(points - morph.first.points_m, axis=-1)
-            across = np.abs(np.diff(gap, axis=1))[morph.common[:, 1:] != morph.common[:, :-1]]
-            steps.append(1000.0 * float(np.nanquantile(across, 0.95)))
-        depth = CAMERA.look(station(PLACES_M[k]), fine=1)[1]
-        error = np.abs(morph.destination_m[..., 2] / depth - 1.0)
-        view = views[2 * k + 1]
-        first, axes = station(PLACES_M[0]), walk.poses[k][:, :3]
-        at = Station(
-            first.at_m + first.axes @ (walk.poses[k][:, 3] + axes @ view.place_m),
-            first.axes @ axes @ view.rotation.T,
-        )
-        real = CAMERA.look(at)[0].astype(float)
-        canvas = render(walk, view, camera, CAMERA.size_px)
-        still = render(
-            walk, type(view)(k, 0.0, view.rotation, view.place_m), camera, CAMERA.size_px
-        )
-        off = [
-            np.abs(each.colour.astype(float) - real).mean(axis=-1)[each.drawn].mean()
-            for each in (canvas, still)
-        ]
-        print(
-            f"| {k + 1} to {k + 2} | {steps[0]:.1f} mm | {steps[1]:.1f} mm | "
-            f"{100 * np.nanmedian(error):.2f} % | {off[0]:.1f} | {off[1]:.1f} |"
-        )
-
-
-def mosaic_table() -> None:
-    """Fig. 7: steps of depth at the seams of a mosaic, with and without Eq. 7."""
-    print("| depths of the side views | step, not rectified | step, Eq. 7 | angles off |")
-    print("| --- | ---: | ---: | ---: |")
-    angles = (0.0, 0.6, -0.6)
-    for name, factors in (("as measured", (1.0, 1.0, 1.0)), ("6 % off", (1.0, 1.06, 0.94))):
-        views = []
-        for k, (angle, factor) in enumerate(zip(angles, factors, strict=True)):
-            model = model_of(station(1.0, angle, 0.1), k)
-            views.append(
-                LocalModel(model.points_m * factor, model.image, model.camera, model.baseline_m)
-            )
-        cells = []
-        for rectified in (False, True):
-            found = mosaic(views, rectified)
-            edge, z = found.domain[0], found.model.points_m[..., 2]
-            row, column = np.nonzero(edge[:, :-1] & ~edge[:, 1:] & np.isfinite(z[:, 1:]))
-            cells.append(100 * np.median(np.abs(z[row, column + 1] / z[row, column] - 1.0)))
-        base = station(1.0, 0.0, 0.1).axes
-        off = [
-            Rotation.from_matrix(turn.T @ base.T @ station(1.0, angle, 0.1).axes).magnitude()
-            for turn, angle in zip(found.rotations, angles, strict=True)
-        ]
-        print(f"| {name} | {cells[0]:.2f} % | {cells[1]:.2f} % | {1000 * max(off):.1f} mrad |")
-
-
-def model_of(at: Station, seed: int) -> LocalModel:
-    """Local model of a rendered pair."""
-    from snakewalk.controller.mapping.stereo_camera import RectifiedPair  # noqa: PLC0415
-
-    left, right = CAMERA.pair(at, seed)
-    k = CAMERA.matrix
-    seen = np.ones(left.shape[:2], bool)
-    centre = float(k[0, 2]), float(k[1, 2])
-    pair = RectifiedPair(
-        left, right, seen, CAMERA.focal_px, centre, 0.0, CAMERA.baseline_m, np.eye(3)
-    )
-    return LocalModel.of_pair(pair, 96)
-
-
 def pose_table(walk: StereoWalk) -> None:
     """Poses between positions against the truth."""
     print("| positions | matches | inliers | place off | axes off | common |")
@@ -204,6 +131,28 @@ def pose_table(walk: StereoWalk) -> None:
             f"{1000 * step.place_error_m:.1f} mm | {1000 * step.angle_error_rad:.1f} mrad | "
             f"{100 * step.common_share:.0f} % |"
         )
+
+
+def real_pair(folder: Path) -> None:
+    """Write the motorcycle pair, and print errors of its model and of a film around it."""
+    file = write_motorcycle(folder)
+    print(file)
+    walk = read_walk(file, load(file, WalkthroughConfig))
+    (model,), truth = walk.models, true_depth()
+    known = np.isfinite(truth)
+    error = np.abs(model.points_m[..., 2] / truth - 1.0)[known & model.valid]
+    camera = picture_camera(walk, (640, 480))
+    holes = [
+        1.0 - render(walk, view, camera, (640, 480)).drawn.mean() for view in views_along(walk, 4)
+    ]
+    print("| valid | depth error, median | within 1 % | within 5 % | holes of the film |")
+    print("| ---: | ---: | ---: | ---: | ---: |")
+    print(
+        f"| {100 * model.valid.mean():.0f} % | {100 * np.median(error):.2f} % | "
+        f"{100 * (error < 0.01).mean():.0f} % | {100 * (error < 0.05).mean():.0f} % | "
+        f"{100 * np.mean(holes):.0f} % |"
+    )
+    print(provenance(f"python -m benchmarks.walkthrough --motorcycle {folder.name}"))
 
 
 def stages(walk: StereoWalk, file: Path) -> None:
@@ -238,12 +187,16 @@ def _depth_picture(depth: Floats) -> Image:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", type=Path)
+    parser.add_argument("--motorcycle", type=Path)
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--positions", type=int, default=len(PLACES_M))
     chosen = parser.parse_args()
     if chosen.write is not None:
         chosen.write.mkdir(parents=True, exist_ok=True)
         print(write_route(chosen.write, PLACES_M, CAMERA))
+        return
+    if chosen.motorcycle is not None:
+        real_pair(chosen.motorcycle)
         return
     with tempfile.TemporaryDirectory() as folder:
         file = write_route(Path(folder), PLACES_M[: chosen.positions], CAMERA)
@@ -259,8 +212,6 @@ def main() -> None:
         ("Poses", lambda: pose_table(walk)),
         ("Flow, estimated pose", lambda: flow_table(walk, known, 0.0)),
         ("Flow, pose 40 mm off", lambda: flow_table(walk, known, 0.04)),
-        ("Morph", lambda: morph_table(walk)),
-        ("Mosaic", mosaic_table),
     ):
         print(f"\n{title}\n", flush=True)
         table()  # type: ignore[no-untyped-call]

@@ -20,31 +20,37 @@ from snakewalk.controller.runlog.record import RunRecord
 
 BEGIN, ONE, TWO = GREY, SKY, BLUE
 """Bodies at the beginning, after one cycle, and after two."""
+_COLUMNS = 3
 
 
 def draw_actions(repertoire: Repertoire, path: Path) -> None:
-    """Draw two cycles of each action to one scale: bodies and the track of the centre."""
-    drawn = [_two_cycles(segment) for segment in repertoire.segments]
-    low = np.min([[body.min(axis=0) for body in bodies] for _, bodies in drawn], axis=(0, 1)) - 0.1
-    high = np.max([[body.max(axis=0) for body in bodies] for _, bodies in drawn], axis=(0, 1)) + 0.1
-    rows = -(-len(drawn) // 2)
-    tall = 0.36 * WIDTH_IN * (high - low)[1] / (high - low)[0] + 0.55
+    """Draw two cycles of each action to one scale: bodies and the track of the centre.
+
+    A brake is played once, so it has one cycle.
+    """
+    drawn = [
+        _cycles(segment, 1 if segment.kind == "brake" else 2) for segment in repertoire.segments
+    ]
+    points = np.concatenate([body for _, bodies in drawn for body in bodies])
+    low, high = points.min(axis=0) - 0.1, points.max(axis=0) + 0.1
+    rows = -(-len(drawn) // _COLUMNS)
+    tall = 0.27 * WIDTH_IN * (high - low)[1] / (high - low)[0] + 0.7
     with style():
         figure = Figure(figsize=(WIDTH_IN, rows * tall + 0.6), layout="constrained")
-        panels = figure.subplots(rows, 2, squeeze=False, sharex=True, sharey=True)
+        panels = figure.subplots(rows, _COLUMNS, squeeze=False, sharex=True, sharey=True)
         for axes in panels.ravel()[len(drawn) :]:
             axes.set_axis_off()
         for axes, segment, (track, bodies) in zip(
             panels.ravel(), repertoire.segments, drawn, strict=False
         ):
             labels = ("at the start", "after one cycle", "after two")
-            for body, colour, label in zip(bodies, (BEGIN, ONE, TWO), labels, strict=True):
+            for body, colour, label in zip(bodies, (BEGIN, ONE, TWO), labels, strict=False):
                 axes.plot(*body.T, color=colour, lw=2.5, solid_capstyle="round", label=label)
                 axes.plot(*body[0], "o", color=colour, ms=5)
             axes.plot(*track.T, color=INK, lw=0.9, ls=":", label="centre of the body")
             turn = round(np.rad2deg(segment.turn_rad_s * segment.duration_s))
             axes.set_title(
-                f"{segment.name}: {segment.speed_m_s:.2f} m/s, {turn:+d}° in "
+                f"{segment.name}\n{segment.speed_m_s:.2f} m/s, {turn:+d}° in "
                 f"{segment.duration_s:.2f} s",
                 fontsize=9,
             )
@@ -53,21 +59,26 @@ def draw_actions(repertoire: Repertoire, path: Path) -> None:
             axes.set_aspect("equal")
         for axes in panels[:, 0]:
             axes.set_ylabel("y (m)")
-        for axes in panels[-1]:
-            axes.set_xlabel("x (m); dots are heads")
+        for k, axes in enumerate(panels.ravel()[: len(drawn)]):
+            if k + _COLUMNS >= len(drawn):
+                axes.set_xlabel("x (m); dots are heads")
+                axes.tick_params(labelbottom=True)
         handles, labels_shown = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels_shown, loc="outside upper center", ncols=4)
         save_picture(figure, path, dpi=110)
 
 
-def _two_cycles(segment: Segment) -> tuple[Floats, list[Floats]]:
-    """Track (n, 2) of the centre, and bodies (L, 2) before, between and after two cycles."""
-    begin = Frame.flat(0.0, 0.0, 0.0)
-    one = replay(segment, begin)
-    two = replay(segment, one.end)
-    track = np.concatenate([one.origin_m, two.origin_m])
-    first = begin.to_world_m(segment.link_m[-1])
-    return track[:, :2], [body[:, :2] for body in (first, one.link_m[-1], two.link_m[-1])]
+def _cycles(segment: Segment, cycles: int) -> tuple[Floats, list[Floats]]:
+    """Track (n, 2) of the centre, and bodies (L, 2) at the start and after each cycle."""
+    frame = Frame.flat(0.0, 0.0, 0.0)
+    bodies = [frame.to_world_m(segment.link_m[-1])]
+    tracks = []
+    for _ in range(cycles):
+        played = replay(segment, frame)
+        tracks.append(played.origin_m)
+        bodies.append(played.link_m[-1])
+        frame = played.end
+    return np.concatenate(tracks)[:, :2], [body[:, :2] for body in bodies]
 
 
 def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:

@@ -100,7 +100,7 @@ def walkthrough(
         "frame_ms": round(1000.0 * facts.frame_s, 1),
         "hole_share": round(facts.hole_share, 4),
         "valid_share": [round(float(model.valid.mean()), 4) for model in made.models],
-        **_step_facts(made.steps),
+        **(_step_facts(made.steps) if made.steps or as_json else {}),
     }
     if world is None or ground is None:
         show(shown, as_json)

@@ -10,8 +10,11 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
-from snakewalk.config.loader import load_world
+from snakewalk.config.loader import load, load_world
+from snakewalk.config.walkthrough import WalkthroughConfig
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.mapping.mosaic.walk import read_walk
+from tests.oracles.motorcycle import true_depth, write_motorcycle
 from tests.oracles.ravine import Camera, Station, station, write_route
 
 CAMERA = Camera((240, 180), 200.0)
@@ -63,6 +66,27 @@ def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) ->
     assert 0.2 < ground.known.mean() < 0.95
     assert ground.colour is not None
     assert ground.colour[ground.known].std(axis=0).min() > 10.0
+
+
+def test_a_real_pair_is_a_single_position(tmp_path: Path) -> None:
+    """Middlebury's motorcycle at half the size; depths against its truth."""
+    folder, film = tmp_path / "motorcycle", tmp_path / "film.mp4"
+    file = write_motorcycle(folder, smaller=2)
+    words = ["terrain", "walkthrough", str(file), "-o", str(film), "--size", "160x120"]
+    found = CliRunner().invoke(app, [*words, "--fps", "2", "--seconds", "1"])
+    assert found.exit_code == 0, found.exception or found.output
+    assert "valid share" in found.output
+    assert "matches" not in found.output  # there is no next position
+    frames = [f.to_ndarray(format="rgb24") for f in av.open(str(film)).decode(video=0)]
+    assert len(frames) == 4
+    assert np.abs(frames[1].astype(float) - frames[3]).mean() > 2.0  # the camera moves
+    (model,) = read_walk(file, load(file, WalkthroughConfig)).models
+    depth = true_depth(smaller=2)
+    both = model.valid & np.isfinite(depth)
+    assert both.mean() > 0.6
+    error = np.abs(model.points_m[..., 2][both] / depth[both] - 1.0)
+    assert np.median(error) < 0.01
+    assert (error < 0.05).mean() > 0.9
 
 
 def test_bad_input_is_reported_with_its_place(route: Path, tmp_path: Path) -> None:
