@@ -15,7 +15,11 @@ from snakewalk.controller.capture.coil_film import COIL_LEAST, solve_coils
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
 from snakewalk.controller.capture.outlier_frames import mark_outliers
-from snakewalk.controller.capture.small_body.film_fit import fit_film, with_least_errors
+from snakewalk.controller.capture.small_body.film_fit import (
+    fit_film,
+    with_least_errors,
+    with_tip_errors,
+)
 from snakewalk.controller.capture.verification.film_check import goes_on_faintly, verified
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
@@ -144,6 +148,7 @@ def captured_from(
     expected = np.where(solved, coils.expected_px, found.expected_px)
     crops = {k: crop for k, crop in found.crops.items() if not solved[k]}
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
+    fitted = with_tip_errors(fitted, found.ends_px, solved)
     fitted = with_least_errors(fitted, found.faint_error_px)
     skeletons = verified(fitted.skeletons, found.store)
     if not part and sum(one.status.has_points for one in skeletons) < 2:

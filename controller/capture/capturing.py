@@ -39,7 +39,7 @@ from snakewalk.controller.track.track import UNSURE_HEAD
 
 _MANY = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
 _EXPLAINED = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED, FrameStatus.LEFT_OUT}
-_INACCURATE = 0.03  # of the length: a larger expected error needs a look
+_INACCURATE = 0.015  # of the length: a larger expected error needs a look
 
 
 @dataclass(frozen=True, slots=True)

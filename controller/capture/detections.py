@@ -9,6 +9,7 @@ from snakewalk.controller.capture.coil_film import COILS
 from snakewalk.controller.capture.coil_fit import Outline
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
+from snakewalk.controller.capture.small_body.tip_profile import NO_ENDS, profile_ends
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import Detection
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
@@ -35,6 +36,8 @@ class Detections:
     """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
     faint_error_px: dict[int, float] = field(default_factory=dict)
     """By frame: least expected error of bodies with faint parts."""
+    ends_px: list[Floats] = field(default_factory=list)
+    """(2, 2) by frame: where the profile of the body ends; NaN where it is not known."""
     store: FrameStore = field(default_factory=FrameStore)
     """The surroundings of the body in every frame."""
     crops: dict[int, Crop] = field(default_factory=dict)
@@ -52,9 +55,13 @@ class Detections:
         self.area_px.append(silhouette.area_px)
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
+        ends_px = NO_ENDS
         if body.status is FrameStatus.GOOD:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
+            first = np.asarray(silhouette.origin_px)
+            line = body.points_px - first
+            ends_px = first + profile_ends(line, body.radius_px, silhouette.level, blur_px)
             if detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)
@@ -72,6 +79,7 @@ class Detections:
             self.crops[number] = crop_body(frame, detection.background, self._points)
         self.expected_px.append(expected)
         self.axis_error_px.append(axis_px)
+        self.ends_px.append(ends_px)
 
     def skip(self, status: FrameStatus) -> None:
         """Add a frame in which the animal is not searched for."""
@@ -80,6 +88,7 @@ class Detections:
         self.distractors.append(0.0)
         self.expected_px.append(np.nan)
         self.axis_error_px.append(np.nan)
+        self.ends_px.append(NO_ENDS)
 
     def _keep(self, number: int, frame: DeepImage, detection: Detection) -> None:
         """Keep the surroundings of the silhouette and of the last place of a small body."""

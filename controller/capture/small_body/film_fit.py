@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px
 from snakewalk.controller.capture.small_body.crop import Crop, View, Workspace, reversed_body
 from snakewalk.controller.capture.small_body.film_body import (
@@ -29,6 +29,7 @@ from snakewalk.controller.capture.small_body.ribbon import (
     curve_of,
     curve_slopes,
 )
+from snakewalk.controller.capture.small_body.tip_profile import beyond_tips_px, tips_error_px
 from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -51,6 +52,7 @@ _NEAR = 3  # frames between which the margin of the ends counts: one may have no
 _EVIDENCE = 9.0  # squares of the noise: the grey values must say so by three standard deviations
 _TRIED = 5  # frames of a stretch between doubts
 _FREE = 0.03  # of the body's cover: less than that is ground
+_WITHOUT_TIPS = 0.85  # of the error of a medial axis: its tips are measured
 _PRIOR_FRAMES = 2.0  # weight of the surroundings of a place, in frames
 
 
@@ -158,6 +160,38 @@ def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> Fitted
         if np.isfinite(expected[k]):
             expected[k] = max(float(expected[k]), least)
             out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
+    return replace(film, skeletons=tuple(out), expected_px=expected)
+
+
+def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) -> FittedFilm:
+    """The film with the error of the tips in its expected errors.
+
+    The profile across the body shows where a body ends below the noise or the blur. A length that
+    all frames share is wrong alike in all of them, so the median over the frames counts.
+
+    Args:
+        film: the fitted film, the same end first in all frames.
+        ends_px: (T) (2, 2) where the profiles end, NaN where they are not known.
+        solved: (T,) frames of coils, whose error is known.
+
+    """
+    expected, out = film.expected_px.copy(), list(film.skeletons)
+    known = [
+        k
+        for k, ends in enumerate(ends_px)
+        if np.isfinite(expected[k]) and np.isfinite(ends).all() and not solved[k]
+    ]
+    if not known:
+        return film
+    beyond = np.array([beyond_tips_px(out[k].points_px, ends_px[k]) for k in known])
+    usual = np.median(beyond, axis=0)
+    for k, own in zip(known, beyond, strict=True):
+        if film.body is not None:
+            expected[k] = np.hypot(expected[k], tips_error_px(usual))
+        else:
+            far = np.where(np.abs(own) > np.abs(usual), own, usual)
+            expected[k] = np.hypot(_WITHOUT_TIPS * expected[k], tips_error_px(far))
+        out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
     return replace(film, skeletons=tuple(out), expected_px=expected)
 
 

@@ -78,7 +78,7 @@ def test_many_unused_frames_are_reported_with_their_usual_reason() -> None:
 
 def test_a_large_expected_error_is_reported() -> None:
     rough = [FrameStatus.ROUGH] * 10
-    assert warning_of(OPTIONS, captured(rough, 2.0)) is None
+    assert warning_of(OPTIONS, captured(rough, 1.2)) is None
     text = warning_of(OPTIONS, captured(rough, 5.0))
     assert text is not None
     assert "off by 5.0% of the body" in text

@@ -1,0 +1,132 @@
+"""Where a body ends by its contrast summed across it, and how far that is from a found tip.
+
+The sum is the width times the contrast, whatever the blur. A pointed tail falls below half of the
+contrast, or below the noise, before it ends. The profile is continued in a straight line to 0.
+"""
+
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.arrays import Floats
+
+_HIGH, _LOW = 0.3, 0.06  # of the usual sum: between these the profile falls as it goes on to 0
+_MOST_LOW = 0.2
+_NOISE = 3.0  # standard deviations of the profile beyond the body
+_FINEST_PX, _STEPS = 0.5, 20  # step along the profile: this, or a part of the width if larger
+_INSIDE, _BEYOND = 1.5, 3.0  # widths of the profile inside of the tip, and beyond it
+_LEAST_BEYOND_PX = 10.0
+_ACROSS, _ACROSS_PX = 0.9, 2.5  # widths and px on each side that are summed
+_RIM = 0.75  # of the reach on each side: from there on is ground
+_CALM = 95.0  # percentile of the ground: more is no noise
+_USUAL = (0.3, 0.6)  # of the length: where the sum is the usual one
+_ROUND_PX, _BY_BLUR, _LEAST_PX = 1.5, 2.0, 3.0  # so far the profile of a round tip goes beyond it
+_LEAST_BLUR_PX = 0.7
+_INNER = 4  # chords from a tip: its direction
+_SURE = 0.7  # standard deviation of a tip, of its distance from the end of its profile
+# (constants measured on rendered films)
+NO_ENDS: Final = np.full((2, 2), np.nan)
+"""Ends of a frame without a body."""
+
+
+def profile_ends(
+    line: Floats, radius_px: Floats, level: NDArray[np.float32], blur_px: float
+) -> Floats:
+    """(2, 2) x, y where the profile of a body ends, next to its first and its last point.
+
+    Args:
+        line: (P, 2) the body in pixels of ``level``.
+        radius_px: (P,) half its width.
+        level: (h, w) contrast, above 0 where the body is.
+        blur_px: standard deviation of the picture's blur.
+
+    """
+    wide = max(2.0 * float(np.median(radius_px)), 1.5)
+    step = max(_FINEST_PX, wide / _STEPS)
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    at = np.arange(0.0, arc[-1], step)
+    even = np.column_stack([np.interp(at, arc, column) for column in line.T])
+    first, last = (round(v * len(even)) for v in _USUAL)
+    usual = 0.0
+    if last - first > 2:
+        usual = float(np.median(_sums(even[first:last], level, wide, step)))
+    if usual <= 0.0:
+        return NO_ENDS
+    round_px = max(_LEAST_PX, _ROUND_PX + _BY_BLUR * max(blur_px, _LEAST_BLUR_PX))
+    ends = [_end(way, level, wide, step, usual, round_px) for way in (even[::-1], even)]
+    return np.stack(ends)
+
+
+def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
+    """(2,) distances of profile ends (2, 2) beyond the tips of a body (P, 2); below 0 before them.
+
+    The ends may be in the other order.
+    """
+    tips = points_px[[0, -1]]
+    ahead = tips - points_px[[_INNER, -1 - _INNER]]
+    ahead = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    other = ends_px[::-1]
+    near = (
+        other
+        if np.hypot(*(other - tips).T).sum() < np.hypot(*(ends_px - tips).T).sum()
+        else ends_px
+    )
+    return np.asarray(((near - tips) * ahead).sum(axis=1))
+
+
+def tips_error_px(beyond_px: Floats) -> float:
+    """Expected mean error of the points of a body whose profile ends (2,) beyond its tips."""
+    return 0.5 * _SURE * float(np.hypot(*beyond_px))
+
+
+def _end(
+    line: Floats,
+    level: NDArray[np.float32],
+    wide: float,
+    step: float,
+    usual: float,
+    round_px: float,
+) -> Floats:
+    """Where the profile of a line of equal steps comes to 0, less that of a round tip."""
+    back = min(max(2, round(max(0.5 * wide, 3.0) / step)), len(line) - 1)
+    ahead = line[-1] - line[-1 - back]
+    ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)
+    reach = min(max(_BEYOND * wide, _LEAST_BEYOND_PX), 0.25 * step * len(line) + _LEAST_BEYOND_PX)
+    beyond = np.arange(1, round(reach / step) + 1)[:, None] * step * ahead
+    end = min(round(_INSIDE * wide / step), len(line) - 1)
+    path = np.vstack([line[-1 - end :], line[-1] + beyond])
+    profile = gaussian_filter1d(_sums(path, level, wide, step) / usual, 1.0 / step)
+    apart = max(1, round(2.0 / step))
+    rest = profile[end + len(beyond) // 3 :]
+    noise = 1.4826 * float(np.median(np.abs(rest[apart:] - rest[:-apart]))) / np.sqrt(2.0)
+    low = float(np.clip(_NOISE * noise, _LOW, _MOST_LOW))
+    from_px, to_px = (_crossing(profile, share) * step for share in (_HIGH, low))
+    far_px = to_px - end * step + (to_px - from_px) * low / (_HIGH - low)
+    return np.asarray(line[-1] + (far_px - round_px) * ahead)
+
+
+def _crossing(profile: Floats, share: float) -> float:
+    """Where the profile first falls below a share."""
+    below = np.flatnonzero(profile < share)
+    if not below.size:
+        return len(profile) - 1.0
+    k = int(below[0])
+    return 0.0 if k == 0 else k - (share - profile[k]) / float(profile[k - 1] - profile[k])
+
+
+def _sums(path: Floats, level: NDArray[np.float32], wide: float, step: float) -> Floats:
+    """(P,) contrast summed across the path, less that of the ground on both sides."""
+    along = np.gradient(path, axis=0)
+    side = np.column_stack([-along[:, 1], along[:, 0]])
+    side = side / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    reach = _ACROSS * wide + _ACROSS_PX
+    across = np.arange(-reach, reach + 0.5 * step, step)
+    x, y = np.moveaxis(path[:, None] + across[:, None] * side[:, None], -1, 0).astype(np.float32)
+    seen = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    rim = seen[:, np.abs(across) > _RIM * reach]
+    # contrast below 0 is cut off, so the median of the noise is below its mean
+    ground = np.minimum(rim, np.percentile(rim, _CALM)).mean()
+    return np.asarray((seen - ground).sum(axis=1) * step, dtype=float)
