@@ -1,6 +1,5 @@
 """A robot: one chain of links, joints and servos, with or without legs."""
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
@@ -11,6 +10,11 @@ from pydantic import SerializerFunctionWrapHandler, model_serializer, model_vali
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.robot.joint_values import JointValues
 from snakewalk.config.robot.keys import READ_INSTEAD, Unreadable
+from snakewalk.config.robot.register_bounds import (
+    half_range_rad,
+    initial_gains,
+    register_faults,
+)
 from snakewalk.config.robot.servo import LAST_ID
 from snakewalk.config.robot.spelling import canonical_joints, canonical_links
 from snakewalk.config.servo_model import protocol_name
@@ -188,7 +192,7 @@ class RobotConfig(JointValues):
     @model_validator(mode="after")
     def _models_can_run(self) -> Self:
         try:
-            records = dict(zip(self.servo_models, self.servo_records, strict=True))
+            records = self.records_by_model
         except ConfigError as error:
             raise ValueError(f"servo: {error}") from None
         first = next(iter(records.values()))
@@ -216,6 +220,16 @@ class RobotConfig(JointValues):
                 )
         if self.servo.over_current_a is not None:
             self.check_over_current("servo: over_current_a", self.servo.over_current_a)
+        return self
+
+    @model_validator(mode="after")
+    def _registers_hold_the_values(self) -> Self:
+        gains = initial_gains(self)
+        if gains:
+            self.__dict__["servo"] = self.servo.model_copy(update=gains)
+        faults = register_faults(self)
+        if faults:
+            raise ValueError("; ".join(faults))
         return self
 
     def check_over_current(self, name: str, limit_a: float) -> None:
@@ -247,7 +261,7 @@ class RobotConfig(JointValues):
         for joint, (limit_rad, facts) in enumerate(
             zip(self.limit_rad, self.servo_records, strict=True)
         ):
-            most_rad = math.pi - facts.rad_per_position
+            most_rad = half_range_rad(facts)
             beyond = limit_rad + abs(self.zeros_rad[joint])
             if beyond > most_rad:
                 raise ValueError(

@@ -40,10 +40,20 @@ class JointValues(LinkValues):
             ConfigError: a model is not known.
 
         """
+        known = self.records_by_model
+        return tuple(known[name] for name in self.servo_models)
+
+    @property
+    def records_by_model(self) -> dict[str, ServoModel]:
+        """Record of each model in the chain, in the order of the servos.
+
+        Raises:
+            ConfigError: a model is not known.
+
+        """
         described = {each.model: each for each in self.described_models}
-        models = self.servo_models
-        known = {name: described.get(name) or servo_model(name) for name in dict.fromkeys(models)}
-        return tuple(known[name] for name in models)
+        models = dict.fromkeys(self.servo_models)
+        return {name: described.get(name) or servo_model(name) for name in models}
 
     @property
     def motors(self) -> tuple[MotorConfig | None, ...]:

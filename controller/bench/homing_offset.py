@@ -1,8 +1,8 @@
-"""Zeros of a robot in its servos: out of the robot's file, into Homing Offset(20).
+"""Zeros of a robot in its servos: out of the robot's file, into Homing Offset.
 
-A servo adds the register to its position, also where Drive Mode(10) turns it round: the manual says
-that its sign stays. Whether it does is seen at once: a shaft that rests must be read as far
-from before as the register was changed.
+A DYNAMIXEL servo adds register 20 to its position. The sign stays if Drive Mode(10) is reversed, as
+the manual says. A Feetech servo subtracts register 31. Each write is checked: the position of a
+resting shaft must change by as much as the register.
 """
 
 import math
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import BusError, DriverError
 
@@ -41,11 +42,21 @@ def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ..
     faults, planned = [], []
     for joint, servo_id in enumerate(robot.servo_ids):
         table = bus.table_of(servo_id)
+        row = table.facts.registers.get("Homing Offset")
+        if row is None:
+            faults.append(
+                f"{robot.joint_label(joint)}: {table.model} has no Homing Offset; leave the zeros "
+                "in the robot's file"
+            )
+            continue
         before = bus.read(servo_id, "Homing Offset")
-        after = before - round(robot.zeros_rad[joint] / table.rad_per_position)
+        shift = round(robot.zeros_rad[joint] / table.rad_per_position)
+        after = before - _sign(table.facts) * shift
         planned.append(HomingOffset(servo_id, before, after))
         reach_rad = abs(after) * table.rad_per_position + robot.limit_rad[joint]
         most = table.facts.units.homing_limit
+        if most is None and row.sign_bit is not None and row.range is not None:
+            most = row.range[1]  # a Feetech servo has no other values
         if (most is not None and abs(after) > most) or reach_rad > math.pi:
             why = (
                 f"beyond {most} the servo ignores it in position mode"
@@ -90,13 +101,19 @@ def without_zeros(robot: RobotConfig) -> RobotConfig:
     return robot.model_copy(update={"joints": joints})
 
 
+def _sign(facts: ServoModel) -> int:
+    """Change of the position for a change of the register by 1."""
+    return -1 if facts.protocol == "feetech" else 1
+
+
 def _write(bus: DynamixelBus, offset: HomingOffset) -> None:
     servo_id = offset.servo_id
     bus.write_verified(servo_id, "Torque Enable", 0)  # the EEPROM is locked while it is on
     was = bus.read(servo_id, "Present Position")
-    bus.write_verified(servo_id, "Homing Offset", offset.after)
+    bus.write_verified(servo_id, "Homing Offset", offset.after, kept=True)
     moved = bus.read(servo_id, "Present Position") - was
-    if abs(moved - (offset.after - offset.before)) > _REST_POSITIONS:
+    expected = _sign(bus.table_of(servo_id).facts) * (offset.after - offset.before)
+    if abs(moved - expected) > _REST_POSITIONS:
         raise BusError(
             f"servo {servo_id}: Homing Offset went from {offset.before} to {offset.after}, Present "
             f"Position by {moved:+d}: its shaft was turned meanwhile, or it counts otherwise"
@@ -108,7 +125,7 @@ def _put_back(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> str:
     faults = []
     for offset in offsets:
         try:
-            bus.write_verified(offset.servo_id, "Homing Offset", offset.before)
+            bus.write_verified(offset.servo_id, "Homing Offset", offset.before, kept=True)
         except DriverError:
             faults.append(f"servo {offset.servo_id} ({offset.after}, was {offset.before})")
     if faults:

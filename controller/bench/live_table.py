@@ -21,11 +21,11 @@ from rich.text import Text
 from snakewalk.controller.console.child_process import pipe, start
 from snakewalk.controller.console.plain_console import PlainConsole
 from snakewalk.drivers.priority import give_way
-from snakewalk.sim.ax12.decode import Decoder1
+from snakewalk.sim.feetech.decode import AnyDecoder
 from snakewalk.sim.serve.live_table import Packet, Rows
-from snakewalk.sim.sniff.decode import DecodedPacket, Decoder
+from snakewalk.sim.sniff.decode import DecodedPacket
 
-MakeDecoder = Callable[[], Decoder | Decoder1]
+MakeDecoder = Callable[[], AnyDecoder]
 _SHOWN: Final = 8
 """Packets in words below the table."""
 _END_S: Final = 2.0

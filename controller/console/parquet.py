@@ -47,7 +47,11 @@ def table_to_parquet(table: Path, path: Path, kinds: Mapping[str, Kind]) -> int:
             table,
             read_options=csv.ReadOptions(block_size=BLOCK_BYTES),
             convert_options=csv.ConvertOptions(
-                column_types=schema, null_values=[""], strings_can_be_null=True
+                column_types=schema,
+                include_columns=list(kinds),
+                include_missing_columns=True,  # a table of an earlier version
+                null_values=[""],
+                strings_can_be_null=True,
             ),
             parse_options=csv.ParseOptions(newlines_in_values=True),
         )

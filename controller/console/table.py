@@ -14,8 +14,12 @@ from snakewalk.config.errors import InputError
 _NO_ROW: Final[dict[str, str]] = {}
 
 
-def read_csv_table(path: Path, columns: Sequence[str], command: str) -> Iterator[dict[str, str]]:
+def read_csv_table(
+    path: Path, columns: Sequence[str], command: str, optional: Sequence[str] = ()
+) -> Iterator[dict[str, str]]:
     """Yield the whole rows of a table that ``command`` wrote; a torn last line is dropped.
+
+    A column of ``optional`` that the table lacks is empty.
 
     Raises:
         InputError: the file is something else.
@@ -27,11 +31,13 @@ def read_csv_table(path: Path, columns: Sequence[str], command: str) -> Iterator
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or 'is no text'}") from None
     whole = text[: text.rfind("\n") + 1]
     rows = csv.DictReader(io.StringIO(whole))
-    if not whole or tuple(rows.fieldnames or ()) != tuple(columns):
+    there = tuple(rows.fieldnames or ())
+    lacking = [each for each in optional if each not in there]
+    if not whole or there != tuple(each for each in columns if each not in lacking):
         raise InputError(
             f"{path}: is not a table of `snakewalk {command}` of this version; choose another file"
         )
-    return iter(rows)
+    return (row | dict.fromkeys(lacking, "") for row in rows)
 
 
 class CsvTable:
@@ -45,6 +51,7 @@ class CsvTable:
         place: Sequence[str],
         command: str,
         keeps_rows: bool = True,
+        optional: Sequence[str] = (),
     ) -> None:
         """Open or make the table; without ``keeps_rows`` only the places stay in memory.
 
@@ -56,8 +63,10 @@ class CsvTable:
         self._keeps_rows = keeps_rows
         self._held: dict[tuple[str, ...], dict[str, str]] = {}
         if path.exists() and path.stat().st_size:
-            for row in read_csv_table(path, columns, command):
+            for row in read_csv_table(path, columns, command, optional):
                 self._hold(row)
+            with path.open(newline="") as file:  # a table keeps the columns that it has
+                self._columns = tuple(next(csv.reader(file)))
 
     def __enter__(self) -> Self:
         """Cut off a torn last line and open for appending."""
@@ -66,7 +75,9 @@ class CsvTable:
             if not whole.endswith(b"\n"):
                 os.truncate(self._path, whole.rfind(b"\n") + 1)
         self._file = self._path.open("a", newline="")
-        self._writer = csv.DictWriter(self._file, self._columns, restval="", lineterminator="\n")
+        self._writer = csv.DictWriter(
+            self._file, self._columns, restval="", extrasaction="ignore", lineterminator="\n"
+        )
         return self
 
     def __exit__(

@@ -28,6 +28,7 @@ from snakewalk.controller.runlog.topics import (
     WaypointTable,
 )
 from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.runtime.cycle_row import log_cycle
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.friction_monitor import FrictionEstimator
 from snakewalk.controller.runtime.loop import Tick, ticks
@@ -410,23 +411,17 @@ class Drive:
         # a veto latches: torque is off, the loop ends, and the log gets this cycle all the same
         with _LATCHED:
             self._link.write(JointCommand(self._clock.now_s(), goal))
-        verdict = self._link.last_verdict
         self._wire_s = self._wire_busy_s()
-        clamped = () if verdict is None else verdict.clamped.nonzero()[0].tolist()
-        sent_rad = state.position_rad if verdict is None else verdict.goal_rad
-        self._log.cycle(
-            tick.deadline_s,
-            goal,
-            sent_rad,
+        sent_rad = log_cycle(
+            self._log,
+            self._link,
             state,
+            goal,
             deadline_s=tick.deadline_s,
             lateness_s=tick.lateness_s,
             wire_busy_s=self._wire_s - before_s,
-            **self._energy()._asdict(),
+            energy=self._energy(),
             yield_rad=None if self._compliance is None else self._compliance.yield_rad,
-            verdict="veto" if self._link.tripped else "clamp" if clamped else "pass",
-            reason=self._link.tripped or "",
-            joints=clamped,
         )
         self._log_battery(tick.deadline_s, state)
         if self._observer is not None and not self._link.tripped:

@@ -49,8 +49,11 @@ class Measurement:
     pose_evidence: str | None = None
     """How the poses are known that speeds and costs follow from."""
     pose_source: str | None = None
+    backend: str | None = None
+    """Simulator of the point: ``compiled``, or ``warp:DEVICE``."""
 
 
+COMPILED = "compiled"
 FRICTION_SPREAD = 0.15
 SUPPLY_SPREAD = 0.05
 
@@ -74,6 +77,7 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
         finished.travel,
         tripped=finished.outcome.tripped,
         least_rate=finished.outcome.least_rate,
+        backend=COMPILED,
     )
 
 
@@ -102,6 +106,7 @@ def measurement(
     *,
     tripped: str | None,
     least_rate: float,
+    backend: str,
 ) -> Measurement:
     """Return the results of a gait run from its log, summary and travel."""
     if not numbers.is_measured:
@@ -128,6 +133,7 @@ def measurement(
         least_rate=_digits(least_rate),
         pose_evidence=numbers.pose_evidence,
         pose_source=numbers.pose_source,
+        backend=backend,
     )
 
 

@@ -21,7 +21,9 @@ _MEASURED = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
 COLUMNS = (*_PLACE, *_MEASURED, *_PARAMETERS)
 """Empty where a gait has no such parameter, or nothing could be measured."""
-_TEXT = ("gait", "robot", "world", "keys", "ended", "pose_evidence", "pose_source")
+_ADDED = ("backend",)
+"""Columns that a table of an earlier version may lack; its new rows lack them as well."""
+_TEXT = ("gait", "robot", "world", "keys", "ended", "pose_evidence", "pose_source", "backend")
 _INTEGER = ("number", "seed", "cycles")
 _TRUTH = tuple(
     key
@@ -55,7 +57,7 @@ def read_table(path: Path) -> list[dict[str, str]]:
 
 def table_rows(path: Path) -> Iterator[dict[str, str]]:
     """Yield the whole rows of a table one by one; otherwise as ``read_table``."""
-    return read_csv_table(path, COLUMNS, "sweep")
+    return read_csv_table(path, COLUMNS, "sweep", _ADDED)
 
 
 class SweepTable(CsvTable):
@@ -68,7 +70,14 @@ class SweepTable(CsvTable):
             InputError: the file is something else.
 
         """
-        super().__init__(path, columns=COLUMNS, place=_PLACE, command="sweep", keeps_rows=False)
+        super().__init__(
+            path,
+            columns=COLUMNS,
+            place=_PLACE,
+            command="sweep",
+            keeps_rows=False,
+            optional=_ADDED,
+        )
 
     def missing(self, points: list[Point]) -> list[Point]:
         """The entries of ``points`` that the table lacks."""

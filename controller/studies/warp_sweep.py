@@ -21,7 +21,7 @@ from snakewalk.controller.studies.sweep_measure import (
     prepared_point,
 )
 from snakewalk.controller.studies.sweep_points import Point
-from snakewalk.sim.batch.warp_bodies import WarpBodies
+from snakewalk.sim.batch.warp_bodies import WarpBodies, device_name
 
 BATCH: Final = 256
 """Most robots of a batch: each has its log open (ours)."""
@@ -76,5 +76,6 @@ def _together(part: Sequence[tuple[Point, GaitRun]], device: str | None) -> Iter
                     moved,
                     tripped=outcome.tripped,
                     least_rate=outcome.least_rate,
+                    backend=f"warp:{device_name(device)}",
                 ),
             )

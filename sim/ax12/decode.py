@@ -5,9 +5,11 @@ the length of its reply is decoded as the reply.
 """
 
 from collections.abc import Iterator
+from enum import IntEnum, IntFlag
+from typing import ClassVar
 
 from snakewalk.config.servo_catalogue import servo_model
-from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.drivers.protocol.protocol1 import (
     BROADCAST_ID,
     Error1,
@@ -27,6 +29,10 @@ REPLY_MAX_S = 0.1
 
 class Decoder1:
     """Bytes of a bus in, lines out."""
+
+    instructions: ClassVar[type[IntEnum]] = Instruction1
+    errors: ClassVar[type[IntEnum] | type[IntFlag]] = Error1
+    """Bits of a reply's error byte."""
 
     def __init__(self, facts: ServoModel | None = None) -> None:
         """Decode with the registers of a model; default: AX-12A."""
@@ -64,8 +70,8 @@ class Decoder1:
     def _question(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:
         self._asked, self._asked_s = packet, time_s
         code, params = packet.instruction, packet.params
-        known = code in Instruction1.__members__.values()
-        name = Instruction1(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
+        known = code in self.instructions.__members__.values()
+        name = self.instructions(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
         values: dict[str, object] = {}
         if code == Instruction1.READ and len(params) == 2:
             values = dict.fromkeys(self._values(params[0], bytes(params[1])), "?")
@@ -84,18 +90,22 @@ class Decoder1:
             self._asked = None
             if packet.params:
                 values = self._values(asked.params[0], packet.params)
-        alarms = [
-            each.name.lower().replace("_", " ") for each in Error1 if packet.instruction & each
-        ]
         return DecodedPacket(
-            time_s, "answer", packet.servo_id, ", ".join(alarms) or "ok", values, raw
+            time_s, "answer", packet.servo_id, self._outcome(packet.instruction), values, raw
         )
+
+    def _outcome(self, error: int) -> str:
+        alarms = [each.name.lower().replace("_", " ") for each in self.errors if error & each]
+        return ", ".join(alarms) or "ok"
+
+    def _decode(self, cell: RegisterRow, data: bytes) -> int:
+        return int.from_bytes(data[: cell.size], "little")
 
     def _values(self, address: int, data: bytes) -> dict[str, object]:
         """Registers that lie in a block."""
         end = address + len(data)
         found: dict[str, object] = {
-            name: int.from_bytes(data[cell.address - address :][: cell.size], "little")
+            name: self._decode(cell, data[cell.address - address :])
             for name, cell in self._registers.items()
             if address <= cell.address and cell.address + cell.size <= end
         }

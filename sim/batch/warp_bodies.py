@@ -76,6 +76,16 @@ class WarpBodies(BatchBodies):
             raise PhysicsError(f"the physics of world {bad} diverged")
 
 
+def device_name(name: str | None) -> str:
+    """Return Warp's own name of a device, such as ``cpu``; None is the default device.
+
+    Raises:
+        InputError: it does not exist.
+
+    """
+    return str(_device(name))
+
+
 def _device(name: str | None) -> Any:
     warp.config.quiet = True
     warp.init()

@@ -17,6 +17,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import JointConfig, RobotConfig
+from snakewalk.config.robot.register_bounds import half_range_rad
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.controller.bench.calibration.progress import (
     CalibrationProgress,
     JointRange,
@@ -29,6 +31,8 @@ from snakewalk.controller.bench.calibration.slow_motions import (
     CalibrationBench,
 )
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
+from snakewalk.drivers.bus.feetech_bus import FeetechBus
+from snakewalk.drivers.bus.feetech_scan import find_feetech
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_of
 
@@ -75,13 +79,16 @@ class ChainCalibration:
     """Joints to look at: those with less range than the others, or without a stop."""
 
 
-def find_servos(port: BytePort, latency_s: float, count: int | None = None) -> dict[int, str]:
+def find_servos(
+    port: BytePort, latency_s: float, count: int | None = None, *, feetech: bool = False
+) -> dict[int, str]:
     """Model of each servo on the bus, by ID.
 
     Args:
         port: the line.
         latency_s: how long adapter and driver may hold bytes back.
         count: number of servos to expect; with fewer or more the bus is scanned again.
+        feetech: whether the servos speak Feetech's protocol.
 
     Raises:
         InputError: two servos share an ID.
@@ -89,12 +96,16 @@ def find_servos(port: BytePort, latency_s: float, count: int | None = None) -> d
         PortError: the port is gone.
 
     """
-    bus = DynamixelBus(port, latency_s=latency_s, tries=BUS_TRIES)
-    found = bus.scan()
+    bus: DynamixelBus = DynamixelBus(port, latency_s=latency_s, tries=BUS_TRIES)
+    scan = partial(_models, bus)
+    if feetech:
+        bus = FeetechBus(port, latency_s=latency_s, tries=BUS_TRIES)
+        scan = partial(_feetech_models, port, latency_s)
+    found = scan()
     for _ in range(_SCANS - 1):
         if count is None or len(found) == count:
             break
-        found |= bus.scan()
+        found |= scan()
     shared = [str(servo_id) for servo_id in sorted(found) if not _is_alone(bus, servo_id)]
     if shared:
         raise InputError(
@@ -102,7 +113,16 @@ def find_servos(port: BytePort, latency_s: float, count: int | None = None) -> d
             "share it, or the line is bad; connect one alone and give it another ID: snakewalk "
             "bus set --new-id"
         )
-    return {each: model_of(found[each].model_number) for each in sorted(found)}
+    return {each: found[each] for each in sorted(found)}
+
+
+def _models(bus: DynamixelBus) -> dict[int, str]:
+    return {each: model_of(reply.model_number) for each, reply in bus.scan().items()}
+
+
+def _feetech_models(port: BytePort, latency_s: float) -> dict[int, str]:
+    found = find_feetech(port, (port.getBaudRate(),), latency_s=latency_s)
+    return {each.servo_id: each.model for each in found}
 
 
 def _is_alone(bus: DynamixelBus, servo_id: int) -> bool:
@@ -129,7 +149,7 @@ def unknown_chain(like: RobotConfig, servos: Mapping[int, str], current_a: float
             id=servo_id,
             model=model,
             name=f"servo_{servo_id}",
-            limit_rad=RANGE_RAD,
+            limit_rad=min(RANGE_RAD, half_range_rad(servo_model(model))),
             position_p_gain=like.servo.position_p_gain,
             current_limit_a=current_a,
         )
@@ -175,7 +195,9 @@ def calibrate(
     if journal is None:
         journal = Journal(CalibrationProgress(joint_axes=like.joint_axes))
     on_progress("search for servos")
-    servos = find_servos(port, latency_s, like.joint_count)
+    servos = find_servos(
+        port, latency_s, like.joint_count, feetech=like.servo_records[0].protocol == "feetech"
+    )
     journal.known.check_servos(servos, "--resume")
     unknown = unknown_chain(like, servos, current_a)
     bench = CalibrationBench(port, unknown, latency_s, stop_requested, on_progress)

@@ -4,6 +4,7 @@ A line of a busy machine loses replies and delays them. Each cycle reads again i
 missing, the state may be older than in a run, and a motion that was ended by the line is repeated.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -41,6 +42,9 @@ MOVED_SHARE = 0.5
 """A joint that makes less of its wiggle is held or has no power (ours)."""
 SWEEP_RAD_S = 1.0
 """Speed of the sweep (ours)."""
+_WEAK_SHARE = 0.3
+"""Speed of the sweep of a servo whose output is limited instead of its current, as a share of the
+speed that it has without load (ours)."""
 STOP_LAG_RAD = 0.1
 """A joint that is so far behind its goal, and pushes ... (ours)."""
 STOP_EFFORT = 0.8
@@ -96,6 +100,7 @@ class CalibrationBench:
         limits = SafetyLimits.from_config(robot, SafetyConfig())
         self._limits = replace(limits, stale_limit_s=_STALE_S)
         self._state: JointState | None = None
+        self._speed_rad_s = [_sweep_rad_s(robot, row) for row in range(robot.joint_count)]
 
     def name_joints(self, labels: Sequence[str]) -> None:
         """Call the servos by these labels in messages, in the order of their IDs."""
@@ -203,7 +208,7 @@ class CalibrationBench:
         reach_rad = min(reach_rad, RANGE_RAD - abs(zero_rad))
         stop, pushing_s, last_s, goal = None, 0.0, 0.0, zero_rad
         least_a = STOP_EFFORT * self._robot.current_limits_a[row]
-        for time_s, state in self._cycles(link, reach_rad / SWEEP_RAD_S + STOP_S):
+        for time_s, state in self._cycles(link, reach_rad / self._speed_rad_s[row] + STOP_S):
             far = side * (goal - float(state.position_rad[row]))
             pushes = far > STOP_LAG_RAD and side * float(state.current_a[row]) >= least_a
             pushing_s = pushing_s + time_s - last_s if pushes else 0.0
@@ -212,7 +217,7 @@ class CalibrationBench:
                 stop = side * (float(state.position_rad[row]) - zero_rad)
                 break
             if not pushes:
-                ahead = side * (goal - zero_rad) + SWEEP_RAD_S * _CYCLE_S
+                ahead = side * (goal - zero_rad) + self._speed_rad_s[row] * _CYCLE_S
                 goal = zero_rad + side * min(ahead, reach_rad)
             self._write(link, here, row, goal)
         keep(stop)
@@ -220,7 +225,7 @@ class CalibrationBench:
 
     def _go(self, link: SafeLink, here: Floats, row: int, start: float, end: float) -> None:
         """Move one servo evenly, and let it come to rest."""
-        last_s = abs(end - start) / SWEEP_RAD_S
+        last_s = abs(end - start) / self._speed_rad_s[row]
         for time_s, _ in self._cycles(link, last_s + REST_S):
             share = min(time_s / last_s, 1.0) if last_s > 0.0 else 1.0
             self._write(link, here, row, start + share * (end - start))
@@ -307,3 +312,13 @@ class CalibrationBench:
             if stale is not None or isinstance(error.__cause__, BusError):
                 raise LineLostError(str(error)) from error
             raise
+
+
+def _sweep_rad_s(robot: RobotConfig, row: int) -> float:
+    """Speed of the sweep of a servo: one with a limited output is slow."""
+    facts = robot.servo_records[row]
+    if "Goal Current" in facts.registers or facts.motor is None:
+        return SWEEP_RAD_S
+    share = min(1.0, robot.current_limits_a[row] / facts.motor.stall_current_a)
+    free_rad_s = facts.motor.no_load_rpm * math.tau / 60.0
+    return min(SWEEP_RAD_S, _WEAK_SHARE * share * free_rad_s)

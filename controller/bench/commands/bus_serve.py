@@ -34,9 +34,9 @@ from snakewalk.controller.console.result_files import refuse_to_overwrite
 from snakewalk.controller.run.external.served_robot import ServedRobot
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.priority import raised_priority
-from snakewalk.sim.ax12.decode import Decoder1
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.feetech.decode import decoder_for
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu
@@ -255,11 +255,11 @@ def _simulated(
         player = FaultPlayer(line, load(faults, FaultPlan), str(faults))
     if isinstance(line, Ax12Line):
         spec = ChainSpec(spec.ids, (line.servos.facts.model,) * len(spec.ids))
-        decoder1 = partial(Decoder1, line.servos.facts)
-        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), decoder1, None
+        decoder = partial(decoder_for, line.servos.facts)
+        return spec, line, LiveTable(lambda: ax12_rows(line.servos)), decoder, None
     spec = ChainSpec(line.bank.ids, line.bank.models)
     models = dict(zip(line.bank.ids, line.bank.facts, strict=True))
-    decoder = partial(Decoder, line.bank.facts[0], models)
+    decoder = partial(decoder_for, line.bank.facts[0], models)
     return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
 
 

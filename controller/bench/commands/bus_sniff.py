@@ -12,8 +12,7 @@ from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.controller.bench.sniff import receive, stand_between
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json
-from snakewalk.sim.ax12.decode import Decoder1
-from snakewalk.sim.sniff.decode import Decoder
+from snakewalk.sim.feetech.decode import decoder_for
 from snakewalk.sim.sniff.trace import read_trace
 
 
@@ -40,7 +39,7 @@ def sniff(
     if not source.exists():
         raise InputError(f"{source}: no such file or device")
     facts = servo_model(model, Path())
-    decoder = Decoder1(facts) if facts.protocol == 1 else Decoder(facts)
+    decoder = decoder_for(facts)
     live = source.is_char_device()
     if through and not live:
         raise InputError(f"{source}: --through needs a serial device")
@@ -65,4 +64,7 @@ def sniff(
         print(file=sys.stderr)
     if not live and packets == 0:
         what = f"no packet in {size} bytes" if size else "no exchange"
-        raise InputError(f"{source}: holds {what}; --model AX-12A reads Protocol 1.0")
+        raise InputError(
+            f"{source}: holds {what}; --model AX-12A decodes Protocol 1.0, --model STS3215 "
+            "Feetech's protocol"
+        )

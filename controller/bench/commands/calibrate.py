@@ -38,7 +38,7 @@ ToEeprom = Annotated[
     bool,
     typer.Option(
         "--homing-offset",
-        help="write the zeros into Homing Offset(20) of the servos instead of the file; asks first",
+        help="write the zeros into Homing Offset of the servos instead of the file; asks first",
     ),
 ]
 
@@ -98,7 +98,8 @@ def calibrate(
         if (
             backup is not None and not keeps_backup
         ):  # before anything is written: a start writes EEPROM, too
-            chain_calibration.find_servos(line, line.latency_s)
+            feetech = like.servo_records[0].protocol == "feetech"
+            chain_calibration.find_servos(line, line.latency_s, feetech=feetech)
             _write(backup, backup_text(back_up(line, line.latency_s)))
         found = chain_calibration.calibrate(
             line,
@@ -150,7 +151,7 @@ def _with_homing(
     written = yes or _confirmed(offsets, backup)
     if written:
         described = without_zeros(described)
-        there = "The zeros are in the servos, in Homing Offset(20)."
+        there = "The zeros are in the servos, in Homing Offset."
         with homing_written(bus, offsets):
             _write(out, robot_toml(described, f"{heading}\n{there}"))
     after = {str(each.servo_id): each.after for each in offsets}

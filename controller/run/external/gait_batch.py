@@ -17,6 +17,7 @@ from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.runlog.evidence import SIMULATED
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.runtime.cycle_row import log_cycle
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.drive import SETTLE_S, Ramp
 from snakewalk.drivers.errors import SafetyTrippedError
@@ -132,21 +133,15 @@ class _Row:
             goal = self._motion.step(self._period_s * rate, view)
         with suppress(SafetyTrippedError):
             self.link.write(JointCommand(self.body.now_s(), goal))
-        verdict = self.link.last_verdict
-        clamped = () if verdict is None else verdict.clamped.nonzero()[0].tolist()
-        self.log.cycle(
-            time_s,
-            goal,
-            state.position_rad if verdict is None else verdict.goal_rad,
+        log_cycle(
+            self.log,
+            self.link,
             state,
+            goal,
             deadline_s=time_s,
             lateness_s=0.0,
             wire_busy_s=float("nan"),
-            **self.body.energy()._asdict(),
-            yield_rad=None,
-            verdict="veto" if self.link.tripped else "clamp" if clamped else "pass",
-            reason=self.link.tripped or "",
-            joints=clamped,
+            energy=self.body.energy(),
         )
         self.log.add(
             PoseTable,

@@ -1,6 +1,9 @@
 """Tasks that compare controllers: conditions, score, and controllers that do not fit."""
 
 import json
+import re
+import textwrap
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +13,7 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.console import plugins
 from snakewalk.controller.rehearsal import tasks
 from snakewalk.controller.rehearsal.commands.tasks import cell, condition
 from snakewalk.controller.rehearsal.tasks import TASKS, TaskResult, TaskRun, run_task
@@ -52,6 +56,42 @@ def test_a_short_swim_and_a_walk_without_waypoints(
     out.write_text("{}\n")
     broken = CliRunner().invoke(app, words)
     assert "line 1 is not a result of a task" in str(broken.exception)
+
+
+def blocks_of_the_page(language: str) -> list[str]:
+    """Code of the page that explains how to add a controller."""
+    page = (Path(__file__).parents[3] / "docs" / "tasks.md").read_text()
+    found = re.findall(rf"   ```{language}\n(.*?)   ```", page, re.DOTALL)
+    return [textwrap.dedent(each) for each in found]
+
+
+def test_a_controller_of_another_package_enters_as_on_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package, info = tmp_path / "my_snake", tmp_path / "my_snake-1.0.dist-info"
+    package.mkdir()
+    info.mkdir()
+    (package / "__init__.py").write_text("")
+    code, manifest = blocks_of_the_page("python")
+    (package / "controllers.py").write_text(code)
+    (package / "manifest.py").write_text(manifest)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-snake\nVersion: 1.0\n")
+    (entry,) = tomllib.loads(blocks_of_the_page("toml")[0])["project"]["entry-points"].items()
+    rows = "\n".join(f"{name} = {module}" for name, module in entry[1].items())
+    (info / "entry_points.txt").write_text(f"[{entry[0]}]\n{rows}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    short = [replace(t, seconds=4.0, distance_m=2.0) for t in TASKS if t.name == "swimming"]
+    monkeypatch.setattr(tasks, "TASKS", (*short, TASKS[0]))
+    plugins.foreign_plugins.cache_clear()
+    try:
+        own = run_task(TaskRun("swimming", "slow-wave", 0))
+        unknown = run_task(TaskRun("swimming", "slow-wav", 0))
+    finally:
+        plugins.foreign_plugins.cache_clear()
+    assert own.ended == "ran to its end"
+    assert own.share is not None
+    assert 0.0 < own.share < 1.0
+    assert unknown.ended.startswith("not applicable: ")
 
 
 def test_the_score_is_the_way_of_the_body_between_the_ends() -> None:
