@@ -1,4 +1,4 @@
-"""The ground without the animal: from many frames, or from the surroundings in one frame."""
+"""The ground without the animal: from many frames, or from one frame."""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,24 +9,24 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import DeepImage
 from snakewalk.controller.images.silhouette import Polarity, as_deep_as
 
-_GRID_PX = 64  # longest side of the picture to which the surface is fitted
+_GRID_PX = 64  # longest side of the image to which the surface is fitted
 _ROUNDS = 4
-_STRONGEST_PX = 20.0  # pixels that decide the polarity
-_QUANTILE = 0.85  # a dark animal may cover a pixel in so large a share of the frames
+_STRONGEST_PX = 20.0  # number of pixels that decide the polarity
+_QUANTILE = 0.85  # a slow dark animal may cover a pixel in up to this share of the frames
 
 
 def median_background(frames: Sequence[DeepImage]) -> DeepImage:
-    """(H, W[, 3]) median over frames of one size; right where the animal is gone half the time."""
+    """Median (H, W[, 3]) over frames of one size; each pixel must be uncovered in half of them."""
     return _quantile(np.stack(frames), 0.5)
 
 
 def background_candidates(
     frames: Sequence[DeepImage],
 ) -> Iterator[tuple[DeepImage, Polarity | None, str]]:
-    """The median over frames, and for slow animals a light and a dark quantile of each pixel.
+    """Yield the median over frames, then a light and a dark quantile for slow animals.
 
     Yields:
-        background (H, W[, 3]), the polarity that it supposes (None: any), and its name.
+        Background (H, W[, 3]), the polarity that it assumes (None: any), and its name.
 
     """
     stack = np.stack(frames)
@@ -41,10 +41,10 @@ def _quantile(stack: DeepImage, quantile: float) -> DeepImage:
 
 
 def smooth_background(image: DeepImage) -> DeepImage:
-    """A background from the frame itself: a second-order surface through all but the animal.
+    """Background from the frame itself: a second-order surface fitted without the animal.
 
-    For an animal that hardly moves, and for images cropped to it: the ground must be plain, but
-    its light may be uneven.
+    For an animal that hardly moves, or cropped images. The ground must be plain; its light may be
+    uneven.
     """
     if image.ndim == 3:
         return np.dstack([smooth_background(image[..., k]) for k in range(image.shape[2])])
@@ -70,10 +70,9 @@ def smooth_background(image: DeepImage) -> DeepImage:
 
 
 def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> DeepImage:
-    """(H, W[, 3]) the image without what is narrower than ``side_px``: a morphological closing.
+    """Background (H, W[, 3]) without objects narrower than ``side_px``, by morphological closing.
 
-    A closing for dark objects on lighter ground; an opening for light objects on darker ground.
-    Wide shades of the ground, as those of a lens, of stains and of lamps, are kept.
+    Light objects need an opening. Wide shades of the ground remain (vignettes, stains, lamps).
     """
     kind = cv2.MORPH_OPEN if polarity is Polarity.LIGHT else cv2.MORPH_CLOSE
     calm = cv2.medianBlur(image, 3)
@@ -83,7 +82,7 @@ def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> De
 
 
 def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity:
-    """Whether the pixels that stand out most are darker or lighter than the ground, or both."""
+    """Whether the pixels of most contrast are darker or lighter than the ground, or both."""
     kind: type[np.int16 | np.float32] = np.int16 if image.dtype == np.uint8 else np.float32
     apart: NDArray[np.int16 | np.float32] = image.astype(kind) - background.astype(kind)
     if apart.ndim == 3:

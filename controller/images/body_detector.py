@@ -1,4 +1,4 @@
-"""One frame in, one skeleton out: silhouette and medial axis against a known background."""
+"""One frame in, one skeleton out: silhouette and medial axis against a background."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,21 +21,21 @@ from snakewalk.controller.images.residual import check_residual
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_LONGER = 1.15  # times the length without the faint parts: they are parts of the body
-_LENGTH_TOLERANCE = 0.15  # of the length: frames that agree on the body's length
-_BETTER = 0.04  # of the frames: by how much more must agree to leave the median
-_FEWEST = 5  # frames from which a ground is learnt
-_CALM = 8  # frames whose median has little of their noise
-_CLEAR = 0.9  # share from which no other size of the surroundings is tried
-_SURE = 0.5  # share from which a ground's length of the body is believed
-_FAINT = 0.5  # of the strongest contrast: a ground's body that is fainter may be a stain
+_LONGER = 1.15  # times the length without the faint parts: they belong to the body
+_LENGTH_TOLERANCE = 0.15  # of the length: frames agree on it
+_BETTER = 0.04  # of the frames: this many more must agree for another ground than the median
+_FEWEST = 5  # frames to estimate a ground
+_CALM = 8  # frames whose median has little noise
+_CLEAR = 0.9  # share above which no other size of the surroundings is tried
+_SURE = 0.5  # share above which a ground's body length is trusted
+_FAINT = 0.5  # of the strongest contrast: a fainter body may be a stain
 _PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
-_WIDTHS = 1.5  # of the body: the same
+_WIDTHS = 1.5  # of the body's width: half the side of the surroundings
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """The body found in one frame."""
+    """The body in one frame."""
 
     silhouette: Silhouette
     skeleton: Skeleton
@@ -57,7 +57,7 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class BodyDetector:
-    """Background and contrast of a scene; ``detect`` accepts any frame, in any order."""
+    """Background and contrast of a scene; ``detect`` accepts frames in any order."""
 
     background: DeepImage | None
     """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
@@ -75,14 +75,14 @@ class BodyDetector:
     """Whether parts that are much fainter than the rest of the body belong to it."""
 
     def detect(self, image: DeepImage, ground: DeepImage | None = None) -> Detection:
-        """Find the animal in one frame; a frame that cannot be used is not ``GOOD``.
+        """Detect the animal in one frame; the status of an unusable frame is not ``GOOD``.
 
         Args:
             image: (H, W[, C]).
-            ground: the background for this frame; None: ``ground_of`` the frame.
+            ground: background for this frame; None: ``ground_of`` the frame.
 
         Raises:
-            InputError: the frame is not as large as the background.
+            InputError: the sizes of frame and background differ.
 
         """
         background = self.ground_of(image) if ground is None else ground
@@ -104,7 +104,6 @@ class BodyDetector:
         return replace(found, may_have_faint_parts=True)
 
     def _judged(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Detection:
-        """The skeleton of a silhouette, and whether it explains the frame."""
         if self.inside is not None and body.status is FrameStatus.GOOD:
             left, top = (int(v) for v in body.origin_px)
             rows, columns = body.mask.shape
@@ -121,7 +120,7 @@ class BodyDetector:
         return Detection(body, skeleton, background)
 
     def ground_of(self, image: DeepImage) -> DeepImage:
-        """(H, W[, 3]) what a frame is compared with."""
+        """Return the background (H, W[, 3]) for a frame."""
         if self.background is not None:
             return self.background
         if self.surroundings_px:
@@ -137,24 +136,23 @@ def make_detector(
     inside: Bools | None = None,
     threshold: float | None = None,
 ) -> BodyDetector:
-    """Learn a scene from a few frames spread over the recording.
+    """Choose the background of a scene from a few frames spread over the recording.
 
-    Without a background the median of the frames is taken. If the animal hardly moves, or the
-    camera follows it, the median shows the animal itself. Then another ground is used if more
-    frames agree on the body's length and are explained by it. It is the median of frames in which
-    the animal is painted out, or a brighter or darker quantile of each pixel's values. It can also
-    be the ground found in each frame alone: a smooth surface or the surroundings of each place.
+    The default is the median of the frames. It shows the animal itself if the animal hardly moves
+    or the camera follows it. Another ground is used if more frames then agree on the body's length:
+    the median of frames with the animal painted out, a quantile of each pixel's values, or a ground
+    estimated in each frame alone.
 
     Args:
         frames: (H, W) or (H, W, 3), 8 bit.
         background: the scene without the animal.
-        cropped: the camera moves, or the frames were cropped to the animal: the ground is found in
-            each frame alone.
+        cropped: the camera moves, or the frames are cropped to the animal; the ground is then
+            estimated in each frame alone.
         inside: (H, W) where the animal may be.
-        threshold: contrast at the body's boundary, grey levels, of a user who knows it.
+        threshold: known contrast at the body's boundary, grey levels.
 
     Raises:
-        InputError: no frames, or the background is of another size.
+        InputError: no frames, or the background has another size.
 
     """
     if not frames:
@@ -174,7 +172,7 @@ def make_detector(
 
 
 def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) -> "_Candidate":
-    """The best ground for some frames, and how the detector does with it."""
+    """Return the best ground for some frames."""
     surface = replace(
         plain,
         polarity=usual_polarity(frames, None),
@@ -209,7 +207,7 @@ def whole_share(detector: BodyDetector, frames: Sequence[DeepImage]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
-    """A detector, and how it does on some frames."""
+    """A detector and its results on some frames."""
 
     detector: BodyDetector
     share: float
@@ -239,15 +237,13 @@ class _Candidate:
 
 
 def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
-    """The detector of ``_best_of``."""
     return _best_of(candidates).detector
 
 
 def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
-    """The first with about the highest share; half of a body in all frames counts as half.
+    """Return the first candidate with about the highest share, weighted by length.
 
-    A part of the body has the same contrast as all of it; a longer and much fainter object is a
-    stain.
+    A part of a body has the same contrast as the whole; a longer, much fainter object is a stain.
     """
     sure = [one for one in candidates if one.share >= _SURE]
     strongest = max((one.contrast for one in sure), default=0.0)
@@ -265,7 +261,7 @@ def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
 def _with_surroundings(
     surface: BodyDetector, seen: _Candidate, frames: Sequence[DeepImage]
 ) -> BodyDetector | None:
-    """The detector that compares each place with its surroundings; None without a polarity."""
+    """Detector that compares each pixel with its surroundings; None without a polarity."""
     if surface.polarity is Polarity.BOTH:
         return None
     side = min(frames[0].shape[:2])
@@ -283,7 +279,7 @@ def _with_surroundings(
 
 
 def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:
-    """Median of the frames with the animal painted over; None where it is seldom found alone."""
+    """Detector with the median of painted-out frames; None if too few are usable."""
     out = []
     for frame in frames:
         detection = detector.detect(frame)
@@ -311,10 +307,9 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
 
 
 def usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
-    """The polarity of most frames.
+    """Return the polarity of most frames.
 
-    Against a background that shows the animal a frame stands out both ways; then what each frame
-    shows alone decides.
+    If the background shows the animal, frames stand out both ways; each frame alone then decides.
     """
     found = [
         contrast_polarity(frame, smooth_background(frame) if background is None else background)

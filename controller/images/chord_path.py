@@ -1,13 +1,14 @@
 """Equal chords by following the path of the existence proof ([PT] 2.3).
 
-The places ``t_1 < ... < t_N`` and the chord c that satisfy ``abs(P(t_i) - P(t_(i-1))) = c`` form a
-path that begins at c = 0. It can end only where ``t_N`` is the end of the curve: an equipartition.
-The chord may shrink on the way, where a circle touches the curve. On a polyline the path is smooth
-until a place reaches a vertex. There the place goes on to the next piece in the same direction,
-as the cofactor that gives its sign does not depend on its own piece (Allgower & Georg 1990, 12).
+The places ``t_1 < ... < t_N`` and the chord c with ``abs(P(t_i) - P(t_(i-1))) = c`` form a path
+that starts at c = 0. It can end only where ``t_N`` is the end of the curve: an equipartition. The
+chord may shrink on the path, where a circle touches the curve. On a polyline the path is smooth
+until a place reaches a vertex. There the place continues to the next piece in the same direction,
+because the cofactor that gives its sign does not depend on its own piece (Allgower & Georg 1990,
+12).
 
-Equation i contains the places i - 1 and i and the chord only. So the direction of the path and
-Newton's step are built up one equation at a time by plane rotations, without a matrix.
+Equation i contains only the places i - 1 and i and the chord. The direction of the path and
+Newton's step are therefore built by plane rotations, one equation at a time, without a matrix.
 """
 
 import numpy as np
@@ -18,19 +19,19 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 _CLOSE = 1e-13
 """Residual of a point on the path, as a share of the length of the curve."""
 _NEWTON = 8
-_STRAIGHT = 0.9  # cosine between tangents before and after a step, at least
+_STRAIGHT = 0.9  # smallest cosine between tangents before and after a step
 _SMALLEST = 1e-12
 _CURVE = f"{readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}"
 
 
 def follow_chords(curve: Floats, arc: Floats, segments: int, most_steps: int) -> Floats | None:
-    """Return the places (N + 1,) of an equipartition; None if the steps do not suffice.
+    """Return the places (N + 1,) of an equipartition; None if ``most_steps`` do not suffice.
 
     Args:
         curve: (M, 2) without repeated points.
-        arc: (M,) arc length at them.
+        arc: (M,) arc length of the points.
         segments: N, 2 or more.
-        most_steps: of the path.
+        most_steps: limit of steps along the path.
 
     """
     at = np.append(np.arange(1.0, segments + 1.0), 1.0) * (0.5 * arc[1] / segments)
@@ -45,15 +46,15 @@ def follow_chords(curve: Floats, arc: Floats, segments: int, most_steps: int) ->
 def equations(
     curve: Floats, arc: Floats, at: Floats, piece: Ints, gap: Floats, slopes: Floats
 ) -> None:
-    """Write the residuals (N,) in chords, and their slopes (N, 2) by the place before and by its.
+    """Write the residuals of the equations, and their slopes.
 
     Args:
         curve: (M, 2).
         arc: (M,).
         at: (N + 1,) the places and the chord.
-        piece: (N,) number of the piece on which each place lies.
-        gap: written.
-        slopes: written.
+        piece: (N,) index of the piece of each place.
+        gap: (N,) out: excess of each chord's length.
+        slopes: (N, 2) out: slopes by the previous place and by its own.
 
     """
     count = len(piece)
@@ -78,13 +79,13 @@ def equations(
 def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
     """Write a step (N + 1,) that closes the gaps, and the unit vector along the path.
 
-    The equations so far leave one direction. The next equation turns it in the plane of itself and
-    the next place; the step grows in the direction that is left out.
+    The first equations leave one free direction. The next equation rotates it in the plane of
+    itself and the next place.
     """
     count = len(gap)
     grow = np.empty(count)
-    turn = np.empty((count, 2))  # of the direction: share of the new place, share that remains
-    before, old, chord, free = 0.0, 0.0, 0.0, 1.0  # entries of the last place, and of the chord
+    turn = np.empty((count, 2))  # shares of the direction: of the new place, and the remainder
+    before, old, chord, free = 0.0, 0.0, 0.0, 1.0  # entries of the last place and of the chord
     for i in range(count):
         a, s = slopes[i, 0] * before - free, slopes[i, 1]
         size = max(np.hypot(a, s), 1e-300)
@@ -94,7 +95,7 @@ def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
         free *= s
         before, old = -a, grow[i] * s
         turn[i, 0], turn[i, 1] = a, s
-    later, remains = 0.0, 1.0  # sum of later growths, and product of later shares
+    later, remains = 0.0, 1.0  # sum of later growths, product of later shares
     for i in range(count - 1, -1, -1):
         a, s = turn[i]
         step[i] = grow[i] * s - a * later
@@ -117,7 +118,7 @@ def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int)
         if reach < _SMALLEST * length:
             return False
         share, place = np.inf, 0
-        for i in range(count):  # how far along the tangent a place first reaches a vertex
+        for i in range(count):  # distance along the tangent at which a place first reaches a vertex
             if abs(tangent[i]) > 1e-14:
                 far = (arc[piece[i] + (1 if tangent[i] > 0.0 else 0)] - at[i]) / tangent[i]
                 if far < share:

@@ -1,9 +1,9 @@
 """Equal chords along a curve: ``N`` consecutive points on it, first at A, last at B ([PT] 2.3).
 
-Steepest descent on the chord as in [PT], Algorithm 1, with the corrections of the errata. It is
-bracketed and bisected if it does not settle. Then chords that end at a later crossing of their
-circle are tried, and last the path of the existence proof (``chord_path``). A curve without a
-solution is an error, never an unequal partition.
+The order of methods: steepest descent on the chord ([PT] Algorithm 1, corrected in the errata);
+bisection if it does not settle; chords that end at a later crossing of their circle; the path of
+the existence proof (``chord_path``). A curve without a solution is an error, never an unequal
+partition.
 """
 
 from collections.abc import Iterator
@@ -18,18 +18,18 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 TOLERANCE = 1e-9
 """Tolerance of the last point's place, in curve lengths."""
-_RATE = 0.95  # of the correction; 1 would be Newton's step for a straight curve
+_RATE = 0.95  # of the correction; 1 is Newton's step for a straight curve
 _DESCENTS = 12
 _BISECTIONS = 80
-_SCAN = 96  # chords tried between the least and the greatest possible one
-_MOST_STEPS = 40_000  # along the path: a second or two for 100 chords
+_SCAN = 96  # number of chords tried between the smallest and the largest possible one
+_MOST_STEPS = 40_000  # along the path: one or two seconds for 100 chords
 _GRID = 400  # of the scan for three chords
 _NEWTON_STEPS = 40
 _BENT = 1.05  # arc over chord from which all solutions are searched
 
 
 class NoEquipartitionError(ValueError):
-    """No chord was found that divides this curve equally."""
+    """No chord divides this curve equally."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Equipartition:
 
 
 class _Curve:
-    """The curve continued straight past B, so that overshoot has a sign."""
+    """The curve, extended straight beyond B, so that overshoot has a sign."""
 
     def __init__(self, curve: Floats, segments: int) -> None:
         step = np.hypot(*np.diff(curve, axis=0).T)
@@ -70,12 +70,12 @@ class _Curve:
         self.first: Ints = np.zeros(segments, dtype=np.int64)
         self.points = np.empty((segments + 1, 2))
         self.at = np.empty(segments + 1)
-        # N chords are never longer than the curve, and never shorter than the distance from A to B
+        # N chords are at most as long as the curve, and at least the distance from A to B
         self.least = float(np.hypot(*(kept[-1] - kept[0]))) / segments
         self.most = self.length / segments
 
     def residual(self, chord: float, crossing: Ints | None = None) -> float:
-        """Signed arc from B to where the last point came to lie; NaN if it does not exist."""
+        """Signed arc from B to the last point; NaN if that point does not exist."""
         taken = self.first if crossing is None else crossing
         done = march(self.line, self.line_arc, chord, taken, self.points, self.at)
         return float(self.at[-1]) - self.length if done == self.segments else float("nan")
@@ -87,7 +87,7 @@ class _Curve:
         return Equipartition(points, at, chord, method, 1, self.distance(points, at))
 
     def distance(self, points: Floats, at: Floats) -> float:
-        """Mean distance of the curve from the chord of each part of it, its ends included."""
+        """Mean distance of the curve from its chords."""
         of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
         chord, away = points[of + 1] - points[of], self.curve - points[of]
         share = (away * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), 1e-300)
@@ -98,13 +98,12 @@ class _Curve:
 def equipartition(curve: Floats, segments: int = 100) -> Equipartition:
     """Divide ``curve`` (M, 2), M 2 or more, into ``segments`` equal chords.
 
-    If a chord leaves its arc by more than 5 % (few chords on a strong bend), all solutions by first
-    crossings are searched, for 8 segments or fewer also those by later crossings. The result is the
-    closest to the curve.
+    If an arc exceeds its chord by more than 5 %, all solutions by first crossings are searched; for
+    8 segments or fewer, also by later crossings. The result is the solution closest to the curve.
 
     Raises:
         ValueError: wrong shape, not finite, no length, or no segments.
-        NoEquipartitionError: no solution was found.
+        NoEquipartitionError: no solution found.
 
     """
     if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
@@ -133,11 +132,11 @@ def _fits(found: Equipartition) -> bool:
 
 
 def _halves(given: _Curve) -> Equipartition:
-    """Two chords meet where the curve crosses the perpendicular bisector of AB: it always does."""
+    """Two chords meet where the curve crosses the perpendicular bisector of AB."""
     curve, arc = given.curve, given.arc
     side = ((curve - curve[0]) ** 2 - (curve - curve[-1]) ** 2).sum(axis=1)
     if given.least <= TOLERANCE * given.length:
-        side = arc - 0.5 * given.length  # A is B: any point is valid, use the middle
+        side = arc - 0.5 * given.length  # A is B: every point is valid, use the middle
     found = []
     for k in np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0)):
         part = side[k] / (side[k] - side[k + 1])
@@ -150,7 +149,7 @@ def _halves(given: _Curve) -> Equipartition:
 
 
 def _descend(given: _Curve) -> Equipartition | None:
-    """[PT] Algorithm 1: correct the chord by the mean arc error; bisect where that cycles."""
+    """[PT] Algorithm 1: correct the chord by the mean arc error; bisect if it cycles."""
     tolerance = TOLERANCE * given.length
     low, high, chord = 0.0, np.inf, given.most
     for _ in range(_DESCENTS):
@@ -170,7 +169,7 @@ def _descend(given: _Curve) -> Equipartition | None:
 
 
 def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None) -> float | None:
-    """The chord between two of opposite sign; None where the residual jumps past zero."""
+    """Return the root between two chords; None where the residual jumps across zero."""
     tolerance = TOLERANCE * given.length
     rising = given.residual(low, crossing) < 0.0
     for _ in range(_BISECTIONS):
@@ -185,7 +184,6 @@ def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None
 
 
 def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
-    """Search every solution and return the one closest to the curve."""
     found = [] if known is None else [known]
     for method, crossing in _crossings(given.segments, search=known is None):
         for chord in _roots(given, crossing):
@@ -210,7 +208,7 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
 
 
 def _path_steps(given: _Curve) -> int:
-    """Most steps along the path: each place passes each vertex a few times."""
+    """Limit of steps along the path: each place passes each vertex a few times."""
     return min(8 * given.segments * len(given.curve) + 1000, _MOST_STEPS)
 
 
@@ -221,11 +219,11 @@ def _at_places(given: _Curve, places: Floats) -> Equipartition:
 
 
 def _thirds(given: _Curve) -> list[Equipartition]:
-    """Three chords wherever they are: places s < t where two differences of chords are zero.
+    """Return all solutions of three chords: places s < t where two differences of chords are zero.
 
-    The proof of existence ([PT] 2.3) allows any later crossing, and at a tangency a circle gains or
-    loses two of them, so that no count of crossings leads there. So the triangle of all s and t is
-    scanned for cells where both differences change sign, and each is solved by Newton's method.
+    [PT] 2.3 allows any later crossing, and a circle gains or loses two at a tangency, so counting
+    crossings does not find all. The triangle of s and t is scanned for cells where both differences
+    change sign; Newton's method solves each.
     """
     length = given.length
     grid = np.linspace(0.0, length, _GRID + 1)
@@ -253,7 +251,7 @@ def _thirds(given: _Curve) -> list[Equipartition]:
 
 
 def _newton(given: _Curve, at: Floats) -> Floats:
-    """Return those of the starts (K, 2) from which Newton's method finds three equal chords."""
+    """Newton's method from starts (K, 2); return the solutions."""
     length, ends = given.length, given.curve[[0, -1]]
     slope = np.diff(given.curve, axis=0) / np.diff(given.arc)[:, None]
     for _ in range(_NEWTON_STEPS):
@@ -277,7 +275,7 @@ def _newton(given: _Curve, at: Floats) -> Floats:
 
 
 def _crossings(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:
-    """First crossings, then one later crossing at any step, then (few segments) at two steps."""
+    """Yield first crossings, then a later one at any step, then (few segments) at two steps."""
     crossing: Ints = np.zeros(segments, dtype=np.int64)
     yield "bisection", crossing
     if segments > 8 and not search:
@@ -312,15 +310,15 @@ def march(
     """Write the points at distance ``chord`` from one another along ``line``.
 
     Args:
-        line: (M, 2) vertices; the last piece should be long enough that no step leaves it.
+        line: (M, 2) vertices; the last piece must be long enough that no step leaves it.
         arc: (M,) arc length at the vertices.
         chord: length of every step.
-        crossing: (N,) which crossing of its circle each step uses, 0 the first.
-        points: (N + 1, 2) written.
-        at: (N + 1,) arc length of them, written.
+        crossing: (N,) index of the circle's crossing that each step uses, 0 the first.
+        points: (N + 1, 2) out.
+        at: (N + 1,) out: their arc length.
 
     Returns:
-        N, or fewer steps where such a crossing does not exist.
+        N, or fewer steps if a crossing does not exist.
 
     """
     px, py, here = line[0, 0], line[0, 1], 0.0
@@ -334,8 +332,8 @@ def march(
         while j + 1 < line.shape[0] and not found:
             ex, ey = line[j + 1, 0] - px, line[j + 1, 1] - py
             if left == 0 and ex * ex + ey * ey < square:
-                # for the first crossing the piece so far lies inside the circle; for a later one
-                # it may cut the circle twice, which the roots below would show
+                # before the first crossing the piece lies inside the circle; a piece of a later
+                # crossing may cut the circle twice
                 ax, ay = line[j, 0] - px, line[j, 1] - py
                 if j == piece or ax * ax + ay * ay < square:
                     j += 1

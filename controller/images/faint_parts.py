@@ -15,15 +15,15 @@ from snakewalk.controller.images.silhouette import (
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _AWAY = 1.2  # widths from the silhouette: blur and shadow stay nearer
-_MUCH = 0.06  # of the silhouette's area: fewer faint pixels do not count as a part of the body
+_MUCH = 0.06  # of the silhouette's area: fewer faint pixels are not a part of the body
 _FAINTEST = 0.07  # of the body's contrast: a fainter area is a stain or a trail
 _MARGIN_PX = 20  # of the cut-out, where the body fades out
-_BLUR_PX = 4  # around the silhouette: an area that goes on further is not its blur
+_BLUR_PX = 4  # around the silhouette: a larger area is not its blur
 _TYPICAL = 40.0  # percentile of the contrast along the middle of the faint parts
 
 
 def may_have_faint_parts(body: Silhouette) -> bool:
-    """Whether something fainter than the silhouette goes on beyond its cut-out, or next to it."""
+    """Whether a fainter area extends beyond the silhouette's box, or another body is similar."""
     if body.status is FrameStatus.SEVERAL:
         return True
     if body.status is not FrameStatus.GOOD:
@@ -37,9 +37,10 @@ def may_have_faint_parts(body: Silhouette) -> bool:
 def with_faint_parts(
     image: DeepImage, background: DeepImage, polarity: Polarity, body: Silhouette
 ) -> Silhouette | None:
-    """The silhouette with all that is connected to it above the noise; None if that is the same.
+    """Return the silhouette with all connected pixels above the noise; None if nothing is added.
 
-    Its contrast is cut at that of the faint part, so that the boundary is at half of it everywhere.
+    The contrast is clipped at that of the faint part, so that the boundary lies at half of it
+    everywhere.
 
     Args:
         image: (H, W[, 3]) the frame.

@@ -1,4 +1,4 @@
-"""Images that belong to one recording: their order, the pages of stacks, and missing numbers."""
+"""Images of one recording: their order, the pages of stacks, and missing numbers."""
 
 import re
 from collections.abc import Sequence
@@ -13,14 +13,14 @@ STACKS = (".tif", ".tiff")
 
 
 def in_order(file: Path) -> list[tuple[int, str]]:
-    """Key that sorts 2.png before 10.png."""
+    """Sort key that puts 2.png before 10.png."""
     return [
         (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)
     ]
 
 
 def pages_of(files: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[int, ...]]:
-    """Each image as often as it has pages, and the page of each, from 0."""
+    """Return each image once per page, and the page of each, from 0."""
     found = [
         (file, page)
         for file in files
@@ -33,14 +33,13 @@ def _page_count(file: Path) -> int:
     try:
         return max(1, int(cv2.imcount(str(file))))
     except cv2.error:
-        return 1  # the fault of reading it names the file
+        return 1  # reading the file reports the fault
 
 
 def frame_numbers_of(files: Sequence[Path]) -> Ints | None:
-    """(T,) frame numbers from 0 by the last number in the names, where some are missing.
+    """(T,) frame numbers from 0, by the last number in the names.
 
-    None if none is missing, or if the names are not those of one sequence. Numbers that all lie the
-    same step apart have none missing.
+    None if no number is missing at a constant step, or if the names do not form one sequence.
     """
     parts = [re.fullmatch(r"(.*?)(\d+)(\D*)", file.name) for file in files]
     known = [one for one in parts if one is not None]

@@ -1,8 +1,7 @@
 """The medial axis of a silhouette as one ordered curve from tip to tip ([PT] 2.3).
 
-The body is thinned at a fixed working width, so that the cost does not depend on its size. Side
-branches are pruned by taking the longest path between two ends. The line of pixels is centred and
-extended to both tips.
+The body is thinned at a fixed working width, so that the cost does not depend on its size. The
+longest path between two ends drops side branches. It is then centred and extended to both tips.
 """
 
 from collections.abc import Sequence
@@ -24,12 +23,12 @@ from snakewalk.drivers.compiling import compiled
 Level = NDArray[np.float32]
 SEGMENTS = 100
 _MARGIN = 3
-_LARGEST_PX = 8000  # side of the enlarged cut-out
-_HOLE = 0.35  # a larger hole, in squares of the width, is a loop of the body
-_THIN_TIP = 0.2  # share of the contrast at which a body two pixels wide ends: blur hides its tips
-_UNSURE_PX = 4.5  # a thinner body's line is used only where its blurred picture fits
-_POINTED_PX = 3.5  # a thinner body's tips are those of its fit
-_UNIFORM = 0.85  # of the mean width: a body with a deeper place has a wide part
+_LARGEST_PX = 8000  # largest side of the enlarged cut-out
+_HOLE = 0.35  # squares of the width: a larger hole is a loop of the body
+_THIN_TIP = 0.2  # share of the contrast that ends a body two pixels wide: blur hides its tips
+_UNSURE_PX = 4.5  # a thinner body needs a fit of its blurred picture
+_POINTED_PX = 3.5  # tips of a thinner body come from its fit
+_UNIFORM = 0.85  # of the working width: a deeper body has a wide part
 _LONG = 2.5  # widths: a shorter object is not a long body
 _BRANCH = 0.14  # of the length: a longer side branch is a part of the body
 WORKING_WIDTH = 14.0
@@ -41,7 +40,7 @@ _TURN_GAIN = 1.0  # of the turn towards the ridge on the way to a tip
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """A body in one image; lengths in pixels of that image, x to the right and y downwards."""
+    """A body in one image; pixels of that image, x to the right and y downwards."""
 
     points_px: Floats
     """(101, 2) x, y at 100 equal chords from tip to tip; NaN without a skeleton. Which end is the
@@ -53,23 +52,23 @@ class Skeleton:
     status: FrameStatus
 
     def reversed(self) -> "Skeleton":
-        """The same body from its other end."""
+        """Return the body from its other end."""
         return Skeleton(
             self.points_px[::-1].copy(), self.radius_px[::-1].copy(), self.length_px, self.status
         )
 
 
 def no_skeleton(status: FrameStatus) -> Skeleton:
-    """Stand-in for the skeleton of a frame that cannot be used: all NaN."""
+    """Skeleton of an unusable frame: all NaN."""
     nan = np.full((SEGMENTS + 1, 3), np.nan)
     return Skeleton(nan[:, :2].copy(), nan[:, 2].copy(), float("nan"), status)
 
 
 def skeleton_of(mask: Bools) -> Skeleton:
-    """Skeleton of a body given as a mask (H, W) of one component, holes of the image filled or not.
+    """Skeleton of a body given as a mask (H, W) of one component, with or without holes.
 
-    Never raises on a mask: an empty, round, looped or branching one has a status other than
-    ``GOOD``, and NaN for points. The order of the ends is arbitrary.
+    Never raises: an empty, round, looped or branching mask has a status other than ``GOOD``, and
+    NaN points. The order of the ends is arbitrary.
     """
     shape = np.ascontiguousarray(mask, dtype=np.uint8)
     rows, columns = np.flatnonzero(shape.any(axis=1)), np.flatnonzero(shape.any(axis=0))
@@ -94,14 +93,14 @@ def skeleton_of_level(
     *,
     grey: bool = True,
 ) -> Skeleton:
-    """Skeleton of the largest part of ``level`` (h, w) above ``threshold``: finer than of a mask.
+    """Skeleton of the largest part of ``level`` (h, w) above ``threshold``; finer than from a mask.
 
     Args:
-        level: contrast of one body against nothing, as a cut-out of an image.
-        threshold: the contrast at the body's boundary.
+        level: contrast of one body, cut out of an image.
+        threshold: contrast at the body's boundary.
         origin_px: x, y of the cut-out's first pixel in the image.
-        noise_level: contrast that noise alone reaches; tips are not searched below it.
-        grey: whether ``level`` falls off at the boundary as blur makes it; a mask does not.
+        noise_level: contrast that noise alone reaches; tips lie above it.
+        grey: whether ``level`` is blurred at the boundary; a mask is not.
 
     """
     width = _width(level > threshold)
@@ -152,7 +151,7 @@ def _width(mask: Bools) -> float | None:
     if not contours:
         return None
     outline = max(contours, key=len)
-    half = 0.5 * cv2.arcLength(outline, closed=True) + 2.0  # the chain runs through pixel centres
+    half = 0.5 * cv2.arcLength(outline, closed=True) + 2.0  # the contour runs through pixel centres
     area = float(np.count_nonzero(mask))
     square = half * half - 4.0 * area
     if square <= 0.0 or area < 6.0:
@@ -177,11 +176,11 @@ def _rescaled(level: Level, scale: float) -> Level:
 def _to_the_tips(
     chain: Floats, fine: Level, threshold: float, depth: Level, tip: float
 ) -> Floats | None:
-    """Smooth the chain of pixels, cut the forks off its ends, and go on to the boundary."""
+    """Smooth the chain of pixels, remove forks at its ends, extend it to the boundary."""
     line = gaussian_filter1d(chain, _SMOOTH, axis=0, mode="nearest")
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     deep = _sample(depth, line)
-    # within a radius of the end the axis of a blunt body turns into one of its corners
+    # within a radius of the end, the axis of a blunt body turns into a corner
     inner = np.flatnonzero((arc >= deep) & (arc[-1] - arc >= deep))
     if len(inner) < 4:
         return None
@@ -197,7 +196,7 @@ def _to_the_tips(
 def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
     """Move each point to the middle between both sides.
 
-    Thinning is off by up to a pixel, and smoothing cuts bends short.
+    Thinning is off by up to a pixel, and smoothing shortens bends.
     """
     along = np.gradient(line, axis=0)
     side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
@@ -221,7 +220,7 @@ def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
 
 
 def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
-    """Points on from the last of ``end`` (K, 2), along the ridge, to where the body ends."""
+    """Extend ``end`` (K, 2) along the ridge to the end of the body; return the new points."""
     ahead = end[-1] - end[0]
     ahead = ahead / np.hypot(*ahead)
     across = np.linspace(-0.5, 0.5, 15) * WORKING_WIDTH
@@ -245,7 +244,7 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
 
 
 def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
-    """Values (...) between the pixels at points (..., 2), one or two leading axes; 0 outside."""
+    """Interpolate at points (..., 2), one or two leading axes; 0 outside."""
     rows = points if points.ndim == 3 else points[:, None]
     x, y = np.ascontiguousarray(np.moveaxis(rows, -1, 0), dtype=np.float32)
     found = cv2.remap(
@@ -260,7 +259,7 @@ def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
 
 
 def _largest(mask: Bools) -> Image | None:
-    """(h, w) the largest part, 1 inside; None where there is nothing."""
+    """Largest part (h, w), 1 inside; None if the mask is empty."""
     count, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     if count < 2:
         return None
@@ -269,7 +268,7 @@ def _largest(mask: Bools) -> Image | None:
 
 
 def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
-    """Holes filled, and whether one was larger than ``hole_px``, so that the body encloses it."""
+    """Fill holes; also return whether one exceeds ``hole_px``, so that the body encloses it."""
     count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
     outside = label[0, 0]
     holes = [stats[k, cv2.CC_STAT_AREA] for k in range(1, count) if k != outside]
@@ -278,7 +277,7 @@ def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
 
 
 def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
-    """The longest path between two ends (K, 2) x, y, and how far off it another part reaches."""
+    """Longest path (K, 2) x, y between two ends, and how far another part reaches from it."""
     rows, columns = np.nonzero(thin)
     if len(rows) < 3:
         return None
@@ -308,15 +307,15 @@ _INTS = "int64[::1]"
 def walk_line(
     place: Ints, flat: Ints, wide: int, start: Ints, length: Floats, before: Ints
 ) -> None:
-    """Walk over the pixels of a thin line from some of them, a pixel further at a time.
+    """Walk over the pixels of a thin line, breadth first.
 
     Args:
-        place: (H W,) index of each pixel of the line, -1 off it; the rim of the image is off it.
-        flat: (N,) where the line's pixels are in it.
+        place: (H W,) index of each pixel on the line, -1 elsewhere; the image's rim must be -1.
+        flat: (N,) flat position of each pixel of the line.
         wide: W.
         start: (S,) indices of the first pixels.
-        length: (N,) px; out: of the way to each pixel, in place of -1. Slanted steps are longer.
-        before: (N,) out: the pixel before it, in place of -1.
+        length: (N,) px, in: -1; out: path length to each pixel.
+        before: (N,) in: -1; out: the previous pixel.
 
     """
     front = np.empty(len(flat), np.int64)

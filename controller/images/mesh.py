@@ -1,4 +1,4 @@
-"""A mesh of triangles with a texture."""
+"""A textured mesh of triangles."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from snakewalk.config.arrays import Floats, Ints
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """Triangles, seen from outside counter-clockwise; x forward, z up, the belly on z = 0."""
+    """Triangles, counter-clockwise from outside; x forward, z up, belly at z = 0."""
 
     vertices: Floats
     """(V, 3) metres, or body lengths where the body has no scale."""

@@ -1,4 +1,4 @@
-"""A mesh as files: Wavefront OBJ with its material and texture, or one binary glTF."""
+"""Mesh files: Wavefront OBJ with material and texture, or binary glTF."""
 
 import io
 import struct
@@ -44,16 +44,15 @@ class GivenMesh:
 
 
 def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> GivenMesh:
-    """Read the triangles of an OBJ or a binary glTF, with the texture if it has one picture.
+    """Read the triangles of an OBJ or a binary glTF, with the texture if there is one picture.
 
     Args:
-        file: ends in .obj or .glb; further parts of a scene are joined.
-        forward: ``+x``, ``-z``, ...: where its head lies; default: along its longest side, +.
-        up: default: +y, which glTF prescribes; of an OBJ, +z, but where z is forward, +y.
+        file: ends in .obj or .glb; the parts of a scene are joined.
+        forward: ``+x``, ``-z``, ...: direction of the head; default: +, along the longest side.
+        up: default: +y for glTF (its standard), +z for OBJ; the other of both if it is ``forward``.
 
     Raises:
-        InputError: no such file, no triangles in it, or axes that are unknown or not at right
-            angles.
+        InputError: no such file, no triangles, or axes that are unknown or parallel.
 
     """
     if not file.is_file():
@@ -66,7 +65,7 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
         solid: Any = scene.to_mesh()
     except InputError:
         raise
-    except Exception as error:  # trimesh raises whatever its parsers meet
+    except Exception as error:  # trimesh passes on any error of its parsers
         raise InputError(f"{file}: cannot be read as a mesh: {error}") from None
     if len(solid.faces) == 0 or not np.isfinite(solid.vertices).all():
         raise InputError(f"{file}: holds no triangles")
@@ -97,9 +96,9 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
 
 
 def _unpacked_glb(file: Path) -> int:
-    """Bytes of numbers that a binary glTF says its meshes have, once for each node that shows one.
+    """Bytes of numbers that a binary glTF declares for its meshes, once for each node.
 
-    Views may overlap, accessors without a view are zeros, and many nodes may show one mesh.
+    Views may overlap, accessors without a view are zeros, and many nodes may use one mesh.
     """
     with file.open("rb") as stream:
         _, _, _, length, _ = struct.unpack("<5I", stream.read(20))
@@ -123,7 +122,7 @@ def _unpacked_glb(file: Path) -> int:
 
 
 def _check_pictures(file: Path, scene: Any) -> None:
-    """Check how large a mesh's pictures are, before any is unpacked."""
+    """Check the size of a mesh's pictures before any is unpacked."""
     found = {id(p): p for g in scene.geometry.values() if (p := _picture_of(g.visual)) is not None}
     pixels = sum(picture.width * picture.height for picture in found.values())
     if pixels > MOST_PIXELS:
@@ -141,16 +140,16 @@ def _axis(name: str, option: str) -> Any:
 
 
 def _picture_of(visual: Any) -> Any:
-    """The picture that a mesh wears, as Pillow has it; None if it wears none."""
+    """Picture of a mesh (Pillow), or None."""
     material = getattr(visual, "material", None)
     return getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
 
 
 def mesh_files(file: Path, textured: bool) -> list[Path]:
-    """List what ``write_mesh`` writes.
+    """List the files that ``write_mesh`` writes.
 
     Raises:
-        InputError: an ending that is neither .obj nor .glb.
+        InputError: the name ends neither in .obj nor in .glb.
 
     """
     if file.suffix.lower() == ".glb":
@@ -161,15 +160,12 @@ def mesh_files(file: Path, textured: bool) -> list[Path]:
 
 
 def write_mesh(file: Path, mesh: Mesh, texture: Image | None) -> list[Path]:
-    """Write a mesh; OBJ keeps z up, glTF wants y up and gets it.
+    """Write a mesh with z up in OBJ, y up in glTF; return the files.
 
     Args:
         file: ends in .obj or .glb.
-        mesh: of the body.
-        texture: (H, W, 3), first row at v = 1; None paints the skin in one colour.
-
-    Returns:
-        The files written.
+        mesh: mesh to write.
+        texture: (H, W, 3), first row at v = 1; None: one colour.
 
     """
     files = mesh_files(file, texture is not None)
@@ -187,7 +183,6 @@ def write_mesh(file: Path, mesh: Mesh, texture: Image | None) -> list[Path]:
 
 
 def _obj(mesh: Mesh, material: str) -> str:
-    """Text of the OBJ; indices count from 1."""
     lines = [f"mtllib {material}", "o body"]
     lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in mesh.vertices.tolist()]
     lines += [f"vt {u:.6f} {v:.6f}" for u, v in mesh.uv.tolist()]
@@ -199,7 +194,6 @@ def _obj(mesh: Mesh, material: str) -> str:
 
 
 def _glb(mesh: Mesh, texture: Image | None) -> bytes:
-    """Bytes of the glTF."""
     turned = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     visual: Any = trimesh.visual  # its classes have no types
     paint: dict[str, Any] = {"baseColorFactor": [*SKIN_RGB, 1.0]}

@@ -1,7 +1,7 @@
-"""The ends of a body that taper below the blur of the picture, where half its contrast is too soon.
+"""Tips that taper below the blur of the picture; half the contrast ends them too early.
 
-The contrast summed across the body is its width times its own contrast, whatever the blur; the tip
-is where that profile, carried on, comes to nothing.
+The contrast summed across the body is its width times its contrast, at any blur. The tip is where
+this profile, extrapolated, reaches 0.
 """
 
 import cv2
@@ -12,30 +12,30 @@ from scipy.ndimage import gaussian_filter1d
 from snakewalk.config.arrays import Floats
 
 _STEP_PX = 0.5
-_LOW, _HIGH = 0.06, 0.12  # of the usual width: the profile between these is carried on to 0
-_BEFORE = 2.0  # widths before the end that is known, from which the profile is looked at
-_BLUR_PX = 2.0  # of filters and image: so far a blunt end's profile reaches beyond it
-_BEYOND = 2.5  # widths beyond the end that is known, at most
+_LOW, _HIGH = 0.06, 0.12  # of the usual width: this part of the profile is extrapolated
+_BEFORE = 2.0  # widths before the known end at which the profile starts
+_BLUR_PX = 2.0  # of filters and image: a blunt end's profile extends this far
+_BEYOND = 2.5  # widths beyond the known end, at most
 _ACROSS = 0.9  # widths on each side that are summed
-_RIM = 0.7  # widths: a place further to the side is ground
-_AHEAD = 0.5  # widths over which the direction at the end is taken
-_BLUNT = 0.18  # of the usual width at the end that is known: a wider end is not pointed
+_RIM = 0.7  # widths to the side beyond which there is ground
+_AHEAD = 0.5  # widths over which the direction at the end is measured
+_BLUNT = 0.18  # of the usual width: a wider known end is not pointed
 _LONGEST = 0.6  # widths: a longer extension is a trail
-_SLOWER = 1.0  # times as long as the taper before the end lets it expect
-_GROUND = 1.2  # widths beyond the end: from there on is ground
+_SLOWER = 1.0  # limit of the extension, over that expected from the taper
+_GROUND = 1.2  # widths beyond the end where the ground starts
 _SLOW_PX = 1.7  # between both shares: a blunt end's profile falls faster
-_WORTH = 0.15  # widths: less than that is left to the end that is known
-_USUAL = (0.3, 0.6)  # of the length: where the width is the usual one
+_WORTH = 0.15  # widths: a shorter extension is ignored
+_USUAL = (0.3, 0.6)  # of the length: range of the usual width
 
 
 def to_pointed_tips(line: Floats, level: NDArray[np.float32], wide: float, scale: float) -> Floats:
-    """The line (P, 2) lengthened to the tips of ends that taper.
+    """Return the line (P, 2), extended to the tips of ends that taper.
 
     Args:
-        line: x, y in pixels of ``level``, from tip to tip, as half the contrast shows them.
+        line: x, y in pixels of ``level``, between the tips at half the contrast.
         level: (h, w) contrast of one body.
         wide: width of the body, pixels of ``level``.
-        scale: pixels of ``level`` a pixel of the image.
+        scale: pixels of ``level`` per pixel of the image.
 
     """
     steps = np.hypot(*np.diff(line, axis=0).T)
@@ -50,7 +50,7 @@ def to_pointed_tips(line: Floats, level: NDArray[np.float32], wide: float, scale
 
 
 def _lengthened(line: Floats, level: NDArray[np.float32], wide: float, scale: float) -> Floats:
-    """The line of equal steps with its last end at the tip."""
+    """Extend the last end of a line of equal steps to the tip."""
     count = len(line)
     back = max(2, round(_AHEAD * wide / _STEP_PX))
     ahead = line[-1] - line[-1 - back]
@@ -77,7 +77,7 @@ def _lengthened(line: Floats, level: NDArray[np.float32], wide: float, scale: fl
 
 
 def _crossing(sums: Floats, share: float) -> float | None:
-    """Where the profile falls below a share for good; None where it does not."""
+    """Position from which the profile stays below a share, or None."""
     above = np.flatnonzero(sums >= share)
     if not above.size or above[-1] + 1 >= len(sums):
         return None

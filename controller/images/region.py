@@ -1,4 +1,4 @@
-"""The region of a picture in which the animal is looked for: a rectangle, a mask, or both."""
+"""The region of a picture that may contain the animal: a rectangle, a mask, or both."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,15 +11,15 @@ from snakewalk.config.arrays import Bools, DeepImage, Floats, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.video import read_image
 
-_LEAST_PX = 16  # of a region's sides
+_LEAST_PX = 16  # smallest side
 _SOFT_PX = (
-    5  # distance over which the fill of the outside is averaged, so that its noise is not a pattern
+    5  # the fill of the outside is averaged over this distance, so that its noise forms no pattern
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A cut-out of every frame; the area outside the mask is filled from the nearest ground."""
+    """A cut-out of every frame; the nearest ground fills the area outside the mask."""
 
     origin_px: tuple[int, int]
     """x, y of its first pixel in the whole picture."""
@@ -31,7 +31,7 @@ class Region:
     """Rows and columns of the ground that fills each pixel of the outside."""
 
     def cut(self, frame: DeepImage) -> DeepImage:
-        """(height, width[, C]) the region of a frame (H, W[, C])."""
+        """Cut the region (height, width[, C]) out of a frame (H, W[, C])."""
         if self.size_px == (0, 0):
             return frame
         (x, y), (wide, high) = self.origin_px, self.size_px
@@ -43,11 +43,11 @@ class Region:
         return part
 
     def moved(self, points_px: Floats) -> Floats:
-        """Points (..., 2) of the region in the whole picture."""
+        """Transform points (..., 2) of the region to the whole picture."""
         return np.asarray(points_px + np.array(self.origin_px, dtype=float))
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """A place of the whole picture in the region."""
+        """Transform a point of the whole picture to the region."""
         return x - self.origin_px[0], y - self.origin_px[1]
 
 
@@ -55,15 +55,17 @@ WHOLE = Region((0, 0), (0, 0))
 
 
 def region_of(roi: str | None, mask: Path | None, frame_shape: tuple[int, ...]) -> Region:
-    """Make a region of the options ``--roi X,Y,W,H`` and ``--mask PNG``.
+    """Return the region of the options ``--roi X,Y,W,H`` and ``--mask PNG``.
 
     Args:
-        roi: first pixel and size of the rectangle, in pixels; None: the whole picture.
-        mask: a picture as large as the frames, above half of its brightest where the animal may be.
-        frame_shape: of the frames (H, W[, C]).
+        roi: first pixel and size of the rectangle, px; None: the whole picture.
+        mask: picture of the frames' size; brighter than half of its maximum where the animal may
+            be.
+        frame_shape: (H, W[, C]).
 
     Raises:
-        InputError: no such rectangle in the picture, or a mask of another size or of nothing.
+        InputError: the rectangle is malformed, too small or outside the picture, or the mask has
+            another size or too few pixels.
 
     """
     rows, columns = frame_shape[:2]

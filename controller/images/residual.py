@@ -9,12 +9,12 @@ from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, as_deep_as, contrast
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_AROUND = 0.5  # of the length, looked at on each side
+_AROUND = 0.5  # of the length: margin on each side
 _WEAK = 0.2  # share of the body's contrast: a weaker residual is ground
 _NEAR = 1.5  # widths from a tip: a nearer residual may belong to the body
 _AWAY = 1.2  # widths from the body: a shadow stays nearer
-_PART = 0.02  # of the body's summed contrast: so much beyond a tip is a part of it
-_GHOST = 0.05  # the same for objects of the background that the frame lacks
+_PART = 0.02  # of the body's summed contrast: a larger residual beyond a tip is a part of it
+_GHOST = 0.05  # the same for objects that only the background shows
 _GHOST_WEAK = 0.3  # of the body's contrast
 
 
@@ -27,7 +27,7 @@ def check_residual(
     *,
     ghosts: bool,
 ) -> FrameStatus:
-    """Whether the body explains the picture around it: its status is ``GOOD`` if so.
+    """Return ``GOOD`` if the body explains the picture around it, else ``PART`` or ``GHOST``.
 
     Args:
         image: (H, W[, 3]) the frame.
@@ -35,7 +35,7 @@ def check_residual(
         polarity: whether the animal is darker or lighter than its ground.
         silhouette: the body in the frame.
         skeleton: its skeleton.
-        ghosts: whether the background is one of the film, which may show the animal itself.
+        ghosts: whether the background comes from the film and may show the animal itself.
 
     """
     wide = 2.0 * max(float(np.median(skeleton.radius_px)), 0.5)
@@ -62,7 +62,7 @@ def check_residual(
 
 
 def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:
-    """Sum of contrast of residuals that begin at a tip and lead away from the body."""
+    """Summed contrast of residuals that start at a tip and lead away from the body."""
     apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
     rest = (same > least) & (apart > 1.5)
     count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
@@ -80,10 +80,7 @@ def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least:
 def _ghost(
     seen: DeepImage, ground: DeepImage, polarity: Polarity, body: Bools, wide: float, least: float
 ) -> float:
-    """Sum of the contrast of the wrong sign near the body, if the ground holds a similar shape.
-
-    A ghost away from the body does not spoil it.
-    """
+    """Summed contrast of the wrong sign next to the body, if the ground shows a similar shape."""
     opposite = Polarity.LIGHT if polarity is Polarity.DARK else Polarity.DARK
     wrong = _soft(contrast(seen, ground, opposite))
     side = 2 * round(1.5 * wide) + 3

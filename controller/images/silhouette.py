@@ -13,12 +13,12 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _MARGIN = 4
 _WIDE_MARGIN = 20
-_CLEAR = 6.0  # standard deviations of the noise by which an animal's pixel must stand out
+_CLEAR = 6.0  # standard deviations of the noise: contrast of an animal's pixel
 _LEAST_PX = 12
-_RIVAL = 0.4  # of the largest body's size: a second animal, not dirt
-_CANDIDATES = 4  # parts that may be the animal
-_SHARE = 0.4  # of the squares of a part's contrast: the contrast of the part
-_SHRUNK_PX = 400  # longest side of the picture on which the noise is measured
+_RIVAL = 0.4  # of the largest body's size: a larger object is a second animal, not dirt
+_CANDIDATES = 4  # number of parts that may be the animal
+_SHARE = 0.4  # quantile, weighted by squared contrast: the contrast of a part
+_SHRUNK_PX = 400  # size of the picture on which the noise is measured
 
 
 class Polarity(StrEnum):
@@ -31,7 +31,7 @@ class Polarity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Silhouette:
-    """One body in one image, cut out."""
+    """One body, cut out of one image."""
 
     level: NDArray[np.float32]
     """(h, w) contrast against the background, grey values; other things in the cut-out are 0."""
@@ -48,19 +48,19 @@ class Silhouette:
 
     @property
     def mask(self) -> Bools:
-        """(h, w) the body."""
+        """(h, w) pixels of the body."""
         return np.asarray(self.level > self.threshold)
 
 
 def as_deep_as(image: DeepImage, values: NDArray[Any]) -> DeepImage:
-    """Grey levels as whole numbers where the image has only these; deeper ones as they are."""
+    """Convert to the image's depth; round for 8 bit."""
     if image.dtype == np.uint8 and values.dtype != np.uint8:
         return np.asarray(np.rint(values), dtype=np.uint8)
     return np.asarray(values, dtype=image.dtype)
 
 
 def contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
-    """(H, W) how much each pixel stands out; of a colour image its strongest channel."""
+    """(H, W) contrast of each pixel; the strongest channel of a colour image."""
     if polarity is Polarity.BOTH:
         apart = cv2.absdiff(image, background)
     elif polarity is Polarity.DARK:
@@ -74,12 +74,12 @@ def contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> Dee
 
 
 def soft_contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
-    """(H, W) ``contrast`` with the noise of single pixels averaged."""
+    """``contrast`` (H, W) with single-pixel noise averaged."""
     return as_deep_as(image, cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0))
 
 
 def noise_of(apart: DeepImage) -> tuple[float, float]:
-    """Median and spread of the contrast of the background, from every n-th pixel."""
+    """Median and spread of the background's contrast, from every n-th pixel."""
     every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
     some = apart[::every, ::every].ravel()
     middle = float(np.median(some))
@@ -95,14 +95,14 @@ def silhouette_of(
     *,
     wide_margin: bool = False,
 ) -> Silhouette:
-    """Find the animal of one frame.
+    """Return the silhouette of the animal in one frame.
 
     Args:
         image: (H, W) or (H, W, 3), see ``DeepImage``.
         background: the same without the animal.
         polarity: whether the animal is darker or lighter than its ground.
         threshold: contrast at the boundary, grey levels; None: half of the body's own.
-        wide_margin: whether the cut-out is larger where the body fades out at its edge.
+        wide_margin: whether the cut-out grows if the body fades out at its edge.
 
     """
     margin = _WIDE_MARGIN if wide_margin else _MARGIN
@@ -119,7 +119,7 @@ def silhouette_of(
 
 
 def body_threshold(apart: DeepImage) -> float | None:
-    """Half of the contrast of the strongest body in a contrast (H, W); None: nothing stands out."""
+    """Half of the strongest body's contrast, from a contrast (H, W); None: no body."""
     middle, spread = noise_of(apart)
     found = connected_parts((apart > middle + _CLEAR * spread).astype(np.uint8))
     if found is None:
@@ -134,11 +134,11 @@ def _threshold_of_body(
     middle: float,
     least: float,
 ) -> float:
-    """Half of the contrast of the part with the most contrast in sum.
+    """Half of the contrast of the part with the largest summed contrast.
 
-    Stains of a JPEG and a soft shade of the ground may be larger than the animal, and joined to it.
-    So if a part is mostly fainter than half of its strong pixels, its contrast is a percentile. In
-    it each pixel counts by its squared contrast, and a part's sum is computed above half of that.
+    JPEG artefacts and soft shades may be larger than the animal and joined to it. If most of a part
+    is fainter than half of its strong pixels, its contrast is a percentile weighted by squared
+    contrast. The sum counts pixels above half of the part's contrast.
     """
     strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
     inside = label > 0
@@ -163,13 +163,12 @@ def _threshold_of_body(
 
 
 def _no_silhouette() -> Silhouette:
-    """The silhouette of a frame without an animal."""
     empty = np.zeros((1, 1), dtype=np.float32)
     return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
 
 
 def connected_parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
-    """Labels and statistics of the connected parts, searched only where the mask is not empty."""
+    """Labels and statistics of the connected parts; None if all are tiny."""
     left, top, wide, high = cv2.boundingRect(mask)
     if wide * high < _LEAST_PX:
         return None
@@ -187,9 +186,9 @@ def connected_parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int3
 def cut_out(
     apart: DeepImage, threshold: float, noise_level: float, middle: float, most_px: int
 ) -> Silhouette:
-    """The body of most contrast above the threshold, with a margin; whether alone and whole.
+    """Cut out the body of most contrast above the threshold; its status is whether alone and whole.
 
-    The margin is ``most_px`` where more than noise reaches its edge, else a few pixels.
+    The margin is ``most_px`` if more than noise reaches the edge, else a few pixels.
     """
     found = connected_parts((apart > threshold).astype(np.uint8))
     if found is None:

@@ -1,8 +1,8 @@
-"""Small bodies, as thin as their own blur: the curve whose blurred picture is the image's.
+"""Small bodies, as thin as their own blur: fit a curve whose blurred picture is the image's.
 
-The ridge of a blurred bend lies inside the bend, and blur hides tips. So a line of Gaussian spots
+The ridge of a blurred bend lies inside the bend, and blur hides tips. A line of Gaussian spots
 along a cubic spline is fitted to the contrast by damped least squares. The parameters are control
-points, thickness at a few stations, and the width of the spots, which blur and body share.
+points, thickness at a few stations, and one width of the spots.
 """
 
 import numpy as np
@@ -19,12 +19,12 @@ _SPOTS = 60
 _CONTROLS = 9
 _STATIONS = 5
 _ROUNDS = 12
-_STIFF = 0.02  # of second differences of the controls, against the picture's own information
-_EVEN = 0.3  # the same of the differences in thickness
+_STIFF = 0.02  # weight of second differences of the controls
+_EVEN = 0.3  # weight of differences in thickness
 _LEAST_WIDTH = 0.5  # px, of a spot
-_FAR = 5.5  # standard deviations: further off a spot is not seen
-_TAPER = 0.02  # share of the length at each end that tapers off and is too faint for the fit
-_MISFIT = 0.25  # of the picture's own strength: more left over, and the curve is not the body's
+_FAR = 5.5  # standard deviations: limit of a spot
+_TAPER = 0.02  # share of the length at each end that tapers and is too faint for the fit
+_MISFIT = 0.25  # of the picture's own strength: a larger residual rejects the fit
 
 
 def _basis(count: int) -> Floats:
@@ -59,8 +59,7 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
         width: of the body with its blur, px.
 
     Returns:
-        The curve and what is left of the picture, of its own strength; None where it is the
-        fit of something else.
+        The curve and the residual as a share of the picture's strength; None if the fit is bad.
 
     """
     picture = np.asarray(level, dtype=float)
@@ -117,7 +116,6 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
 
 
 def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
-    """The picture (h, w) of a line of spots, and its slopes (h w, values)."""
     x, y = _ALONG @ values[:_CONTROLS], _ALONG @ values[_CONTROLS : 2 * _CONTROLS]
     weights, spot = _HATS @ values[2 * _CONTROLS : -1], float(values[-1])
     shown, by = np.zeros(shape), np.zeros((len(values), *shape))
@@ -145,18 +143,18 @@ def draw_spots(
     cover: Floats,
     by: Floats,
 ) -> None:
-    """Add Gaussian spots to a picture and its slopes, each spot where it is seen.
+    """Add Gaussian spots to a picture and to its slopes.
 
     Args:
         x: (S,) columns.
         y: (S,) rows.
         area: (S,) sum of a spot's picture.
         x_by: (P, S) slopes of ``x`` by the parameters.
-        y_by: those of ``y``.
-        area_by: those of ``area``.
+        y_by: (P, S) slopes of ``y``.
+        area_by: (P, S) slopes of ``area``.
         spot: standard deviation, px.
-        cover: (h, w) the picture.
-        by: (P + 1, h, w) its slopes, the last by the log of ``spot``; (0, h, w) for none.
+        cover: (h, w) the picture, changed.
+        by: (P + 1, h, w) its slopes, changed; the last by the log of ``spot``; (0, h, w) to skip.
 
     """
     high, wide = cover.shape
@@ -180,7 +178,7 @@ def draw_spots(
                 cover[v, u] += heavy * across[u]
             for p in range(len(by) - 1):
                 if x_by[p, k] == 0.0 and y_by[p, k] == 0.0 and area_by[p, k] == 0.0:
-                    continue  # of a spline's values a spot hangs on few
+                    continue  # each spot depends on few values of a spline
                 beside = heavy * x_by[p, k]
                 along = heavy * off / spot * y_by[p, k] + down * area_by[p, k]
                 for u in range(left, right):

@@ -1,7 +1,7 @@
 """Frames of a recording: a video that OpenCV or PyAV reads, a TIFF stack, or a folder of images.
 
-Images of 16 bit keep their depth: they become float32, and one scale for the whole recording puts
-what its camera uses of the range where 8 bit would have it. Frames of a video have its times.
+Images of 16 bit become float32. One scale for the whole recording maps the range in use to the
+range of 8 bit.
 """
 
 import os
@@ -25,8 +25,8 @@ from snakewalk.controller.images.image_sequence import (
     pages_of,
 )
 
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # faults get our own messages
-if "OPENCV_LOG_LEVEL" not in os.environ:  # which OpenCV has read when it was loaded
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # this program reports the faults
+if "OPENCV_LOG_LEVEL" not in os.environ:  # OpenCV read the variable when it was loaded
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".webp")
@@ -34,14 +34,14 @@ ASSUMED_HZ = 30.0
 _DEEP_RANGE = (16.0, 240.0)
 """Grey levels between which the values of deep images are put."""
 _DEEP_SAMPLE = 9
-_EVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
-_ALIKE = 0.005  # share of the rate: difference between the times and the rate that the file states
-_MISSING = 0.02  # of the frames that a file declares may be absent: some codecs count wrongly
+_EVEN = 0.1  # of a frame: larger deviations mean an uneven rate
+_ALIKE = 0.005  # share of the rate by which the times and the stated rate may differ
+_MISSING = 0.02  # of the declared frames may be absent: some codecs count wrongly
 
 
 @dataclass(frozen=True, slots=True)
 class GreyScale:
-    """Where the values of images of 16 bit lie on the scale of 8 bit."""
+    """Linear map from values of 16 bit to the scale of 8 bit."""
 
     black: float
     """Value of grey level 0."""
@@ -51,7 +51,7 @@ class GreyScale:
 
 @dataclass(frozen=True, slots=True)
 class Footage:
-    """A recording on disk; ``read`` goes through it from the start each time."""
+    """A recording on disk."""
 
     path: Path
     files: tuple[Path, ...]
@@ -72,26 +72,26 @@ class Footage:
 
     @property
     def missing(self) -> int:
-        """Images whose number is missing."""
+        """Number of images that are missing in the sequence."""
         return self.numbers[-1] + 1 - len(self.numbers) if self.numbers else 0
 
     def read(self) -> Iterator[DeepImage]:
-        """(H, W) or (H, W, 3) frames in order, 8 bit, or deeper ones on the same scale.
+        """Iterate over all frames (H, W) or (H, W, 3): 8 bit, or deeper on the same scale.
 
         Raises:
-            InputError: a frame that cannot be read; of a video, as soon as it ends early.
+            InputError: a frame cannot be read, or a video ends early.
 
         """
         return (frame for frame, _ in self.timed())
 
     def shown(self) -> Iterator[Image]:
-        """Frames as of ``read``, 8 bit all of them: to be drawn on."""
+        """Frames of ``read`` in 8 bit."""
         return map(in_8_bits, self.read())
 
     def timed(self, first: int = 0) -> Iterator[tuple[DeepImage, float]]:
-        """Frames as of ``read`` from number ``first``, and when a video says they are shown, s.
+        """Frames of ``read`` from number ``first``, with their times in s.
 
-        Images have the times of their numbers where some are missing, else NaN.
+        Times of images follow from their numbers if some are missing, else they are NaN.
         """
         if self.files:
             at_s = [n / self.rate_hz for n in self.numbers] or [float("nan")] * len(self.files)
@@ -100,7 +100,7 @@ class Footage:
         return self._video(1, first)
 
     def spread(self, most: int) -> list[DeepImage]:
-        """At most ``most`` frames, spread over the recording."""
+        """Return at most ``most`` frames, spread over the recording."""
         every = max(1, -(-self.count // most))
         if self.files:
             shots = list(zip(self.files, self.pages, strict=True))
@@ -108,7 +108,7 @@ class Footage:
         return [frame for frame, _ in self._video(every)]
 
     def image(self, file: Path, page: int = 0) -> DeepImage:
-        """One image of the recording, or one that belongs to it: a background.
+        """Read an image of the recording, or a background for it.
 
         Raises:
             InputError: no image in this file.
@@ -139,7 +139,7 @@ class Footage:
             )
 
     def _grabbed(self, every: int, first: int) -> Iterator[tuple[Image | None, float]]:
-        """All frames by OpenCV, with their times; None before ``first`` and between."""
+        """Frames by OpenCV with their times; None for skipped frames."""
         film = cv2.VideoCapture(str(self.path))
         number = 0
         try:
@@ -158,7 +158,7 @@ class Footage:
 
 
 def _av_frames(path: Path, every: int, first: int = 0) -> Iterator[tuple[Image | None, float]]:
-    """All frames by PyAV, blue first as OpenCV has them, with times; None for those between."""
+    """Frames by PyAV as BGR with their times; None for skipped frames."""
     av = _av()
     try:
         with av.open(str(path)) as film:
@@ -168,17 +168,17 @@ def _av_frames(path: Path, every: int, first: int = 0) -> Iterator[tuple[Image |
                 whole = None if skipped else frame.to_ndarray(format="bgr24")
                 yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
-        return  # missing frames are counted by the caller
+        return  # the caller counts missing frames
 
 
 def _av() -> ModuleType:
-    import av  # noqa: PLC0415  an extra, for films that OpenCV does not read
+    import av  # noqa: PLC0415  an optional package, for films that OpenCV cannot read
 
     return av
 
 
 def _av_facts(path: Path) -> tuple[int, float] | None:
-    """Frames and rate (0: not stated) of a video that PyAV reads; None where it does not."""
+    """Frames and rate (0: not stated) of a video; None if PyAV cannot read it."""
     if find_spec("av") is None or next(_av_frames(path, 1), None) is None:
         return None
     with _av().open(str(path)) as film:
@@ -192,10 +192,10 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
 
     Args:
         path: a video file, a TIFF stack, or a folder of images.
-        rate_hz: frames a second, instead of the rate that the file states; a folder states none.
+        rate_hz: frames per second, overrides the rate that the file states.
 
     Raises:
-        InputError: no such file, no images, no video that can be read, or an empty one.
+        InputError: no such file, no images, no readable video, an empty one, or a bad rate.
 
     """
     if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
@@ -228,7 +228,7 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
 
 
 def _images(path: Path, rate_hz: float | None) -> Footage:
-    """A folder of images, or one file of many pages."""
+    """Footage of a folder of images, or of one file with many pages."""
     if path.is_dir():
         found = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=in_order)
     else:
@@ -250,16 +250,15 @@ def _images(path: Path, rate_hz: float | None) -> Footage:
 
 
 def frame_times(stated_s: Sequence[float], rate_hz: float) -> tuple[Floats, float]:
-    """When frames were taken, (T,) s from the first, and frames a second.
+    """Times of frames, (T,) s from the first, and frames per second.
 
     Args:
-        stated_s: of each frame, as the film says; NaN where it does not.
-        rate_hz: that the file states.
+        stated_s: time of each frame from the film; NaN if it is missing.
+        rate_hz: rate that the file states.
 
     Returns:
-        Times of the stated rate where the film's own are even and of about that rate, or none.
-        Even times of another rate have theirs; uneven times are kept, with the rate of their
-        median step.
+        Multiples of the stated rate, if the film's times are absent or agree with it. Even times of
+        another rate use that rate. Uneven times are kept, with the rate of their median step.
 
     """
     number = np.arange(len(stated_s))
@@ -275,23 +274,23 @@ def frame_times(stated_s: Sequence[float], rate_hz: float) -> tuple[Floats, floa
 
 
 def in_8_bits(image: DeepImage) -> Image:
-    """A frame to be shown."""
+    """Round and clip a frame to 8 bit."""
     if image.dtype == np.uint8:
         return np.asarray(image, dtype=np.uint8)
     return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
 
 
 def _scale_of_deep(files: Sequence[Path]) -> GreyScale | None:
-    """The scale of a recording in 16 bit, from some of its images; None for one in 8 bit.
+    """Scale of a 16-bit recording, from some of its images; None for 8 bit.
 
-    A camera of 12 bit fills a sixteenth of the range, and a dim film less.
+    A camera of 12 bit uses a sixteenth of the range, and a dim film less.
     """
     low, high = float("inf"), -float("inf")
     for file in files:
         whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
         if whole.dtype != np.uint16:
             return None
-        calm = cv2.medianBlur(whole, 3)  # a pixel that is broken has no say
+        calm = cv2.medianBlur(whole, 3)  # removes broken pixels
         low, high = min(low, float(calm.min())), max(high, float(calm.max()))
     if high <= low:
         return GreyScale(low - _DEEP_RANGE[0], 1.0)
@@ -300,7 +299,7 @@ def _scale_of_deep(files: Sequence[Path]) -> GreyScale | None:
 
 
 def read_image(file: Path) -> Image:
-    """(H, W) or (H, W, 3) 8 bit.
+    """Read an image (H, W) or (H, W, 3) in 8 bit.
 
     Raises:
         InputError: no image in this file.
@@ -327,7 +326,7 @@ def _decoded(file: Path, how: int, page: int = 0) -> NDArray[np.uint8 | np.uint1
 
 
 def _one_channel(image: NDArray[np.uint8 | np.uint16 | np.float32]) -> DeepImage:
-    """One channel where all three are the same: three times quicker."""
+    """Reduce three equal channels to one: three times faster."""
     deep = image.dtype == np.float32
     out: DeepImage = np.asarray(image, dtype=np.float32 if deep else np.uint8)
     if out.ndim == 3 and not (

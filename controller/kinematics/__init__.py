@@ -1,1 +1,1 @@
-"""Kinematics: where the links of a body are, frames that go with it, and angles from its shape."""
+"""Kinematics: poses of links, frames of the body, and joint angles from its shape."""

@@ -1,4 +1,4 @@
-"""The frame that travels with a body ([YT] 3.1, Eq. 1-5): origin at its centre, x to its head."""
+"""The body frame ([YT] 3.1, Eq. 1-5): origin at the body's centre, x to its head."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """A place and three axes in the world."""
+    """An origin and three axes in the world."""
 
     rotation: Floats
     """(3, 3) columns: forward, left, up. [YT]'s R."""
@@ -28,23 +28,22 @@ class Frame:
 
     @property
     def heading_rad(self) -> float:
-        """Direction of x in the horizontal plane, rad, in (-pi, pi]."""
+        """Direction of x in the horizontal plane, in (-pi, pi]."""
         return float(np.arctan2(self.rotation[1, 0], self.rotation[0, 0]))
 
     def to_world_m(self, points_m: Floats) -> Floats:
-        """(..., 3) points of this frame in the world."""
+        """Transform points (..., 3) of this frame to the world."""
         return np.asarray(points_m @ self.rotation.T + self.origin_m)
 
     def to_local_m(self, points_m: Floats) -> Floats:
-        """(..., 3) points of the world in this frame."""
+        """Transform points (..., 3) of the world to this frame."""
         return np.asarray((points_m - self.origin_m) @ self.rotation)
 
 
 def body_frame(link_m: Floats, up: ArrayLike = UP) -> Frame:
     """Frame of links with centres ``link_m`` (L, 3), head first.
 
-    The axis x goes from the mean of the centres to the head. The axis y is *normalised*: ``up`` is
-    not at a right angle to x on a slope, and Eq. 3 as printed leaves a short axis there.
+    Correction to Eq. 3: y is normalised, because ``up`` is not perpendicular to x on a slope.
 
     Raises:
         ValueError: the head is at the centre, or x is parallel to ``up``.

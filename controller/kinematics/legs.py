@@ -1,4 +1,4 @@
-"""Where the segments of a robot's legs are, from its spine and the angles of its joints."""
+"""Positions of leg segments, from the spine and the joint angles."""
 
 import numpy as np
 
@@ -8,12 +8,12 @@ from snakewalk.controller.kinematics.links import BodyView
 
 
 def leg_segments_m(robot: RobotConfig, body: BodyView, joint_rad: Floats) -> Floats:
-    """(S, 2, 3) joint and far end of each segment of the legs, one a joint in the bus's order.
+    """Return (S, 2, 3): the joint and the far end of each leg segment, in the bus's order.
 
     Args:
-        robot: Whose legs.
-        body: Its spine in the world.
-        joint_rad: (J,) angles of all joints, those of the spine first.
+        robot: the robot with legs.
+        body: spine in the world.
+        joint_rad: (J,) angles of all joints, spine first.
 
     """
     found = np.empty((len(robot.limb_joints), 2, 3))

@@ -1,4 +1,4 @@
-"""Forward kinematics: every link of the chain in the world, from the head's pose and the joints."""
+"""Forward kinematics: the links of the spine in the world, from the head's pose and the joints."""
 
 from functools import cache
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from snakewalk.drivers.types import BodyPose
 
 
 class BodyView(NamedTuple):
-    """Where every link of the spine is, in the world."""
+    """Poses of the links of the spine in the world."""
 
     link_m: Floats
     """(L, 3) centres of the links, head first."""
@@ -36,25 +36,24 @@ class BodyView(NamedTuple):
 
     @property
     def heading_rad(self) -> float:
-        """Heading of the body's mean line: the mean of the links' headings."""
+        """Mean of the links' headings."""
         return float(self.headings_rad.mean())
 
     def advance_since_m(self, before: "BodyView") -> float:
-        """How far the links have gone along themselves since ``before``, mean over the body."""
+        """Mean distance that the links moved along their present axes since ``before``."""
         return _mean_advance_m(before.link_m, self.link_m, self.rotation)
 
     def unbiased_advance_since_m(self, before: "BodyView") -> float:
-        """Return the same along the mean of the axes before and now.
+        """Mean distance that the links moved along the mean of their axes before and now.
 
-        Noise of the head's rotation moves the links and turns their axes at once. Along the axes of
-        only one of both times, 3 degrees of noise in every pose make a body of 1.2 m 0.13 m/s
-        slower at 50 Hz.
+        Noise of the head's rotation moves the links and turns their axes at once. With the axes of
+        one time only, 3 degrees of noise make a body of 1.2 m appear 0.13 m/s slower at 50 Hz.
         """
         return 0.5 * (self.advance_since_m(before) - before.advance_since_m(self))
 
 
 class SpineLinks(NamedTuple):
-    """The links of a robot's spine, for those who ask where they are in every cycle."""
+    """Link constants of a spine, for callers that need poses in every cycle."""
 
     yaws: Bools
     """(L - 1,) whether a joint is a yaw joint."""
@@ -65,11 +64,11 @@ class SpineLinks(NamedTuple):
 
     @staticmethod
     def of(robot: RobotConfig) -> "SpineLinks":
-        """Links of a robot's file."""
+        """Return the constants of a robot's spine."""
         return _spine(robot.joint_axes, robot.link_lengths_m, robot.link_masses_kg)
 
     def in_world(self, pose: BodyPose, joint_rad: Floats) -> BodyView:
-        """As ``body_in_world``."""
+        """See ``body_in_world``."""
         yaws, half_m, weight = self
         links = len(half_m)
         rotation, centres = np.empty((links, 3, 3)), np.empty((links + 1, 3))
@@ -81,10 +80,10 @@ class SpineLinks(NamedTuple):
 
 
 def body_in_world(robot: RobotConfig, pose: BodyPose, joint_rad: Floats) -> BodyView:
-    """Forward kinematics of the spine from the head pose and joint angles (J,), legs left out.
+    """Return the spine's links from the head pose and joint angles (J,).
 
-    Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis, so a
-    positive joint bends the head side to the left, or lifts it.
+    Yaw turns the link behind by ``-q`` about the up axis, pitch by ``+q`` about the left axis. A
+    positive joint therefore bends the head side to the left, or lifts it.
     """
     return SpineLinks.of(robot).in_world(pose, joint_rad)
 
@@ -98,34 +97,34 @@ def chain_angles_rad(robot: RobotConfig, body: BodyView) -> Floats:
 
 
 def chain_points_m(robot: RobotConfig, body: BodyView) -> Floats:
-    """(J + 2, 3) the head's tip, the joints and the tail's end."""
+    """(J + 2, 3) points: the head's tip, the joints, the tail's end."""
     half = half_lengths_m(robot)[:, None] * body.forward
     return np.concatenate([body.link_m[:1] + half[:1], body.link_m - half])
 
 
 def half_lengths_m(robot: RobotConfig) -> Floats:
-    """(L,) half the length of each link of the spine."""
+    """(L,) half the length of each link."""
     return SpineLinks.of(robot).half_m
 
 
 def link_weights(robot: RobotConfig) -> Floats:
-    """(L,) mass of each link of the spine over that of a mean link; ones if all are alike."""
+    """(L,) mass of each link of the spine over the mean link mass."""
     weight = SpineLinks.of(robot).weight
     return np.asarray(weight * (len(weight) / weight.sum()))
 
 
 def chain_axes(robot: RobotConfig, body: BodyView) -> Floats:
-    """(J, 3) unit axes about which a positive angle of each joint turns what is *behind* it."""
+    """(J, 3) unit axes about which a positive angle turns the links *behind* each joint."""
     left, up = body.rotation[:-1, :, 1], body.rotation[:-1, :, 2]
     return np.where(SpineLinks.of(robot).yaws[:, None], -up, left)
 
 
 def chain_jacobian(points_m: Floats, axes: Floats) -> Floats:
-    """(J + 2, 3, 6 + J) how ``chain_points_m`` move with the head's tip, its turn and each joint.
+    """(J + 2, 3, 6 + J) derivatives of the points by the head tip's position, its turn, each joint.
 
     Args:
-        points_m: (J + 2, 3) of ``chain_points_m``.
-        axes: (J, 3) of ``chain_axes``.
+        points_m: (J + 2, 3) from ``chain_points_m``.
+        axes: (J, 3) from ``chain_axes``.
 
     """
     count = len(points_m)
@@ -165,13 +164,10 @@ def _forward(
     rotation: Floats,
     centres: Floats,
 ) -> None:
-    """Carry the head's axes along the joints into ``rotation`` (L, 3, 3), ``centres`` (L + 1, 3).
-
-    ``centres`` holds the centres of the links and, last, that of their mass.
-    """
+    """Write ``rotation`` (L, 3, 3) and ``centres`` (L + 1, 3): links, then centre of mass."""
     links = len(rotation)
     for i in range(3):
-        for j in range(3):  # numba compiles a whole row's assignment for four seconds
+        for j in range(3):  # numba compiles the assignment of a row for four seconds
             rotation[0, i, j] = head_rotation[i, j]
     x, y, z = head_m[0], head_m[1], head_m[2]
     whole = weight[0]
@@ -203,7 +199,7 @@ def _forward(
 
 
 def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
-    """Build the pose of a level head link."""
+    """Return the pose of a level head link."""
     c, s = np.cos(heading_rad), np.sin(heading_rad)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return BodyPose(time_s, np.append(position_m[:2], 0.0), rotation)
@@ -220,7 +216,6 @@ def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
     makes_arrays=False,
 )
 def _mean_advance_m(before_m: Floats, here_m: Floats, rotation: Floats) -> float:
-    """Mean way from ``before_m`` (L, 3) to ``here_m`` along the links."""
     total = 0.0
     for k in range(len(here_m)):
         for i in range(3):

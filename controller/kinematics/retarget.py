@@ -1,7 +1,7 @@
-"""Skeleton to joints: 100 tangent angles to the yaw joints of this robot, link lengths respected.
+"""Skeleton to joints: tangent angles to yaw joints, respecting link lengths.
 
-Links that no yaw joint separates form one rigid group in the plane; a group's heading is the mean
-tangent angle over its span, so the headings' mean is the skeleton's and nothing needs wrapping.
+Links without a yaw joint between them form one rigid group. A group's heading is the mean tangent
+angle over its span, so the mean heading is kept and no angle needs wrapping.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 
 class Retarget:
-    """Maps skeletons of ``points`` segments, head first, to joint angles of ``robot``."""
+    """Map skeletons of ``points`` segments, head first, to joint angles of ``robot``."""
 
     def __init__(self, robot: RobotConfig, points: int = 100) -> None:
         yaw = np.array(robot.yaw_joints, dtype=int)
@@ -46,7 +46,7 @@ class Retarget:
         return headings.reshape(*skeleton_rad.shape[:-1], -1)
 
     def joints_rad(self, skeleton_rad: Floats) -> Floats:
-        """(..., J) joint angles; pitch joints are 0; the pitch fit sets them."""
+        """(..., J) joint angles; pitch joints are 0."""
         headings = self.group_headings_rad(np.asarray(skeleton_rad, dtype=float))
         joints = np.zeros((*headings.shape[:-1], self._joints))
         joints[..., self._yaw] = headings[..., :-1] - headings[..., 1:]
@@ -68,7 +68,7 @@ class Retarget:
 
 @compiled(f"void({readonly_array(dimensions=2, layout='C')}, float64[::1], float64[:, ::1])")
 def _mean_angles(rows_rad: Floats, edges: Floats, means: Floats) -> None:
-    """Means (S, G) of angles (S, N) between ``edges`` (G + 1,), counted in samples."""
+    """Write means (S, G) of angles (S, N) between ``edges`` (G + 1,), in samples."""
     points = rows_rad.shape[1]
     for row in range(len(rows_rad)):
         area, before, at = 0.0, 0.0, 0
@@ -85,7 +85,7 @@ def _mean_angles(rows_rad: Floats, edges: Floats, means: Floats) -> None:
 
 
 def _ends(angles_rad: Floats, step_m: Floats | float) -> Floats:
-    """(..., n + 1, 2) ends of n segments of length ``step_m`` (n,) behind a head at the origin."""
+    """(..., n + 1, 2) ends of n segments of length ``step_m`` behind a head at the origin."""
     ahead = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=-1)
     steps = ahead * -np.reshape(step_m, (-1, 1))
     zero = np.zeros((*steps.shape[:-2], 1, 2))

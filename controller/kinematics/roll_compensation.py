@@ -1,9 +1,8 @@
-"""Roll compensation: joint goals that bend a rolled body in the plane that was meant.
+"""Roll compensation: joint goals that bend a rolled body in the intended plane.
 
-A body that has rolled by an angle bends its yaw joints out of the ground's plane, and on its back
-to the wrong side. Its bends, turned back by that angle, lie in the plane again: the pitch joints
-next to the yaw joints make the missing part. A remainder of the roll is left in, so that the weight
-of the tilted shape turns the body home.
+A rolled body bends its yaw joints out of the ground's plane. The compensation turns the bends back
+by the roll angle: the neighbouring pitch joints supply the missing part. It leaves a remainder, so
+that the weight of the tilted shape turns the body back.
 """
 
 import numpy as np
@@ -21,10 +20,10 @@ _RATE_RAD_S = 2.0
 
 
 class RollCompensation:
-    """Turns goals of one robot by the roll of its body."""
+    """Turns joint goals by the roll of the body."""
 
     def __init__(self, robot: RobotConfig) -> None:
-        """``robot`` has yaw and pitch joints; one without either cannot be compensated."""
+        """``robot`` has both yaw and pitch joints."""
         self._yaw = np.array(robot.yaw_joints, dtype=np.intp)
         self._pitch = np.array(robot.pitch_joints, dtype=np.intp)
         self._limit_rad = np.array(robot.limit_rad)
@@ -32,11 +31,11 @@ class RollCompensation:
         self._roll_rad = 0.0
 
     def __call__(self, goal_rad: Floats, view: BodyView, dt_s: float) -> Floats:
-        """Return goals (J,) whose bends lie as ``goal_rad`` would on a body that has not rolled."""
-        # counted on over half a turn: a body on its back is turned home one way, not to and fro
+        """Return goals (J,) that bend the rolled body as ``goal_rad`` would bend a level one."""
+        # unwrapped, so that a body on its back turns in one direction only
         self._measured_rad += float(wrap(body_roll_rad(view) - self._measured_rad))
         turns = 2.0 * np.pi * round(self._measured_rad / (2.0 * np.pi))
-        if abs(self._measured_rad - turns) < _LEFT_IN_RAD:  # it lies well: turns are forgotten
+        if abs(self._measured_rad - turns) < _LEFT_IN_RAD:  # nearly level: forget whole turns
             self._measured_rad -= turns
             self._roll_rad -= turns
         measured = self._measured_rad
@@ -62,7 +61,7 @@ def body_roll_rad(view: BodyView) -> float:
 
 @compiled("float64(float64[:, :, ::1])", makes_arrays=False)
 def _mean_roll_rad(rotation: Floats) -> float:
-    """Direction of the sum of unit vectors, each that of a link's up seen along the link."""
+    """Direction of the sum of the unit vectors to each link's up axis, seen along the link."""
     left_up = up = 0.0
     for k in range(len(rotation)):
         left_z, up_z = rotation[k, 2, 1], rotation[k, 2, 2]

@@ -1,4 +1,4 @@
-"""Angles: wrapped, and their circular means."""
+"""Wrapped angles and circular means."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,12 +8,12 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 
 def wrap(angle_rad: ArrayLike) -> Floats:
-    """Angles in [-pi, pi)."""
+    """Return angles in [-pi, pi)."""
     return np.asarray((np.asarray(angle_rad, float) + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def offset_rad(measured_rad: Floats, believed_rad: Floats) -> float:
-    """Rotation from believed to measured link headings: their circular mean difference."""
+    """Circular mean difference of link headings (L,): the rotation from believed to measured."""
     return _mean_difference_rad(measured_rad, believed_rad)
 
 

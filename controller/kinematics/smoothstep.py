@@ -1,7 +1,7 @@
-"""Smoothsteps: a cubic and a quintic over x from 0 to 1, with their slopes and integrals.
+"""Smoothsteps: a cubic and a quintic over x from 0 to 1, with slopes and integrals.
 
-Both rise from 0 at 0 to their height at 1. The cubic ``3 x^2 - 2 x^3`` begins and ends at rest; the
-quintic ``10 x^3 - 15 x^4 + 6 x^5`` does so without a step in acceleration. They do not clip x.
+Both rise from 0 to their height. The cubic starts and ends at rest; the quintic also without a step
+in acceleration. They do not clip x.
 """
 
 import math
@@ -18,12 +18,12 @@ def cubic(x: Share, height: float = 1.0) -> Share:
 
 
 def cubic_slope(x: Share, height: float = 1.0) -> Share:
-    """Slope of ``cubic``; largest in the middle, 1.5 heights."""
+    """Slope of ``cubic``; at most 1.5 heights, in the middle."""
     return height * 6.0 * x * (1.0 - x)
 
 
 def cubic_sum(x: Share) -> Share:
-    """Integral of ``cubic`` from 0 to x; half at 1."""
+    """Integral of ``cubic`` of height 1 from 0 to x."""
     return x**3 - 0.5 * x**4
 
 
@@ -39,7 +39,7 @@ def quintic(x: Share) -> Share:
 
 
 def quintic_sum(x: Share) -> Share:
-    """Integral of ``quintic`` from 0 to x; half at 1."""
+    """Integral of ``quintic`` from 0 to x."""
     return x**4 * (2.5 - 3.0 * x + x * x)
 
 

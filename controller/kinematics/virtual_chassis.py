@@ -1,8 +1,7 @@
-"""The virtual chassis: a frame that goes with the whole body.
+"""The virtual chassis: a frame of the whole body that does not swing with a link.
 
-A link of a snake swings to and fro; the virtual chassis (D. Rollinson, H. Choset, Virtual Chassis
-for Snake Robots, IROS 2011) does not: its origin is the centre of mass, its axes are the principal
-axes of the links, with signs that follow the body and never jump.
+The origin is the mean of the link centres; the axes are the links' principal axes, with signs that
+never jump (D. Rollinson, H. Choset, Virtual Chassis for Snake Robots, IROS 2011).
 """
 
 import numpy as np
@@ -15,13 +14,13 @@ _FLAT = 0.02
 
 
 def virtual_chassis(link_m: Floats, up: Floats, last: Frame | None = None) -> Frame:
-    """Principal axes of the body.
+    """Return the principal axes of the body.
 
     Args:
         link_m: (L, 3) centres of the links, head first.
-        up: (3,) a direction that goes with the body, the head link's up axis; it decides where
-            the links do not: signs at the start, and a body that is straight.
-        last: the chassis a moment ago, from which the signs are carried on.
+        up: (3,) the head link's up axis. It decides the signs at the start and the axis of a
+            straight body.
+        last: previous chassis, from which the signs are continued.
 
     """
     centre = link_m.mean(axis=0)

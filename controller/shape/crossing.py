@@ -1,4 +1,4 @@
-"""Whether a body touches itself: a thick curve against its own other parts."""
+"""Test whether a body, as a thick curve, touches itself."""
 
 import numpy as np
 
@@ -7,12 +7,11 @@ from snakewalk.drivers.compiling import compiled
 
 
 def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bools:
-    """Whether each body (S, N) of ``length_m`` and ``radius_m`` comes within its own thickness.
+    """Return (S,) whether each body (S, N) of ``length_m`` and ``radius_m`` touches itself.
 
-    Two segments count when they are nearer than a diameter in the plane though at least half the
-    circumference of the body apart along it. Nearer ones are joined by the bend itself, and a curve
-    that bends no sharper than ``radius_m`` keeps such parts a diameter apart (Schur). Crossings of
-    a thin body count too. Returns (S,).
+    Two segments touch if they cross or are nearer than a diameter, and are at least pi radii apart
+    along the body. Nearer segments of a curve that bends no sharper than ``radius_m`` are a
+    diameter apart (Schur).
     """
     shapes = np.atleast_2d(skeleton_rad)
     points = shapes.shape[1]
@@ -27,7 +26,6 @@ def self_touches(skeleton_rad: Floats, length_m: float, radius_m: float) -> Bool
 
 @compiled("float64(float64[::1], float64[::1], int64, int64)")
 def _square_m2(x: Floats, y: Floats, point: int, segment: int) -> float:
-    """Square of the distance of a point of the curve from a segment."""
     u, v = x[segment + 1] - x[segment], y[segment + 1] - y[segment]
     dx, dy = x[point] - x[segment], y[point] - y[segment]
     part = min(max((dx * u + dy * v) / (u * u + v * v), 0.0), 1.0)
@@ -37,14 +35,14 @@ def _square_m2(x: Floats, y: Floats, point: int, segment: int) -> float:
 
 @compiled("float64(float64[::1], float64[::1], int64, int64)")
 def _side(x: Floats, y: Floats, segment: int, point: int) -> float:
-    """On which side of a segment's line a point of the curve lies; 0 is on it."""
+    """Positive if the point lies left of the segment's line, 0 if it lies on the line."""
     u, v = x[segment + 1] - x[segment], y[segment + 1] - y[segment]
     return float(u * (y[point] - y[segment]) - v * (x[point] - x[segment]))
 
 
 @compiled("boolean(float64[::1], float64[::1], int64, int64, float64)")
 def _is_near(x: Floats, y: Floats, i: int, j: int, width_m: float) -> bool:
-    """Whether segments ``i`` and ``j`` of a curve are nearer than ``width_m``, or cross."""
+    """Whether the segments are nearer than ``width_m`` or cross."""
     crosses = (
         _side(x, y, i, j) * _side(x, y, i, j + 1) < 0.0
         and _side(x, y, j, i) * _side(x, y, j, i + 1) < 0.0
@@ -57,8 +55,7 @@ def _is_near(x: Floats, y: Floats, i: int, j: int, width_m: float) -> bool:
 
 @compiled("boolean(float64[::1], float64[::1], int64, float64, float64)")
 def _touches(x: Floats, y: Floats, lag: int, width_m: float, piece_m: float) -> bool:
-    """Whether a curve's segments touch, which are ``piece_m`` long."""
-    points, reach_m = len(x) - 1, width_m + piece_m  # of middles that may belong to a touch
+    points, reach_m = len(x) - 1, width_m + piece_m  # largest distance of middles that touch
     for i in range(points - lag):
         j = i + lag
         while j < points:
@@ -66,14 +63,14 @@ def _touches(x: Floats, y: Floats, lag: int, width_m: float, piece_m: float) -> 
             square = 0.25 * (gap_x * gap_x + gap_y * gap_y)
             if square < reach_m * reach_m and _is_near(x, y, i, j, width_m):
                 return True
-            # a step brings the middles nearer by a segment's length at most
+            # one step brings the middles nearer by at most a segment's length
             j += max(1, int((np.sqrt(square) - reach_m) / piece_m))
     return False
 
 
 @compiled("void(float64[:, ::1], float64, int64, float64, boolean[::1])")
 def _find(shapes_rad: Floats, piece_m: float, lag: int, width_m: float, touches: Bools) -> None:
-    """Note of each body (S, N) whether two segments ``lag`` apart are nearer than ``width_m``."""
+    """Write to ``touches`` whether segments ``lag`` or more apart touch, for bodies (S, N)."""
     points = shapes_rad.shape[1]
     x, y = np.empty(points + 1), np.empty(points + 1)
     for body in range(len(shapes_rad)):

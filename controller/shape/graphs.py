@@ -1,4 +1,4 @@
-"""Connected graphs of states as neighbour lists: random ones, and the fixed one of [KP] 4.2.1."""
+"""Connected graphs of states: random graphs, and the graph of [KP] 4.2.1."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ class Graph:
     """A connected simple graph; the neighbours of q are ``indices[indptr[q] : indptr[q + 1]]``.
 
     Raises:
-        InputError: fewer than 2 states, or not connected: no walk could cover it.
+        InputError: fewer than 2 states, or not connected.
 
     """
 
@@ -42,7 +42,7 @@ class Graph:
 
     @property
     def degree(self) -> Ints:
-        """(V,) neighbours of each state."""
+        """(V,) number of neighbours."""
         return np.diff(self.indptr)
 
     @property
@@ -52,7 +52,7 @@ class Graph:
 
 
 def graph_from_edges(states: int, edges: Ints) -> Graph:
-    """Build from undirected edges (E, 2); loops and repeated edges are left out.
+    """Build from undirected edges (E, 2); ignore loops and repeated edges.
 
     Raises:
         InputError: an edge to no state, fewer than 2 states, or not connected.
@@ -64,10 +64,10 @@ def graph_from_edges(states: int, edges: Ints) -> Graph:
 
 
 def largest_part(states: int, edges: Ints) -> Graph:
-    """Build from undirected edges (E, 2) and keep the largest connected part, renumbered.
+    """Build from undirected edges (E, 2); keep the largest connected part, renumbered.
 
     Raises:
-        InputError: no edge at all.
+        InputError: the edges are empty.
 
     """
     if len(edges) == 0:
@@ -79,7 +79,7 @@ def largest_part(states: int, edges: Ints) -> Graph:
 
 
 def random_edges(states: int, degree: float, rng: np.random.Generator) -> Ints:
-    """Erdos-Renyi: each pair with the probability that gives mean ``degree``, (E, 2)."""
+    """Return Erdos-Renyi edges (E, 2) of mean ``degree``."""
     count = int(rng.binomial(states * (states - 1) // 2, degree / (states - 1)))
     keys = np.empty(0, dtype=np.int64)
     while len(keys) < count:
@@ -90,9 +90,9 @@ def random_edges(states: int, degree: float, rng: np.random.Generator) -> Ints:
 
 
 def small_world_edges(states: int, degree: int, rewired: float, rng: np.random.Generator) -> Ints:
-    """Watts-Strogatz: a ring with ``degree`` near neighbours, edges moved to random ends, (E, 2).
+    """Return Watts-Strogatz edges (E, 2): a ring of ``degree`` neighbours, partly rewired.
 
-    At an odd degree every second state gets one edge more, to the next distance.
+    If the degree is odd, every second state gets one more edge, to the next distance.
     """
     near = [(q, (q + k) % states) for k in range(1, degree // 2 + 1) for q in range(states)]
     if degree % 2:
@@ -111,10 +111,10 @@ def small_world_edges(states: int, degree: int, rewired: float, rng: np.random.G
 def threshold_graph(states: Complexes, threshold: float | None) -> Graph:
     """Join states (S, n) whose Euclidean distance is at most ``threshold`` ([KP] 4.2.1).
 
-    None: the smallest threshold that joins all of them.
+    None selects the smallest threshold that joins all states.
 
     Raises:
-        InputError: fewer than 2 states, or not connected; says which threshold would be enough.
+        InputError: fewer than 2 states, or not connected; names a sufficient threshold.
 
     """
     distance = squareform(pdist(np.concatenate([states.real, states.imag], axis=1)))
@@ -127,14 +127,14 @@ def threshold_graph(states: Complexes, threshold: float | None) -> Graph:
     except InputError as error:
         if len(states) < 2:
             raise
-        enough = np.ceil(1e4 * needed) / 1e4  # a number rounded down would not do
+        enough = np.ceil(1e4 * needed) / 1e4  # rounded up: rounded down, it would not join all
         raise InputError(
             f"{error.faults[0]} (threshold {limit:.4g}; {enough:.10g} joins all)"
         ) from None
 
 
 def _lists(states: int, edges: Ints) -> tuple[Ints, Ints]:
-    """Both ways of each edge, sorted: (V + 1,) starts and (2 E,) neighbours."""
+    """(V + 1,) starts and (2 E,) neighbours."""
     both = np.concatenate([edges, edges[:, ::-1]])
     keys = np.unique(both[both[:, 0] != both[:, 1]] @ np.array([states, 1]))
     ends = np.searchsorted(keys, np.arange(states + 1) * states)
@@ -142,7 +142,7 @@ def _lists(states: int, edges: Ints) -> tuple[Ints, Ints]:
 
 
 def _parts(indptr: Ints, indices: Ints) -> tuple[int, Int32s]:
-    """Number of connected parts and the part of each state (V,)."""
+    """Number of connected parts, and the part (V,) of each state."""
     ones = np.ones(len(indices), dtype=np.int8)
     shape = (len(indptr) - 1, len(indptr) - 1)
     net = csr_array((ones, indices, indptr), shape=shape)

@@ -1,4 +1,4 @@
-"""The library of shapes: recorded and random states that this robot can make and that push."""
+"""The library of shapes: recorded and random states that pass the robot's filters."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ _DRAWN, _ENOUGH = 200, 0.2
 
 @dataclass(frozen=True, slots=True)
 class StateLibrary:
-    """Shapes that passed every filter, and how many did not."""
+    """Shapes that passed every filter, and the number of the others."""
 
     shapes_rad: Floats
     """(S, N) tangent angles, head first, zero mean."""
@@ -42,7 +42,7 @@ class StateLibrary:
 
     @property
     def counts(self) -> dict[str, int]:
-        """For the log and the report."""
+        """Return the counts for the log and the report."""
         refused = {f"rejected: {reason}": n for reason, n in self.rejected.items()}
         made = {"recorded": self.recorded, "random": len(self.shapes_rad) - self.recorded}
         return made | refused
@@ -60,11 +60,9 @@ def build_library(
 ) -> StateLibrary:
     """Turn tangent angles (T, N) into states, add ``random_count`` random ones, filter all.
 
-    Bends are scaled by ``curvature``; None selects the least of 1, 1.2, ... 2 at which a fifth of
-    random states passes the filters, or the one at which most do.
-
-    Where kinds of waves are wanted ([PT] 2.6.6), the library holds random states of these only, in
-    the wanted parts.
+    ``curvature`` scales the bends. None selects the smallest of 1, 1.2, ... 2 at which a fifth of
+    random states passes, or else the factor at which most pass. ``waves`` limits the random states
+    to the given kinds of waves, in the given shares ([PT] 2.6.6).
 
     Raises:
         InputError: too few random states pass: the robot cannot make these motions.
@@ -104,7 +102,7 @@ def build_library(
 
 
 def _wide_enough(states: Complexes, filters: dict[str, ShapeFilter], points: int) -> float:
-    """Return the factor on bends at which enough random states can be used (ours)."""
+    """(L,) half the length of each link."""
     shares = []
     for factor in _FACTORS:
         drawn = random_states(factor * states, _DRAWN, np.random.default_rng(0))
@@ -117,7 +115,7 @@ def _wide_enough(states: Complexes, filters: dict[str, ShapeFilter], points: int
 def _counts(
     random_count: int, waves: WavesConfig | None
 ) -> list[tuple[int, tuple[int, int] | None]]:
-    """How many random states of which coefficients; None: as recorded."""
+    """Number of random states for each band of coefficients; None: as recorded."""
     parts = {} if waves is None else waves.parts
     if not parts:
         return [(random_count, None)]

@@ -1,9 +1,8 @@
 """W on a star: the next state where every other state is a leaf ([PT] 2.6.2, Eq. 4-7).
 
-Every leaf has degree 1, so W only orders by: unvisited; then F = 0 with fewest M; then the smallest
-M 2^F. Here F counts the times that a state was left for an already *visited* one. The star is
-rebuilt at each step, so that M may exceed deg + F and the printed value of W may fall below that of
-a state with F > 0. The classes are those that the paper describes, and they are kept.
+Every leaf has degree 1, so W orders states: unvisited; then F = 0, fewest M first; then smallest M
+2^F. F counts how often a state was left for a *visited* one. The star is rebuilt at each step, so M
+may exceed deg + F, and the printed W would then break these classes. This module keeps the classes.
 """
 
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ from snakewalk.config.arrays import Floats, Ints
 
 
 class StarVisits:
-    """Memory of a walk on the star of its V states: M, F, and the order of the last ones."""
+    """Visits of a walk on a star of V states: M, F and the order."""
 
     def __init__(self, count: int) -> None:
         self._visits = np.zeros(count, dtype=np.int64)
@@ -29,7 +28,7 @@ class StarVisits:
         return int(np.count_nonzero(self._visits))
 
     def take(self, state: int) -> None:
-        """Go on to a state; leaving for a visited one counts in F of the state left."""
+        """Move to a state; moving to a visited state counts in F of the state left."""
         if self._visits[state]:
             self._failures[self.taken[-1]] += 1
         self._visits[state] += 1
@@ -38,13 +37,13 @@ class StarVisits:
     def order(
         self, error_rad: Floats, tolerance_rad: float, nearest_count: int, rest: int = 1
     ) -> tuple[Iterator[int], int]:
-        """Candidates, best first, and how many heads are within the tolerance.
+        """Return candidates, best first, and the number of headings within the tolerance.
 
         Args:
-            error_rad: (V,) heading error of each state, were it next.
-            tolerance_rad: of the error.
-            nearest_count: how many of the nearest count where none is within the tolerance.
-            rest: this number of last states is left out.
+            error_rad: (V,) heading error of each state, if it came next.
+            tolerance_rad: largest heading error of a candidate.
+            nearest_count: number of candidates if no state is within the tolerance.
+            rest: number of last states to exclude.
 
         """
         size = np.abs(error_rad)
@@ -57,12 +56,12 @@ class StarVisits:
 
 
 def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
-    """Candidates, best first; the first costs O(V), only then are the others sorted.
+    """Yield candidates, best first; the first costs O(V), the others a sort.
 
     Args:
         M: (V,) times that each was selected.
-        F: (V,) times that each was left for an already visited one.
-        heading_error_rad: (V,) its size decides ties.
+        F: (V,) times that each was left for a visited one.
+        heading_error_rad: (V,) the smallest size decides ties.
 
     Raises:
         ValueError: no candidates.
@@ -72,13 +71,12 @@ def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
         raise ValueError("a star without leaves has no next state")
     yield _best(M, F, heading_error_rad)
     group = np.where(M == 0, 0, np.where(F == 0, 1, 2))
-    mantissa, exponent = np.frexp(M)  # M 2^F in two parts: exact, where 2^F itself overflows
+    mantissa, exponent = np.frexp(M)  # M 2^F in two parts, because 2^F overflows
     order = np.lexsort((np.abs(heading_error_rad), mantissa, exponent + F, group))
     yield from order[1:].tolist()
 
 
 def _best(M: Ints, F: Ints, heading_error_rad: Floats) -> int:
-    """First candidate of the order, in a few passes."""
     tied = np.flatnonzero(M == 0)
     if len(tied) == 0:
         tied = np.flatnonzero(F == 0)

@@ -1,8 +1,8 @@
 """Shape states: a body's tangent angles as a few Fourier coefficients ([PT] 2.5).
 
-Corrections to the printed text: angles are unwrapped first, or rotation invariance fails across
-+-pi. Coefficient 0 belongs to the padded signal and is not the body's mean heading. The 99 % of the
-energy in seven coefficients hold up to four or five waves on the body, not beyond.
+Corrections to the paper: angles are unwrapped first, or rotation invariance fails across +-pi.
+Coefficient 0 is not the body's mean heading. Seven coefficients hold 99 % of the energy only up to
+four or five waves on the body.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ would spend half of them on the padding (99 % only up to three waves), 0.1 leave
 
 
 def pad(angles_rad: Floats) -> Floats:
-    """Append samples from last back to first, so that the periodic extension has no jump.
+    """Append samples from the last angle to the first, so that the periodic signal has no jump.
 
     Args:
         angles_rad: (..., N) unwrapped.
@@ -36,23 +36,24 @@ def pad(angles_rad: Floats) -> Floats:
 
 
 def padded_length(points: int) -> int:
-    """Samples of the padded signal of a body of ``points`` samples."""
+    """Number of samples of a padded body."""
     return points + round(PADDING * points)
 
 
 def to_states(angles_rad: Floats, coefficients: int = 7) -> Complexes:
-    """Coefficients 1..n of the padded tangent angles: (..., n), free of place, heading and size.
+    """Return coefficients 1..n of the padded tangent angles: (..., n).
 
-    Not normalised: a wave of amplitude a that fills the padded signal has modulus 64 a.
+    Not normalised: with 100 points, a wave of amplitude a that fills the padded signal has modulus
+    64 a.
     """
     spectrum = np.fft.fft(pad(np.unwrap(angles_rad, axis=-1)), axis=-1)
     return np.asarray(spectrum[..., 1 : coefficients + 1])
 
 
 def to_angles(states: Complexes, points: int = 100) -> Floats:
-    """Rebuild (..., points) angles of zero mean over the body.
+    """Return (..., points) angles of zero mean over the body.
 
-    The upper half is the conjugate mirror; ``R^H`` of the text is already conjugated and reversed.
+    The upper half of the spectrum is the conjugate mirror (the paper's ``R^H``).
     """
     length = padded_length(points)
     spectrum = np.zeros((*states.shape[:-1], length // 2 + 1), dtype=complex)
@@ -62,10 +63,7 @@ def to_angles(states: Complexes, points: int = 100) -> Floats:
 
 
 def energy_kept(angles_rad: Floats, coefficients: int = 7) -> Floats:
-    """Share (...) of the shape's energy (heading left out) that the coefficients hold.
-
-    A straight body has none to lose: 1.
-    """
+    """Share (...) of the shape's energy that the coefficients hold; 1 for a straight body."""
     spectrum = np.fft.rfft(pad(np.unwrap(angles_rad, axis=-1)), axis=-1)
     power = np.abs(spectrum[..., 1:]) ** 2
     total = power.sum(axis=-1)
@@ -75,7 +73,7 @@ def energy_kept(angles_rad: Floats, coefficients: int = 7) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class StateRange:
-    """Range of a recording's states: [PT] 2.5 draws random ones between these."""
+    """Range of a recording's states, from which [PT] 2.5 draws random ones."""
 
     low: Floats
     """(n,) smallest modulus of each coefficient, C_min of [PT]."""
@@ -83,29 +81,28 @@ class StateRange:
     """(n,) largest, C_max."""
 
     def amplitude_rad(self, points: int = 100) -> Floats:
-        """Both as amplitudes of a wave of tangent angle, (n, 2): modulus over half the samples."""
+        """(n, 2) amplitudes of a wave of tangent angle: modulus over half the samples."""
         return np.stack([self.low, self.high], axis=-1) / (0.5 * padded_length(points))
 
 
 def state_range(states: Complexes) -> StateRange:
-    """Range of the moduli of recorded states (T, n), T >= 1."""
+    """Return the range of the moduli of states (T, n), T >= 1."""
     size = np.abs(states)
     return StateRange(size.min(axis=0), size.max(axis=0))
 
 
 def random_states(states: Complexes, count: int, rng: np.random.Generator) -> Complexes:
-    """Draw states with moduli in the recorded range and free phases ([PT] Eq. 1-2): (count, n)."""
+    """Draw (count, n) states with moduli in the recorded range and free phases ([PT] Eq. 1-2)."""
     limits = state_range(states)
     modulus = limits.low + rng.random((count, states.shape[-1])) * (limits.high - limits.low)
     return np.asarray(modulus * np.exp(2j * np.pi * rng.random((count, states.shape[-1]))))
 
 
 def limit_to_waves(states: Complexes, first: int, last: int, share: float) -> Complexes:
-    """States (..., n) whose coefficients ``first`` to ``last`` hold a share of their energy.
+    """Return states (..., n) whose coefficients ``first`` to ``last`` hold a share of the energy.
 
-    [PT] 2.6.6 sets thresholds on the energy of the coefficients (Fig. 13). The other coefficients
-    are scaled down to the threshold, all to the energy that the state had: K stays the same, which
-    is what drives the speed law.
+    [PT] 2.6.6 sets thresholds on this energy (Fig. 13). The other coefficients are scaled down to
+    the threshold, then all are scaled up to the original energy: the speed law uses K.
 
     Raises:
         ValueError: the states have no such coefficients.
@@ -117,7 +114,7 @@ def limit_to_waves(states: Complexes, first: int, last: int, share: float) -> Co
     inside[first - 1 : last] = True
     energy = np.abs(states) ** 2
     kept, rest = energy[..., inside].sum(axis=-1), energy[..., ~inside].sum(axis=-1)
-    most = kept * (1.0 - share) / share  # energy outside that the share allows
+    most = kept * (1.0 - share) / share  # energy outside the band that the share allows
     down = np.sqrt(np.minimum(1.0, most / np.where(rest > 0.0, rest, 1.0)))
     up = np.sqrt((kept + rest) / np.where(kept > 0.0, kept + down**2 * rest, 1.0))
     return np.asarray(states * up[..., None] * np.where(inside, 1.0, down[..., None]))

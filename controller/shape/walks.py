@@ -1,16 +1,14 @@
-"""Walks that cover a graph: the snake walk, its rivals ([PT] 2.6.2, [KP] 4.2.1), and one of ours.
+"""Walks that cover a graph: the snake walk, its rivals ([PT] 2.6.2, [KP] 4.2.1), and ``frontier``.
 
-``W(q) = deg / (1 - sign M + deg (sign M + sign F) + M 2^F)``, the neighbour with the largest W is
-next. Correction: F(q) counts the times that q was left for an already *visited* state. With the
-printed "unvisited", Eq. 3 and the properties of W fail (``snake-printed`` keeps it for comparison).
-2^F overflows floats, so W is compared by integers. Ties go to the least recently visited neighbour,
-then to the first in the list. Algorithm 2's ``until n < N`` is read as "until the target is met":
-here, until all states are seen.
+``W(q) = deg / (1 - sign M + deg (sign M + sign F) + M 2^F)``; the neighbour with the largest W is
+next. Correction: F(q) counts how often q was left for a *visited* state. With the printed
+"unvisited", Eq. 3 fails (``snake-printed`` keeps it for comparison). W is compared by integers,
+because 2^F overflows floats. Ties go to the least recently visited neighbour, then to the first in
+the list. Algorithm 2's ``until n < N`` is read as "until all states are seen".
 
-``frontier`` (ours) knows what the snake walk knows of its neighbours, and remembers it. Like a
-knight's tour by Warnsdorff's rule it goes to the unvisited neighbour with the fewest unvisited
-neighbours. Without one, it goes through visited states to an unvisited one, by the path of fewest
-short returns, then of fewest steps.
+``frontier`` (ours) uses Warnsdorff's rule: it goes to the unvisited neighbour with the fewest
+unvisited neighbours. Without one, it goes through visited states to an unvisited one, by the path
+of fewest short returns, then of fewest steps. It looks only at neighbours of visited states.
 """
 
 from collections.abc import Callable
@@ -31,7 +29,7 @@ SHORT_RETURN = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """One walk, from its start until all states are seen or the steps run out."""
+    """A walk from its start until all states are seen or the steps run out."""
 
     path: Ints
     """(steps + 1,) states in order, the start first."""
@@ -44,7 +42,7 @@ class Walk:
 
     @property
     def steps(self) -> int:
-        """Edges walked."""
+        """Number of edges walked."""
         return len(self.path) - 1
 
 
@@ -57,14 +55,14 @@ def walk(
 ) -> Walk:
     """Walk from ``start`` until all states are seen.
 
-    O(neighbours) a step; ``frontier``'s search, where no neighbour is unvisited, up to O(E log V).
+    A step costs O(neighbours); a search of ``frontier`` costs up to O(E log V).
 
     Args:
-        graph: connected.
+        graph: graph to cover.
         rule: one of ``RULES``.
         start: first state.
         rng: used by ``random`` only.
-        max_steps: default V^2, the number that a random walk may need.
+        max_steps: default V^2, which a random walk may need.
 
     Raises:
         InputError: unknown rule, or the start is not a state.
@@ -114,7 +112,7 @@ def _one_over_w(degree: int, selected: int, failures: int) -> tuple[int, int]:
 
 
 class _WalkState:
-    """State of a walk, in plain lists: the inner loop is about ten neighbours long."""
+    """State of a walk, in plain lists: a state has about ten neighbours."""
 
     def __init__(self, graph: Graph, start: int) -> None:
         ends = graph.indptr.tolist()
@@ -138,7 +136,7 @@ class _WalkState:
         return len(self.path) - 1
 
     def move(self, to: int, counts_fresh: bool | None) -> None:
-        """Go to ``to``; F of the state left grows if ``to`` is fresh, or if it is not."""
+        """Go to ``to``; F of the state left grows if ``to`` is as fresh as ``counts_fresh``."""
         fresh = self.selected[to] == 0
         if counts_fresh is not None and fresh is counts_fresh:
             self.failures[self.path[-1]] += 1
@@ -172,22 +170,21 @@ class _WalkState:
         return self.ahead.pop()
 
     def _way_towards_unvisited(self) -> list[int]:
-        """Visited states to walk, the last one first, which has an unvisited neighbour; Dijkstra.
+        """Visited states to walk, last first; the last one has an unvisited neighbour (Dijkstra).
 
-        The cost of a way is the number of its short returns, then that of its steps; ties go by
-        Warnsdorff's choice of its end. Only neighbours of visited states are looked at.
+        The cost is the number of short returns, then of steps; ties go by Warnsdorff's rule.
         """
         soon = SHORT_RETURN * len(self.near)
         here, now = self.path[-1], self.step
         came_from = {here: here}
         cost = {here: (0, 0)}
         queue = [(0, 0, 0, 0, here)]
-        while True:  # a connected graph with unvisited states: there is a way to one
+        while True:  # the graph is connected, so a path exists
             returns, steps, _, _, q = heappop(queue)
             if not self.selected[q]:
                 break
             if (returns, steps) > cost[q]:
-                continue  # a better way to q has been gone on from
+                continue  # a better path to q was expanded
             for n in self.near[q]:
                 early = self.selected[n] > 0 and now + steps + 1 - self.last[n] < soon
                 after = (returns + early, steps + 1)
@@ -200,12 +197,12 @@ class _WalkState:
         return way
 
     def stack_top(self, near: list[int]) -> int:
-        """Depth first: the unvisited neighbour of highest degree, else back the way it came."""
+        """Depth first: the unvisited neighbour of highest degree, else backtrack."""
         fresh = self._fresh(near)
         if fresh:
             self.branches.append(max(fresh, key=self.degree.__getitem__))
         else:
-            self.branches.pop()  # never the start: back there with nothing fresh, all has been seen
+            self.branches.pop()  # never the start: back at the start, all states have been seen
         return self.branches[-1]
 
     def free(self, near: list[int], rng: np.random.Generator) -> int:
