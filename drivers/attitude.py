@@ -1,9 +1,9 @@
 """Rotations, and attitude from rates and accelerations.
 
-A complementary filter on rotations: it integrates rates, and corrects roll and pitch by the
-acceleration at rest. The heading drifts with the gyro's bias.
-(R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear complementary filters on the special orthogonal
-group", IEEE Transactions on Automatic Control 53, 2008, without its estimate of the bias.)
+A complementary filter on rotations integrates rates, and corrects roll and pitch by the
+acceleration at rest. The heading drifts with the gyro's bias. Source: R. Mahony, T. Hamel, J.-M.
+Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEEE Transactions on
+Automatic Control 53, 2008, without its bias estimate.
 """
 
 from typing import Any, Final
@@ -22,7 +22,7 @@ _LONGEST_S: Final = 0.2
 
 
 def rotations() -> Any:
-    """Return scipy's class of rotations; only a program with an IMU imports it."""
+    """Return scipy's class of rotations, for programs with an IMU."""
     from scipy.spatial.transform import Rotation  # noqa: PLC0415  a light install has no scipy
 
     return Rotation
@@ -39,19 +39,17 @@ def rotation_by(vector: Floats) -> Floats:
 
 
 class AttitudeFilter:
-    """Axes of a device in the world, from its readings; the heading begins at 0."""
+    """Axes of a device in the world; the heading begins at 0."""
 
     def __init__(self) -> None:
         self._rotation: Floats | None = None
 
     def update(self, rate_rad_s: Floats, force_m_s2: Floats, step_s: float) -> Floats:
-        """Process a reading, ``step_s`` after the last; returns the axes (3, 3), columns.
+        """Process a reading, ``step_s`` after the last; return the axes (3, 3), columns.
 
-        Args:
-            rate_rad_s: (3,) mean rate since the last reading, in the device's axes.
-            force_m_s2: (3,) specific force, in the device's axes; at rest it points up.
-            step_s: since the last reading, s; of no account in the first.
-
+        ``rate_rad_s`` (3,) is the mean rate since the last reading and ``force_m_s2`` (3,) the
+        specific force (up at rest), both in the device's axes. The first reading ignores
+        ``step_s``.
         """
         size = float(np.linalg.norm(force_m_s2))
         still = abs(size - GRAVITY_M_S2) <= _AT_REST * GRAVITY_M_S2
@@ -69,7 +67,7 @@ class AttitudeFilter:
 
 
 def _level(up: Floats) -> Floats:
-    """Axes, columns, of a device that sees ``up`` (3,) in its own; its x is at heading 0."""
+    """Axes, columns, of a device with ``up`` (3,) in its own axes; its x is at heading 0."""
     ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 0.0, -up[0]])
     left = np.cross(up, ahead)
     left /= np.linalg.norm(left)

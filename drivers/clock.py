@@ -1,4 +1,4 @@
-"""The clock interface and the wall clock, which no other module reads."""
+"""The clock interface, and the wall clock; no other module reads the time."""
 
 import time
 from typing import Protocol
@@ -12,7 +12,7 @@ class Clock(Protocol):
         ...
 
     def sleep_until_s(self, time_s: float) -> None:
-        """Return when ``now_s() >= time_s``; at once if that is past."""
+        """Return when ``now_s() >= time_s``."""
         ...
 
 

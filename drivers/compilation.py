@@ -1,4 +1,4 @@
-"""Observers that are informed when a loop was compiled because numba's cache did not contain it."""
+"""Observers of loops that numba compiles because its cache lacks them."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,7 @@ _OBSERVERS: list[Callable[[str], None]] = []
 
 
 def observe_compilation(observer: Callable[[str], None]) -> Callable[[], None]:
-    """Call ``observer`` with the name of each loop after its compilation; returns a removal."""
+    """Call ``observer`` with the name of each compiled loop; return a function that removes it."""
     _OBSERVERS.append(observer)
 
     def remove() -> None:

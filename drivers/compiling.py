@@ -1,10 +1,8 @@
 """Loops compiled by numba for one signature, when their module is imported.
 
-Never at the first call: a bus that stops for a second to compile has missed fifty cycles. Later
-imports load the machine code from numba's cache.
-
-A package of the base install that may be absent all the same: a light install of the test fixture
-has no numba (docs/start/ci.md), and runs the loops as they are written.
+A compilation at the first call would stop the bus for a second. Later imports load the machine code
+from numba's cache.
+A light install of the test fixture has no numba (docs/start/ci.md), and runs the loops as Python.
 """
 
 import sys
@@ -22,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def readonly_array(number: str = "float64", dimensions: int = 1, layout: str = "A") -> str:
-    """Numba's name of an array that is only read; layout "A" is any, "C" is contiguous."""
+    """Numba's name of a read-only array; layout "A" is any, "C" is contiguous."""
     return f"Array({number}, {dimensions}, '{layout}', readonly=True)"
 
 
@@ -33,20 +31,19 @@ def compiled(
     divides_by_zero: bool = False,
     makes_arrays: bool = True,
 ) -> Callable[[F], F]:
-    """Compile a function for ``signature``; the function as written is its ``py_func``.
+    """Compile a function for ``signature``; ``py_func`` is the original.
 
-    Without numba the function itself is returned: modules that drive servos use numba's types in
-    their signatures, and they are not imported in that case.
+    Without numba the function itself is returned.
 
     Args:
-        signature: a numba type, or its name, for modules that do not import numba themselves.
-        nogil: release Python's lock meanwhile; worth its cost for a loop that waits.
-        divides_by_zero: a division by zero is infinite, not an error; without the question for it
-            a loop is made for several numbers at once.
-        makes_arrays: False for a loop that only reads and writes the arrays it is given. Numba then
-            counts no references, which would need as much time as a short loop. A loop that makes
-            an array in spite of it does not compile. If numba has no such option, all loops count
-            references: the results have the same bits.
+        signature: a numba type, or its name, for modules that do not import numba.
+        nogil: release Python's lock; worth its cost for a loop that waits.
+        divides_by_zero: a division by zero is infinite, not an error; without this check a loop can
+            be vectorised.
+        makes_arrays: False for a loop that only uses given arrays. Numba then counts no references,
+            which would need as much time as a short loop. Such a loop does not compile if it makes
+            an array. If numba lacks the option, all loops count references, with the same bits as
+            results.
 
     """
 
@@ -72,12 +69,12 @@ def compiled(
 
 
 def is_compiling() -> bool:
-    """Whether loops are compiled; without numba they run as they are written."""
+    """Whether loops are compiled; without numba they run as Python."""
     return _numba() is not None
 
 
 def callable_in_loops(function: F) -> F:
-    """Let compiled loops call a function that also runs as it is written."""
+    """Let compiled loops call a Python function."""
     numba = _numba()
     if numba is None:
         return function
@@ -88,7 +85,7 @@ def callable_in_loops(function: F) -> F:
 def _numba() -> Any:
     """Return the package numba; None in a light install."""
     try:
-        import numba  # noqa: PLC0415  slow to import, and a light install has none
+        import numba  # noqa: PLC0415  slow to import, and missing in a light install
     except ModuleNotFoundError as error:
         if error.name != "numba":
             raise
@@ -101,7 +98,7 @@ _UNCOUNTED = {"_nrt": False}
 
 
 def _doubled(values: Any) -> float:
-    """Double the values behind the first; return the sum of a view of them."""
+    """Double all values but the first; return the sum of a view of them."""
     total = 0.0
     behind = values[1:]
     for k in range(len(behind)):
@@ -130,7 +127,7 @@ def _can_skip_counting() -> bool:
             ):
                 return True
             fault = "a loop with its option _nrt is wrong"
-        except Exception as error:  # an unknown option is a KeyError, or whatever numba makes of it
+        except Exception as error:  # an unknown option is a KeyError, or another exception of numba
             fault = f"its option _nrt is not usable ({type(error).__name__})"
     report_fallback(
         "numba",
@@ -141,10 +138,10 @@ def _can_skip_counting() -> bool:
 
 
 def inlined(function: F) -> F:
-    """Have numba write a function out where a compiled one calls it.
+    """Inline a function into compiled callers, so that their loops can be vectorised.
 
-    A loop around it is then made for several numbers at once. It has no types of its own; without
-    numba, and outside of compiled functions, it is called as it is written.
+    It has no types of its own. Without numba, and outside of compiled functions, it is plain
+    Python.
     """
     numba = _numba()
     if numba is None:

@@ -2,20 +2,18 @@
 
 ::
 
-    DriverError                    everything below
-    ├── ProtocolError              bytes that are not a packet
-    │   └── StuffingError          ``FF FF FD`` in a payload without its stuffed ``FD``
-    ├── BusError                   a servo did not do what an instruction asked
-    │   ├── NoAnswerError          no status packet before the deadline
-    │   └── ServoError             a status packet that carries a result error
-    ├── SafetyTrippedError         the safety layer has latched; an operator must reset it
-    ├── PortError (InputError)     the port is missing, denied, busy, or vanished
-    ├── ChainError (InputError)    the servos found are not the robot described
-    ├── ControlTableError (InputError)  unknown servo model, register or unit
-    └── BudgetError (InputError)   the cycle does not fit the wire
+    DriverError                    everything below ├── ProtocolError              bytes that are
+    not a packet │   └── StuffingError          ``FF FF FD`` in a payload without its stuffed ``FD``
+    ├── BusError                   a servo did not do what an instruction asked │   ├──
+    NoAnswerError          no status packet before the deadline │   └── ServoError             a
+    status packet that carries a result error ├── SafetyTrippedError         the safety layer has
+    latched; an operator must reset it ├── PortError (InputError)     the port is missing, denied,
+    busy, or vanished ├── ChainError (InputError)    the servos found are not the robot described
+    ├── ControlTableError (InputError)  unknown servo model, register or unit └── BudgetError
+    (InputError)   the cycle does not fit the wire
 
-The last four state the faults of the user's input, one line each; the command line prints them and
-ends with exit code 2. A ``ChainFault`` also contains its ``FaultCause``.
+The last four state faults of the user's input, one line each; the command line prints them and
+exits with code 2.
 """
 
 from dataclasses import dataclass
@@ -25,7 +23,7 @@ from snakewalk.config.errors import InputError
 
 
 class DriverError(Exception):
-    """Root of the tree."""
+    """Base class of driver errors."""
 
 
 class ProtocolError(DriverError):
@@ -37,15 +35,15 @@ class StuffingError(ProtocolError):
 
 
 class BusError(DriverError):
-    """A servo did not do what an instruction asked."""
+    """A servo did not follow an instruction."""
 
 
 class NoAnswerError(BusError):
-    """No status packet came before the deadline."""
+    """No status packet arrived before the deadline."""
 
 
 class ServoError(BusError):
-    """The servo answered with a result error; ``error`` is the byte of its status packet."""
+    """The servo replied with a result error; ``error`` is the byte of its status packet."""
 
     def __init__(self, message: str, error: int) -> None:
         super().__init__(message)
@@ -53,7 +51,7 @@ class ServoError(BusError):
 
 
 class SafetyTrippedError(DriverError):
-    """The safety layer has latched and sends nothing until an operator resets it."""
+    """The safety layer has latched; an operator must reset it."""
 
 
 class PortError(InputError, DriverError):
@@ -61,7 +59,7 @@ class PortError(InputError, DriverError):
 
 
 class FaultCause(Enum):
-    """Kinds of faults that forbid a chain to start or to go on."""
+    """Kinds of faults that forbid a start or a continuation."""
 
     NO_ANSWER = auto()
     OTHER_MODEL = auto()
@@ -85,7 +83,7 @@ class ChainFault:
 
 
 class ChainError(InputError, DriverError):
-    """The servos found on the bus are not the robot that was described."""
+    """The servos on the bus are not the described robot."""
 
 
 class ControlTableError(InputError, DriverError):

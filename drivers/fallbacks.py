@@ -33,5 +33,5 @@ def report_fallback(name: Interface, text: str) -> None:
 
 
 def fallbacks_in_use() -> tuple[str, ...]:
-    """Return the warnings so far: some are older than the handlers of a command."""
+    """Return the warnings so far; some precede the log handlers of a command."""
     return tuple(_reported.values())

@@ -1,9 +1,8 @@
-"""Small least squares whose result has the same bits on every processor.
+"""Small least squares with the same bits on every processor.
 
-numpy hands products and solvers to BLAS, which uses other kernels on other processors, with sums in
-another order; a run then differs in the last bit, and after a while in everything. The loops here
-have one order. They are in the same package as ``compiling``, because the simulation and the
-controller both need them.
+numpy uses BLAS, whose kernels and order of sums depend on the processor; runs would then diverge.
+These loops have one order. They are next to ``compiling`` because simulation and controller need
+them.
 """
 
 import numpy as np
@@ -14,9 +13,9 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 @compiled("void(float64[:, ::1], float64[::1], float64[::1])")
 def solve_positive_definite(a: Floats, b: Floats, x: Floats) -> None:
-    """Solve ``a`` x = b by Cholesky into ``x`` (N,); only the lower half of ``a`` is read.
+    """Solve ``a`` x = b by Cholesky into ``x`` (N,); reads the lower half of ``a``.
 
-    ``a`` (N, N) must be positive definite, and is used up.
+    ``a`` (N, N) must be positive definite; it is overwritten.
     """
     n = len(b)
     for i in range(n):
@@ -56,14 +55,8 @@ def _least_squares(rows: Floats, target: Floats, damping: Floats) -> Floats:
 def least_squares(rows: Floats, target: Floats, damping: Floats) -> Floats:
     """The x (N,) that minimises ``|rows x - target|^2 + |damping x|^2``.
 
-    By the normal equations, so for systems whose condition is far from 1e8; rows and damping
-    together must leave nothing open.
-
-    Args:
-        rows: (M, N).
-        target: (M,)
-        damping: (N,) one weight for each unknown; zeros where the rows alone decide.
-
+    It uses the normal equations, so the condition must be far below 1e8, and rows and damping must
+    determine x. Shapes: ``rows`` (M, N), ``target`` (M,), ``damping`` (N,), one weight per unknown.
     """
     return _least_squares(
         np.ascontiguousarray(rows), np.ascontiguousarray(target), np.ascontiguousarray(damping)

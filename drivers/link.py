@@ -9,15 +9,15 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 @runtime_checkable
 class ExplainingLink(Protocol):
-    """A link that can look for the reason why a joint does not follow."""
+    """A link that can find the reason why a joint does not follow."""
 
     def explain(self, joint: int) -> str | None:
-        """Return what is wrong with the goal that the joint's servo holds; None: nothing."""
+        """Return the fault of the goal in the joint's servo, or None."""
         ...
 
 
 class LoadEstimate(Protocol):
-    """Estimates of a chain's current, and of the temperature of its motors."""
+    """Estimates of a chain's current and of its motors' temperatures."""
 
     current_a: float
     """Drawn by the chain now."""
@@ -27,19 +27,19 @@ class LoadEstimate(Protocol):
     """Temperature of the hottest winding; -inf before one is known."""
 
     def winding_c(self, state: JointState) -> Floats:
-        """(J,) temperatures of the windings."""
+        """(J,) winding temperatures."""
         ...
 
 
 @runtime_checkable
 class CheckingLink(Protocol):
-    """A link that compares the servos with the values written to them, once a cycle."""
+    """A link that compares the servos with the values written to them, once per cycle."""
 
     def check_servos(self) -> None:
-        """Make the check of this cycle, once its goals are sent.
+        """Make the check of this cycle, after its goals.
 
         Raises:
-            DriverError: a servo is not as it was set.
+            DriverError: a servo differs from its settings.
 
         """
         ...
@@ -50,7 +50,7 @@ class SoftLink(Protocol):
     """A link whose joints can hold with low currents."""
 
     def hold_softly(self, current_a: Floats) -> None:
-        """Hold where the joints are, with currents of at most ``current_a`` (J,)."""
+        """Hold the present positions, with currents of at most ``current_a`` (J,)."""
         ...
 
 
@@ -60,13 +60,13 @@ class LoadedLink(Protocol):
 
     @property
     def load(self) -> LoadEstimate | None:
-        """The estimates; None without records of the motors."""
+        """The estimates; None without motor records."""
         ...
 
 
 @runtime_checkable
 class HoldingLink(Protocol):
-    """A link that may hold for a while after a trip; reads go on until it has ended."""
+    """A link that may hold for a while after a trip; reads continue until then."""
 
     @property
     def is_holding(self) -> bool:
@@ -83,11 +83,11 @@ class JointLink(Protocol):
         ...
 
     def enable(self) -> JointState:
-        """Verify the servos, set goal = present, switch torque on; returns the state found."""
+        """Verify the servos, set goal = present, switch torque on; return the state found."""
         ...
 
     def disable(self) -> None:
-        """Switch torque off; safe to call at any time, more than once."""
+        """Switch torque off; safe to call at any time, repeatedly."""
         ...
 
     def read(self) -> JointState:
@@ -104,7 +104,7 @@ class CommandOutcome(Protocol):
 
     @property
     def goal_rad(self) -> Floats:
-        """(J,) goals that were sent; on a veto the previous ones."""
+        """(J,) goals that were sent; after a veto the previous ones."""
         ...
 
     @property
@@ -118,7 +118,7 @@ class VettedLink(JointLink, Protocol):
 
     @property
     def tripped(self) -> str | None:
-        """Why no command passes any more, one line; None while commands pass."""
+        """Reason why no command passes, one line; None while commands pass."""
         ...
 
     @property
@@ -127,7 +127,7 @@ class VettedLink(JointLink, Protocol):
         ...
 
     def __enter__(self) -> Self:
-        """Enter the context; torque is off when it ends, also after an exception."""
+        """Enter the context; torque is off when it ends, even after an exception."""
         ...
 
     def __exit__(

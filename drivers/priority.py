@@ -1,4 +1,4 @@
-"""Priority of this process: how soon the operating system lets it run on a busy machine."""
+"""Priority of this process on a busy machine."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -13,10 +13,10 @@ LOWER = 10
 
 @contextmanager
 def raised_priority() -> Iterator[None]:
-    """Put the calling thread, and what it starts, before others for as long as the context lasts.
+    """Raise the priority of the calling thread and its children within the context.
 
     On Linux it is the least real-time priority (``SCHED_RR``), which needs a superuser or
-    ``rtprio`` (``limits.conf(5)``); otherwise lower niceness, which needs a superuser as well.
+    ``rtprio`` (``limits.conf(5)``); otherwise lower niceness, which also needs a superuser.
     """
     restore = _real_time() or _nicer()
     try:
@@ -27,7 +27,7 @@ def raised_priority() -> Iterator[None]:
 
 
 def give_way() -> None:
-    """Let all others run before this process, whatever priority its parent has."""
+    """Give this process the lowest usual priority."""
     if hasattr(os, "sched_setscheduler"):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -38,7 +38,7 @@ def give_way() -> None:
 
 
 def _real_time() -> Callable[[], None] | None:
-    """Set the least real-time priority; returns a function that restores it, or None."""
+    """Set the least real-time priority; return a function that restores it, or None."""
     try:
         before = os.sched_getscheduler(0), os.sched_getparam(0)
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -48,7 +48,7 @@ def _real_time() -> Callable[[], None] | None:
 
 
 def _nicer() -> Callable[[], None] | None:
-    """Do the same with niceness."""
+    """Lower the niceness; return a function that restores it, or None."""
     try:
         before = os.getpriority(os.PRIO_PROCESS, 0)
         os.setpriority(os.PRIO_PROCESS, 0, before - RAISE)

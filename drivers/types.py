@@ -1,6 +1,6 @@
 """Commands, states and poses between controller and servos: read-only arrays, SI units, head first.
 
-Named tuples: several are made in every cycle, and a frozen dataclass needs five times as long.
+Named tuples, because a frozen dataclass needs five times as long and several are made per cycle.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class JointCommand(NamedTuple):
 
 
 class ImuState(NamedTuple):
-    """Newest reading of the robot's IMU, in the axes of the link that it sits in."""
+    """Newest reading of the robot's IMU, in the axes of its link."""
 
     rotation: Floats
     """(3, 3) columns: the link's forward, left and up axes in a world whose up is right and whose
@@ -38,7 +38,7 @@ class ImuState(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Newest known state of all joints; after a failed read the old value stays and ages."""
+    """Newest known state of all joints; after a failed read old values stay and age."""
 
     time_s: float
     """Clock time at the end of the read."""

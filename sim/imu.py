@@ -23,7 +23,7 @@ _UP = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 class Imu:
-    """The device of ``config`` on a line of ``baud``; ``motion`` returns the motion of its link."""
+    """The IMU of ``config`` on a line of ``baud``; ``motion`` returns the motion of its link."""
 
     def __init__(
         self,
@@ -49,18 +49,18 @@ class Imu:
 
     @property
     def model_number(self) -> int:
-        """Model number in a ping; 0 if the device's number is not published."""
+        """Model number in a ping; 0 if it is not published."""
         return self._public.model_number or 0
 
     def block(self, address: int, length: int) -> bytes | None:
-        """Bytes that a read returns now; None where no register begins at ``address``."""
+        """Bytes of a read; None if no register begins at ``address``."""
         if address not in self._starts or not 0 < length <= _TABLE_BYTES - address:
             return None
         self._look()
         return self._table[address : address + length].tobytes()
 
     def _look(self) -> None:
-        """Measure, unless the last measurement was just made."""
+        """Measure, unless the last measurement is recent."""
         now, last = self._motion(), self._last
         step_s = 0.0 if last is None else now.time_s - last.time_s
         if last is not None and step_s < _SHORTEST_S:
@@ -97,7 +97,7 @@ class Imu:
         }
 
     def _set(self, name: str, value: int) -> None:
-        """Put a value into a register, where the device has it."""
+        """Set a register, if the device has it."""
         register = self._public.registers.get(name)
         if register is not None:
             data = np.frombuffer(register.encode(value), np.uint8)

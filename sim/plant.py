@@ -1,8 +1,8 @@
 """The interface between servos and mechanics.
 
-Servos (``sim.servo``) own a ``ServoDrive``: one array per quantity, one entry per joint, written
-when registers change. A ``Plant`` (``sim.physics``, or a bench of bare shafts) owns the shafts,
-reads the drive in every step, and writes back the motors' output.
+Servos (``sim.servo``) write a ``ServoDrive``, one array per quantity, when registers change. A
+``Plant`` (``sim.physics``, or a bench of bare shafts) owns the shafts, reads the drive in every
+step, and writes back the motors' output.
 """
 
 from dataclasses import dataclass, field
@@ -18,14 +18,13 @@ _ENERGIES = ("drawn_j", "returned_j", "heat_j", "work_j")
 
 @dataclass(frozen=True, slots=True)
 class ServoDrive:
-    """Quantities of J servos that the plant needs in every step; contiguous float64 arrays (J,).
+    """Quantities of J servos for the plant's steps; contiguous float64 arrays (J,).
 
-    The arrays are written in place and never exchanged: compiled steps keep their addresses.
-
-    Position control as the firmware does it: ``pwm = clip(p_gain * (goal - q), +-pwm_limit)``,
-    ``volts = pwm * supply``, ``i = (volts - k_e w) / R``, ``torque = k_t i``. The current is
-    clipped to ``+-current_limit_a`` in current-based mode. An unpowered bridge (``torque_on`` 0) is
-    open: no current.
+    The arrays are written in place and never replaced: compiled steps keep their addresses.
+    Position control of the firmware: ``pwm = clip(p_gain * (goal - q), +-pwm_limit)``, ``volts =
+    pwm * supply``, ``i = (volts - k_e w) / R``, ``torque = k_t i``. In current-based mode the
+    current is clipped to ``+-current_limit_a``. An unpowered bridge (``torque_on`` 0) is open: no
+    current.
     """
 
     torque_on: Floats
@@ -45,7 +44,7 @@ class ServoDrive:
     current_a: Floats = field(init=False)
     torque_n_m: Floats = field(init=False)
     pwm: Floats = field(init=False)
-    # added up by the plant over all its steps
+    # sums of the plant over all its steps
     drawn_j: Floats = field(init=False)
     """Electrical energy ``volts i`` that the motor consumed; returned energy is not deducted."""
     returned_j: Floats = field(init=False)
@@ -64,7 +63,7 @@ class ServoDrive:
                 raise TypeError(f"a drive holds contiguous float64 arrays of {joints} joints")
 
     def columns(self) -> tuple[Floats, ...]:
-        """All arrays, in the order of the fields."""
+        """All arrays, in field order."""
         return (
             *(self.torque_on, self.goal_rad, self.p_gain_per_rad, self.pwm_limit, self.supply_v),
             *(self.resistance_ohm, self.torque_constant_n_m_a, self.back_emf_v_s),
@@ -75,7 +74,7 @@ class ServoDrive:
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """How S servos sit on the plant's shafts: ``servo angle = sign * shaft angle + zero``."""
+    """Mounting of S servos on the plant's shafts: ``servo angle = sign * shaft angle + zero``."""
 
     sign: Floats
     """(S,) -1 where a servo turns the other way round than its shaft, else 1."""
@@ -84,7 +83,7 @@ class Mounting:
 
     @staticmethod
     def of(robot: RobotConfig) -> "Mounting":
-        """As the robot's file says."""
+        """Mounting of the robot's file."""
         return Mounting(np.array(robot.signs, np.float64), np.array(robot.zeros_rad))
 
 
@@ -101,7 +100,7 @@ def shaft_torque(
     back_emf_v_s: float,
     current_limit_a: float,
 ) -> tuple[float, float, float]:
-    """PWM fraction, current in A and torque in N m of one servo: the law of ``ServoDrive``."""
+    """PWM fraction, current, A, and torque, N m, of one servo by the law of ``ServoDrive``."""
     if torque_on <= 0.0:
         return 0.0, 0.0, 0.0
     pwm = min(max(p_gain_per_rad * (goal_rad - position_rad), -pwm_limit), pwm_limit)
@@ -111,7 +110,7 @@ def shaft_torque(
 
 
 class LinkMotion(NamedTuple):
-    """Where one link is, as an IMU in it feels it."""
+    """Pose of one link, for an IMU in it."""
 
     time_s: float
     centre_m: Floats
@@ -121,11 +120,11 @@ class LinkMotion(NamedTuple):
 
 
 class Plant(Protocol):
-    """Mechanics with J shafts, stepped up to a time when someone looks."""
+    """Mechanics with J shafts, stepped on demand."""
 
     @property
     def time_s(self) -> float:
-        """Time of the state that the shafts show."""
+        """Time of the shafts' state."""
         ...
 
     @property

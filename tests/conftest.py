@@ -62,7 +62,7 @@ def all_figures() -> Iterator[tuple[object, ...]]:
 
     To draw them all takes longer than most runs of tests. ``whole_report`` is for tests that read.
     """
-    from snakewalk.controller.report.figures import sections  # noqa: PLC0415  it imports matplotlib
+    from snakewalk.controller.report.figures import sections
 
     figures = sections._ALL
     with pytest.MonkeyPatch.context() as patch:
@@ -73,7 +73,7 @@ def all_figures() -> Iterator[tuple[object, ...]]:
 @pytest.fixture(scope="module")
 def whole_report(all_figures: tuple[object, ...]) -> Iterator[None]:
     """Draw every figure of the reports of a module's tests."""
-    from snakewalk.controller.report.figures import sections  # noqa: PLC0415  as above
+    from snakewalk.controller.report.figures import sections
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sections, "_ALL", all_figures)

@@ -48,7 +48,7 @@ class Analysis:
 
     @property
     def pulse_not_told(self) -> str | None:
-        """Why the pulse speed, and all that is divided by it, is unknown; None where it is not."""
+        """Reason why pulse speed and all values divided by it are unknown, or None."""
         if self.wave.coarse:
             return self.wave.not_told
         if not np.isfinite(self.pulse.points_per_frame).any():
@@ -57,7 +57,7 @@ class Analysis:
 
     @property
     def travel_not_told(self) -> str | None:
-        """Why travel and sliding are unknown; None where they are not."""
+        """Reason why travel and sliding are unknown, or None."""
         if self.advance is None:
             return "places are not recorded"
         if self.pulse_not_told is not None:
@@ -74,10 +74,10 @@ class Analysis:
 
     @property
     def travel(self) -> float | None:
-        """Speed of the points along the body over the pulse speed, where both are known.
+        """Speed of the points along the body over the pulse speed; None if unknown.
 
-        1: every point passes where the head passed. If the body stays far behind its wave, the
-        water may run as fast the other way: the ground does not show how the body slides.
+        1: every point follows the head's path. A much smaller value may be a current against the
+        animal: the ground does not show how the body slides.
         """
         if self.advance is None or self.travel_not_told is not None:
             return None
@@ -87,8 +87,8 @@ class Analysis:
     def sliding(self) -> float | None:
         """w_d of [PT] 2.6.4 as the synthesis uses it: the share of the head's speed not shifted.
 
-        0: no sliding. Up to 1: the body glides on in its shape. Below 0: the head advances less
-        than the wave runs back, so the body slips.
+        0: no sliding. Up to 1: the body glides in its shape. Below 0: the head advances less than
+        the wave runs back.
         """
         if self.advance is None or self.travel_not_told is not None:
             return None
@@ -104,7 +104,7 @@ class Analysis:
     def error_slope(self) -> tuple[float, float] | None:
         """How the error of one pulse speed for the whole body follows ``abs(Theta_n)``.
 
-        [PT] 2.4 calls the absolute error proportional to it (Fig. 5(a)): slope through the origin,
+        [PT] 2.4 calls the absolute error proportional to it (Fig. 5(a)). Slope through the origin,
         points, and correlation, over all frames and points.
         """
         error, slope = np.abs(self.pulse.body_error_rad), self.slope_rad
@@ -115,14 +115,14 @@ class Analysis:
         return points, float(np.corrcoef(error[seen], slope[seen])[0, 1])
 
     def _over_pulse(self, speed: Floats) -> float | None:
-        """Ratio of a speed (S, N) to the pulse speed, weighted by how well a shift is seen."""
+        """Ratio of a speed (S, N) to the pulse speed, weighted by squared slope."""
         both = np.isfinite(self.pulse.points_per_frame)
         weight = self.pulse.slope[both] ** 2
         moved = float((weight * self.pulse.points_per_frame[both]).sum())
         return None if abs(moved) < 1e-9 else float((weight * speed[both]).sum()) / moved
 
     def facts(self) -> dict[str, Any]:
-        """Plain numbers, for the table and JSON; None where ``*_not_told`` has the reason."""
+        """Plain numbers for the table and JSON; None if ``*_not_told`` has a reason."""
         track, wave, pulse = self.track, self.wave, self.pulse
         u = pulse.points_per_frame
         known = np.isfinite(u)
@@ -186,7 +186,7 @@ def analyse(track: Track) -> Analysis:
     """Measure a recording.
 
     Raises:
-        InputError: nothing moves, or too few frames follow each other.
+        InputError: nothing moves, or too few consecutive frames.
 
     """
     if track.frames < 4:

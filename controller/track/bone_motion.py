@@ -38,7 +38,7 @@ class BoneMotion:
 
 
 def even_points(track: Track) -> Floats:
-    """(T, P, 2) midlines; those of more than 101 points in 100 parts of equal arc length."""
+    """(T, P, 2) midlines; those of more than 101 points resampled to 100 equal arcs."""
     points = track.points
     if points.shape[1] > SEGMENTS + 1:
         points = np.stack([equal_arc_length(body) for body in points])
@@ -49,7 +49,7 @@ def from_points(points_m: Floats, time_s: Floats) -> BoneMotion:
     """Bones between points (T, K + 1, 3); a bone's left side is level.
 
     Raises:
-        InputError: a bone of no length, or one that stands upright.
+        InputError: a bone has no length, or is vertical.
 
     """
     step = points_m[:, :-1] - points_m[:, 1:]
@@ -68,13 +68,13 @@ def from_points(points_m: Floats, time_s: Floats) -> BoneMotion:
 
 
 def swimming(gait: SpineGait, length_m: float, frames: int = CYCLE_FRAMES) -> BoneMotion:
-    """One whole cycle of a spine gait, the last frame the first again.
+    """One cycle of a spine gait; the last frame repeats the first.
 
-    [GC] ends its cycle at t = 1 s whatever omega is; with the dolphin's 1.3 the body would jump.
-    Here a cycle lasts 1 / omega. The spine keeps its length: it is divided into equal arcs.
+    [GC] ends its cycle at t = 1 s whatever omega is, so the body would jump. Here a cycle lasts 1 /
+    omega. The spine keeps its length: it is divided into equal arcs.
 
     Raises:
-        InputError: a gait without frequency.
+        InputError: the frequency is 0.
 
     """
     p = gait.params

@@ -6,24 +6,23 @@ from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Complexes, Floats
 
-_SMOOTH = 4.0  # of 100 segments: a wave of half the body keeps 88 % of its size
-_END = 8  # segments at either end whose smoothed curvature leans on what is not there
+_SMOOTH = 4.0  # of 100 segments: a wave of half the body keeps 88 % of its amplitude
+_END = 8  # segments at each end whose smoothed curvature is one-sided
 
 
 def smooth_curvature(angles_rad: Floats) -> Floats:
-    """(T, N - 16) change of the tangent angles (T, N) from segment to segment, smoothed.
+    """(T, N - 16) change of the tangent angles (T, N) per segment, smoothed, without the ends.
 
-    Noise of the points grows with the square of how closely they lie: without smoothing, 0.2 % of
-    the length is more than the bending itself. The ends, where it has one side only, are left out.
+    Without smoothing, noise of 0.2 % of the length exceeds the bending itself.
     """
     smooth = gaussian_filter1d(angles_rad, _SMOOTH, axis=1, order=1, mode="nearest")
     return np.asarray(smooth[:, _END:-_END])
 
 
 def analytic_signal(values: Floats) -> Complexes:
-    """Analytic signal (T, N) of each column: the positive frequencies alone, doubled.
+    """Analytic signal (T, N) of each column: the positive frequencies, doubled.
 
-    Equal to the bit to the result of ``scipy.signal.hilbert``, whose import needs a second.
+    Bit-identical to ``scipy.signal.hilbert``, which needs a second to import.
     """
     count = len(values)
     share = np.zeros(count)

@@ -1,4 +1,4 @@
-"""Frames that follow each other, and frames that are missing between them."""
+"""Runs of consecutive frames, and missing frames."""
 
 import numpy as np
 
@@ -12,17 +12,17 @@ _MOSTLY = 0.8
 
 
 def consecutive(number: Ints) -> list[Ints]:
-    """Indices of frames that follow each other without a gap, run by run."""
+    """Indices of consecutive frames, run by run."""
     return np.split(np.arange(len(number)), np.flatnonzero(np.diff(number) != 1) + 1)
 
 
 def missing_frames(number: Ints) -> int:
-    """Frames between the first and the last number (T,) that are not among them."""
+    """Number of frames missing between the first and the last number (T,)."""
     return int(number[-1] - number[0]) + 1 - len(number) if len(number) else 0
 
 
 def common_step(number: Ints) -> int:
-    """Frames from one row to the next where a file lists every n-th frame; else 1."""
+    """Frames from row to row if a file lists every n-th frame; else 1."""
     if len(number) < LEAST_ROWS:
         return 1
     return max(1, int(np.gcd.reduce(np.diff(number))))
@@ -38,7 +38,7 @@ def is_mostly_every_nth(number: Ints) -> bool:
 
 
 def bridged(number: Ints, values: Floats, most: int) -> list[tuple[Ints, Floats]]:
-    """Numbers and values (T', N) of runs; gaps of up to ``most`` frames are filled linearly."""
+    """Numbers and values (T', N) of runs; gaps of up to ``most`` frames are interpolated."""
     runs = np.split(np.arange(len(number)), np.flatnonzero(np.diff(number) > most + 1) + 1)
     filled = []
     for run in runs:

@@ -1,10 +1,10 @@
-"""Whether the body of one frame can be used, and if not, why."""
+"""Whether the body of a frame is usable, and why not."""
 
 from enum import StrEnum
 
 
 class FrameStatus(StrEnum):
-    """Frames down to ``COIL`` hold points; the others say why they do not."""
+    """Verdict on a frame; those down to ``COIL`` hold points."""
 
     GOOD = "good"
     ROUGH = "rough: the points may be off by more than 1 % of the body"

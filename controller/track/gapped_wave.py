@@ -1,8 +1,8 @@
-"""The wave of a recording with gaps, from frames that follow each other.
+"""The wave of a recording with gaps, from runs of consecutive frames.
 
-Each frame has a phase of its own: in the plane of the two strongest components of the curvature a
-travelling wave runs on an ellipse. The turn between consecutive frames gives a first frequency. The
-frequency with the least squares over all runs refines it; each run has its own phase and size.
+In the plane of the two strongest components of the curvature a travelling wave runs on an ellipse,
+so each frame has a phase. The turn between consecutive frames gives a first frequency. Least
+squares over all runs, each with its own phase and amplitude, refine it.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ _COMPONENTS = 4
 
 
 class GappedWave(NamedTuple):
-    """The strongest pattern of runs of frames."""
+    """The strongest travelling pattern of runs of frames."""
 
     turns_a_frame: float
     """Positive in the direction of ``mode``'s phase."""
@@ -67,13 +67,13 @@ def gapped_wave(number: Ints, curvature: Floats) -> GappedWave:
 
 
 def _components(bending: Floats) -> Floats:
-    """(T, 4) strongest components, the strongest first."""
+    """(T, 4) strongest components, in order."""
     _, axes = np.linalg.eigh(bending.T @ bending)
     return np.asarray(bending @ axes[:, : -_COMPONENTS - 1 : -1])
 
 
 def _first_turns(number: Ints, components: Floats) -> float:
-    """Turns from frame to frame, by the phase of each frame in its own right."""
+    """Turns per frame, from the phase of each frame."""
     size = np.maximum(np.sqrt((components[:, :2] ** 2).sum(axis=0)), 1e-300)
     both = components[:, :2] / size
     phasor = both[:, 0] + 1j * both[:, 1]
@@ -82,7 +82,7 @@ def _first_turns(number: Ints, components: Floats) -> float:
 
 
 def _refined(number: Ints, spans: list[Ints], components: Floats, first: float) -> float:
-    """Frequency near ``first``, turns a frame, that leaves the least squares over the spans."""
+    """Frequency near ``first``, turns per frame, with the least residual over the spans."""
     spanned = [np.flatnonzero((number >= span[0]) & (number <= span[-1])) for span in spans]
     best, reach = first, _REACH
     for _ in range(_ZOOMS):
@@ -96,7 +96,7 @@ def _refined(number: Ints, spans: list[Ints], components: Floats, first: float) 
 
 
 def _squares_left(number: Ints, components: Floats, turns: float) -> float:
-    """Squares that a constant, a sine and a cosine leave of components (T, K)."""
+    """Squared residual of components (T, K) after a constant, a sine and a cosine."""
     phase = 2.0 * np.pi * turns * (number - number[0])
     columns = [np.cos(phase), np.sin(phase)]
     if turns * (number[-1] - number[0]) > 1.0:

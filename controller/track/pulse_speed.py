@@ -1,9 +1,9 @@
-"""Pulse speed: how many points the pattern of angles moves down the body in a frame ([PT] 2.4).
+"""Pulse speed: points that the pattern of angles moves towards the tail per frame ([PT] 2.4).
 
-The place ``n - (u - w)`` is looked up with a whole u and 0 <= w < 1. The interpolation is
-``Theta(n, t) = Theta(n - u, t - 1) + w (Theta(n + 1 - u, t - 1) - Theta(n - u, t - 1))``.
-Correction: so the pulse speed is ``U = u - w``, where the text prints ``u + w``. Both come from
-least squares over nine points.
+The place ``n - (u - w)`` has a whole u and 0 <= w < 1, both from least squares over nine points.
+The interpolation is ``Theta(n, t) = Theta(n - u, t - 1) + w (Theta(n + 1 - u, t - 1) - Theta(n - u,
+t - 1))``.
+Correction: the pulse speed is ``U = u - w``; the text prints ``u + w``.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class PulseSpeed:
 
     @property
     def typical(self) -> float:
-        """Median of U, points a frame; NaN if nothing was measured."""
+        """Median of U, points per frame; NaN if nothing was measured."""
         known = np.isfinite(self.points_per_frame)
         return float(np.median(self.points_per_frame[known])) if known.any() else float("nan")
 
@@ -59,17 +59,16 @@ def measure_pulse_speed(
 ) -> PulseSpeed:
     """Measure U(n, t).
 
-    A slow pulse is compared over ``step`` frames, or noise hides it: a shift of a few points is
-    found to a few hundredths. ``most`` must stay below half a wavelength, or a shift is mistaken
-    for the next wave's.
+    A slow pulse needs a larger ``step``: a shift of a few points has an error of a few hundredths.
+    ``most`` must stay below half a wavelength; a larger shift matches the next wave.
 
     Args:
         angles_rad: (T, N) tangent angles, head first, unwrapped along the body.
-        number: (T,) frame numbers, increasing; only frames ``step`` apart are compared.
+        number: (T,) frame numbers, increasing.
         step: frames between those compared.
-        most: points, the largest shift that is tried, in either direction.
-        heading_known: False where each frame was turned to a heading of its own (recordings of
-            joint angles): one turn of the whole body a frame is then fitted first.
+        most: largest shift tried in either direction, points.
+        heading_known: False if each frame has its own heading (recordings of joint angles): one
+            rotation of the whole body per frame is then fitted first.
 
     Raises:
         ValueError: ``step`` or ``most`` below 1, or too few points for such a shift.
@@ -92,8 +91,8 @@ def measure_pulse_speed(
     slope = np.sqrt(_sums(np.diff(before, axis=1) ** 2) / NEIGHBOURS)
     slope = np.pad(slope, ((0, 0), (4, 5)), mode="edge")
     usual = np.sqrt((np.diff(before, axis=1) ** 2).mean()) if before.size else 0.0
-    # a best shift at the end of the range does not count as a minimum: the pattern came from beyond
-    # the head or the tail, or moved by more than was tried
+    # a best shift at the end of the range is not a minimum: the pattern came from beyond the body,
+    # or moved farther than was tried
     n = np.arange(points)
     ahead, behind = n - NEIGHBOURS // 2 - 1 - shift, points - 2 - NEIGHBOURS // 2 - n + shift
     inside = (ahead > _EDGE) & (behind > _EDGE) & (np.abs(shift) < most - 0.5)
@@ -112,14 +111,14 @@ def measure_pulse_speed(
 
 
 def _whole_body(shift: Floats, weight: Floats) -> Floats:
-    """Weighted mean (S,) of shifts (S, N); NaN where all weights are 0."""
+    """Weighted mean (S,) of shifts (S, N); NaN if all weights are 0."""
     total = weight.sum(axis=1)
     moved = (weight * np.where(weight > 0.0, shift, 0.0)).sum(axis=1)
     return np.where(total > 0.0, moved / np.where(total > 0.0, total, 1.0), np.nan)
 
 
 def _estimate(before: Floats, shift: Floats) -> Floats:
-    """``Theta_e(n) = Theta(n - U)``, (S, N), linear between points; NaN from beyond the body."""
+    """``Theta_e(n) = Theta(n - U)``, (S, N), linear between points; NaN beyond the body."""
     last = before.shape[1] - 1
     place = np.arange(last + 1) - shift[:, None]
     seen = (place >= 0.0) & (place <= last)
@@ -130,17 +129,17 @@ def _estimate(before: Floats, shift: Floats) -> Floats:
 
 
 def _forget_beyond(known: Bools, shift: Floats, most: int) -> None:
-    """Clear what fits by chance where the neighbours' shift comes from beyond the head or the tail.
+    """Clear chance fits next to neighbours whose shift comes from beyond the head or the tail.
 
-    There the true shift is out of reach, and the best of the others may be a minimum of its own.
-    The neighbours are the known ones among ``most + NEIGHBOURS`` points on the side of the middle.
+    There the true shift is out of reach, and another shift may be a minimum. The neighbours are the
+    known ones among ``most + NEIGHBOURS`` points towards the middle.
     """
     for one, far in ((known, shift), (known[:, ::-1], -shift[:, ::-1])):  # from the tail: mirrored
         for n in range(min(most + NEIGHBOURS, one.shape[1] // 2), -1, -1):
             beside = slice(n + 1, n + 1 + most + NEIGHBOURS)
             near = one[:, beside]
             order = np.sort(np.where(near, far[:, beside], np.inf), axis=1)
-            middle = np.maximum(near.sum(axis=1) - 1, 0) // 2  # the lower one of two
+            middle = np.maximum(near.sum(axis=1) - 1, 0) // 2  # the lower median
             usual = np.where(near.any(axis=1), order[np.arange(len(order)), middle], 0.0)
             one[:, n] &= n - NEIGHBOURS // 2 - 1 - usual > -_SLACK
 
@@ -153,7 +152,7 @@ def _pairs(number: Ints, step: int) -> tuple[Ints, Ints]:
 
 
 def _fit(now: Floats, before: Floats, u: int) -> tuple[Floats, Floats]:
-    """Best w in 0..1 and the squares left over, (S, N), for the whole shift u; inf where unseen."""
+    """Best w in 0..1 and squared residual, (S, N), for the whole shift u; inf where unseen."""
     points = now.shape[1]
     w, error = np.full(now.shape, np.nan), np.full(now.shape, np.inf)
     first, last = max(0, u), min(points, points - 1 + u)  # n with n - u and n + 1 - u on the body
@@ -177,7 +176,7 @@ def _sums(values: Floats) -> Floats:
 
 
 def _body_rotation(now: Floats, before: Floats) -> Floats:
-    """Rotation of the whole body (S,) that, with one shift for all of it, explains a frame best."""
+    """Rotation of the whole body (S,) that, with one common shift, fits a frame best."""
     slope = np.gradient(before, axis=1)
     change = now - before
     flat = slope - slope.mean(axis=1, keepdims=True)

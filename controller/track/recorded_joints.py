@@ -1,4 +1,4 @@
-"""Joint angles over time of a recording, for one robot."""
+"""Joint angles of a recording over time, for one robot."""
 
 from pathlib import Path
 
@@ -16,12 +16,12 @@ from snakewalk.controller.track.wave import measure_wave
 
 
 def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
-    """Read times (T,) and joint angles (T, J): of the file itself, or of its midlines.
+    """Read times (T,) and joint angles (T, J) from the file itself, or from its midlines.
 
-    Midlines shake from frame to frame; their joints are smoothed, well above the wave's frequency.
+    Joints of midlines are smoothed, with a cut well above the wave's frequency.
 
     Raises:
-        InputError: no such recording, or made for another robot.
+        InputError: no such recording, or it was made for another robot.
 
     """
     stored = _stored_joints(track, robot)
@@ -42,7 +42,7 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
 
 
 def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:
-    """Joint angles that a synthesis wrote in addition to its midlines; None without them."""
+    """Joint angles that a synthesis stored with its midlines; None without them."""
     if Path(track).suffix != ".npz" or not Path(track).is_file():
         return None
     try:

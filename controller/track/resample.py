@@ -1,4 +1,4 @@
-"""Resampling to equal arc lengths: points along a body become 100 segments and tangent angles."""
+"""Resampling to equal arc lengths: a midline becomes 100 segments and tangent angles."""
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -7,14 +7,13 @@ from snakewalk.config.arrays import Floats
 
 SEGMENTS = 100
 """Segments of a skeleton, [PT] 2.5."""
-_FINE = 8  # samples per segment when the spline's arc length is measured
+_FINE = 8  # samples per segment to measure the spline's arc length
 
 
 def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
-    """Points (segments + 1, 2) at equal arc lengths on the cubic spline through ``points`` (P, 2).
+    """Points (segments + 1, 2) at equal arc lengths on the cubic spline through (P, 2).
 
-    First and last point are kept. Arcs are equal, chords only nearly so: on 100 segments of a body
-    they differ by about the square of the bend of one segment.
+    First and last point are kept. Chords differ by about the square of the bend of one segment.
 
     Raises:
         ValueError: fewer than 4 distinct consecutive points.

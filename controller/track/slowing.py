@@ -1,8 +1,7 @@
-"""How much slower than the animal a robot must be: joint speed and acceleration at its own pace.
+"""How much slower than the animal a robot must be: joint speed and acceleration.
 
-Tracked points shake from frame to frame, and differences over one frame time amplify that: at 60 Hz
-a slow fish seems to need the speed of a fast one. So demands are computed from angles smoothed over
-time, with a cut well above the wave's frequency; the unsmoothed speed is kept as well.
+Noise of tracked points dominates differences over one frame. So demands use angles smoothed over
+time, with a cut well above the wave's frequency. The unsmoothed speed is kept as well.
 """
 
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ CUT_CYCLES = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """Demand of the recorded motion on the joints in the animal's own time."""
+    """Joint speeds and accelerations of the recorded motion in the animal's own time."""
 
     speed_rad_s: Floats
     """(K,) fastest joint between each two frames that follow each other, smoothed over time."""
@@ -41,7 +40,7 @@ class Slowing:
 
     @property
     def throughout(self) -> float:
-        """One factor for the whole recording that keeps both limits."""
+        """Factor for the whole recording that keeps both limits."""
         return max(self.by_speed, self.by_acceleration)
 
 
@@ -53,8 +52,8 @@ def joint_demand(joints_rad: Floats, time_s: Floats, rate_hz: float, wave_hz: fl
     Args:
         joints_rad: of every kept frame.
         time_s: (T,) of the frames, increasing.
-        rate_hz: frames a second.
-        wave_hz: frequency of the body wave; sets how much is smoothed.
+        rate_hz: frames per second.
+        wave_hz: frequency of the body wave; sets the smoothing.
 
     Raises:
         ValueError: no two frames follow each other.
@@ -78,7 +77,7 @@ def joint_demand(joints_rad: Floats, time_s: Floats, rate_hz: float, wave_hz: fl
 
 
 def slowing(demand: Demand, speed_limit_rad_s: float, acceleration_limit_rad_s2: float) -> Slowing:
-    """Compare a demand with the limits of a robot's plan for its joints."""
+    """Compare a demand with a robot's limits."""
     speed = demand.speed_rad_s / speed_limit_rad_s
     acceleration = demand.acceleration_rad_s2.max(initial=0.0) / acceleration_limit_rad_s2
     return Slowing(
@@ -89,7 +88,7 @@ def slowing(demand: Demand, speed_limit_rad_s: float, acceleration_limit_rad_s2:
 
 
 def _smooth(joints_rad: Floats, width: float) -> Floats:
-    """Smooth over time; the ends are continued point-symmetrically, so that no kink is made."""
+    """Smooth over time; the ends are continued point-symmetrically, without a kink."""
     room = min(int(np.ceil(4.0 * width)), len(joints_rad) - 1)
     if room == 0:
         return joints_rad

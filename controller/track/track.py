@@ -18,13 +18,13 @@ from snakewalk.controller.track.resample import equal_arc_length, tangent_angles
 
 MOST_FRAMES = 500_000
 """Frames of a track, gaps included (ours): 4.6 hours at 30 Hz."""
-_UNEVEN = 0.1  # of a frame: times that are off by more are not those of an even rate
-_JOINED = 2.5  # frames: bodies are not put between those that are further apart in time
+_UNEVEN = 0.1  # of a frame: largest deviation of times from an even rate
+_JOINED = 2.5  # frames: bodies are not interpolated over larger gaps
 
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A recording of any kind; frames without a whole midline are left out and counted."""
+    """A recording of any kind; frames without a whole midline are dropped and counted."""
 
     name: str
     angles_rad: Floats
@@ -61,12 +61,12 @@ class Track:
 
     @property
     def frames(self) -> int:
-        """Kept frames T."""
+        """Number of kept frames T."""
         return len(self.angles_rad)
 
     @property
     def bridged(self) -> int:
-        """Frames in which a missing keypoint was set on the curve through the others."""
+        """Number of frames with an interpolated keypoint."""
         return self.status.count(FrameStatus.BRIDGED)
 
     @property
@@ -76,7 +76,7 @@ class Track:
 
     @property
     def flips(self) -> int:
-        """Frames that fit the frame before better with head and tail exchanged: tracking faults."""
+        """Number of frames that fit their predecessor better with head and tail exchanged."""
         before, after = self.angles_rad[:-1], self.angles_rad[1:]
         same = 1.0 - np.cos(after - before).mean(axis=1)
         flipped = 1.0 - np.cos(after[:, ::-1] + np.pi - before).mean(axis=1)
@@ -105,15 +105,15 @@ def track_from_points(
     """Build a ``Track`` from points (T, P, 2), head first, in any unit.
 
     Args:
-        name: of the recording, also used in faults.
+        name: of the recording, for faults too.
         points: NaN where a point was not seen.
-        rate_hz: frames a second.
-        scale_m: metres per unit; None where it is unknown (points become body lengths).
+        rate_hz: frames per second.
+        scale_m: metres per unit; None if unknown (points become body lengths).
         frame: (T,) frame numbers, increasing; default 0, 1, 2...
-        time_s: (T,) when the frames were taken, increasing. Uneven times decide: bodies are put
-            between them (a cubic spline of each point) at the rate of their median step.
+        time_s: (T,) times of the frames, increasing. If they are uneven, bodies are interpolated (a
+            cubic spline per point) at the rate of the median step.
         rate_assumed: whether ``rate_hz`` is a guess.
-        status: of every frame (T,), or nothing.
+        status: of every frame (T,), or empty.
         source: origin of the recording.
         licence: its terms of use.
         notes: lines about parts that the reader left out or changed.
@@ -177,7 +177,7 @@ def _evenly(bodies: Floats) -> tuple[Floats, float]:
 def _timed(
     name: str, number: Ints, time_s: Floats | None, rate_hz: float
 ) -> tuple[Ints, float, bool]:
-    """Frame numbers, rate, and whether the times (T,) are uneven and decide about both."""
+    """Frame numbers, rate, and whether the times (T,) are uneven and determine both."""
     _check_span(name, number)
     if time_s is not None and _is_uneven(name, time_s, number):
         rate_hz = 1.0 / float(np.median(np.diff(time_s)))
@@ -190,7 +190,7 @@ def _timed(
 
 
 def _absent(number: Ints, time_s: Floats | None, rate_hz: float) -> int:
-    """Frames between the first and the last row that have none of their own."""
+    """Number of frames between the first and the last row without a row."""
     if time_s is None:
         return missing_frames(number)
     return max(0, round(float(time_s[-1] - time_s[0]) * rate_hz) + 1 - len(time_s))
@@ -205,7 +205,7 @@ def _check_span(name: str, number: Ints) -> None:
 
 
 def _is_uneven(name: str, time_s: Floats, number: Ints) -> bool:
-    """Whether times are off those of any one rate by more than a part of a frame.
+    """Whether times deviate from an even rate by more than ``_UNEVEN`` of a frame.
 
     Raises:
         InputError: times or frame numbers do not increase.
@@ -225,7 +225,7 @@ def _between(
 ) -> tuple[Floats, Ints, Ints]:
     """Bodies (T', P, 2) at an even rate, their frame numbers, and the nearest frame of each.
 
-    No body is returned next to a frame without a body, or where frames are far apart.
+    Times next to a frame without a body, or in long gaps, get no body.
     """
     first = np.flatnonzero(whole[:-1] & whole[1:] & (np.diff(time_s) <= _JOINED / rate_hz))
     bodies, numbers, nearest = [points[:0]], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
@@ -248,7 +248,7 @@ def frame_numbers(name: str, values: Floats) -> Ints:
     """Frame numbers as integers.
 
     Raises:
-        InputError: some are not whole, or too large to count frames.
+        InputError: some are not whole, or too large.
 
     """
     odd = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
@@ -266,6 +266,6 @@ def _distinct(body: Floats) -> bool:
 
 
 def _over_time(angles_rad: Floats) -> Floats:
-    """Shift whole frames by turns of 2 pi, so that the mean heading never jumps."""
+    """Shift whole frames by multiples of 2 pi, so that the mean heading never jumps."""
     mean = angles_rad.mean(axis=1)
     return np.asarray(angles_rad + (np.unwrap(mean) - mean)[:, None])

@@ -1,4 +1,4 @@
-"""Undulation: how far each part of the body swings, and how its path advances."""
+"""Undulation: lateral swing of each part of the body, and its advance along the path."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from snakewalk.controller.track.track import Track
 
 @dataclass(frozen=True, slots=True)
 class Undulation:
-    """Amplitudes along the body, taken about the slow path of the whole body."""
+    """Amplitudes along the body, relative to its slow path."""
 
     angle_rad: Floats
     """(N,) amplitude of the tangent angle: root of twice its variance over time."""
@@ -22,10 +22,10 @@ class Undulation:
 
 
 def even_points(track: Track) -> Floats | None:
-    """Points (T, 101, 2) at equal arc lengths, body lengths; None where places are not recorded.
+    """Points (T, 101, 2) at equal arc lengths, body lengths; None if places are not recorded.
 
-    Files of joint angles, and figures without travel, put every head at the same place; images that
-    are cropped to the animal share no origin.
+    Files of joint angles put every head at the origin; images cropped to the animal share no
+    origin.
     """
     if not track.places_recorded:
         return None
@@ -40,13 +40,8 @@ def even_points(track: Track) -> Floats | None:
 def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
     """Amplitudes along the body.
 
-    The path's direction is the body's mean heading smoothed over a cycle, so that slow turns of
-    the animal do not count as swings.
-
-    Args:
-        track: with at least two frames.
-        frequency_hz: of the undulation; sets what is slow.
-
+    The mean heading, smoothed over a cycle of ``frequency_hz``, is the path's direction: slow turns
+    do not count as swings.
     """
     heading = track.angles_rad.mean(axis=1)
     cycle = track.rate_hz / max(frequency_hz, 1e-9)
@@ -65,7 +60,7 @@ def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
 
 @dataclass(frozen=True, slots=True)
 class Advance:
-    """How fast each segment goes, points of N a frame; at the pairs of ``measure_pulse_speed``."""
+    """Speed of each segment, points of N per frame; for the pairs of ``measure_pulse_speed``."""
 
     along: Floats
     """(S, N) along the body's own tangent there, forwards positive."""
@@ -75,28 +70,19 @@ class Advance:
     """(S, N) of the angle between the tangent there and the head's."""
 
     def head_speed(self, pulse: Floats) -> Floats:
-        """Speed of the head along its tangent (S, N), estimated from each segment.
+        """Speed of the head along its tangent (S, N), from each segment and its ``pulse`` (S, N).
 
-        With the skeleton of [PT] 2.6.4 a segment goes at the pulse speed along its own tangent. In
-        addition all segments go in the direction of the head, at the difference of the head's speed
-        and the pulse speed. So the speed along the tangent of a segment is less than the head's by
-        the angle between them.
-
-        Args:
-            pulse: (S, N) pulse speed, points a frame.
-
+        With the skeleton of [PT] 2.6.4 a segment moves at the pulse speed along its own tangent.
+        All segments also move in the head's direction, at the difference of head speed and pulse
+        speed.
         """
         return np.asarray(self.headward + pulse * (1.0 - self.cosine))
 
 
 def advance_of(body: Floats, number: Ints, step: int) -> Advance:
-    """Speed of each segment, between frames that are ``step`` apart.
+    """Speed of each segment between frames that are ``step`` apart.
 
-    Args:
-        body: (T, N + 1, 2) points in body lengths, at equal arcs.
-        number: (T,) frame numbers.
-        step: frames between those compared.
-
+    ``body`` are points (T, N + 1, 2) in body lengths, at equal arcs; ``number`` (T,) frame numbers.
     """
     segments = body.shape[1] - 1
     at = np.searchsorted(number, number - step)
@@ -116,10 +102,10 @@ def advance_of(body: Floats, number: Ints, step: int) -> Advance:
 
 
 def _slow(number: Ints, values: Floats, cycle: float) -> Floats:
-    """Return a series without what happens within a cycle of this many frames.
+    """Smooth a series over a cycle of this many frames.
 
-    Parts between gaps are smoothed each for itself; those shorter than a cycle keep to one line
-    through all frames.
+    Parts between gaps are smoothed separately; those shorter than a cycle follow one line through
+    all frames.
     """
     runs = consecutive(number)
     if len(runs) == 1:
@@ -133,7 +119,7 @@ def _slow(number: Ints, values: Floats, cycle: float) -> Floats:
 
 
 def _slow_run(values: Floats, cycle: float) -> Floats:
-    """Return a series of consecutive frames without what happens within a cycle."""
+    """Smooth a series of consecutive frames over a cycle."""
     trend = np.polynomial.Polynomial.fit(np.arange(len(values)), values, 1)
     line = trend(np.arange(len(values)))
     if len(values) < 3.0 * cycle:

@@ -1,4 +1,4 @@
-"""The body wave of a recording: its direction, length and speed, one number each."""
+"""The body wave of a recording: direction, length and speed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ LEAST_CYCLES = 2.0
 """In the recording: a wave by formula has its frequency within 1.5 % from here on."""
 LEAST_RUN_CYCLES = 1.0
 """In the longest part without a gap (ours)."""
-_NO_BEND = 1e-9  # rad a segment: a straight body that turns leaves rounding errors
-_STEPS = 6  # until frequency and smoothing fit each other
+_NO_BEND = 1e-9  # rad per segment: rounding errors of a straight body that turns
+_STEPS = 6  # until frequency and smoothing are consistent
 
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """The strongest travelling pattern of the curvature; ``not_told`` says whether it is a wave."""
+    """The strongest travelling pattern of the curvature; ``not_told`` is None if it is a wave."""
 
     waves: float
     """Wavelengths on the body."""
@@ -49,12 +49,12 @@ class Wave:
 
     @property
     def coarse(self) -> bool:
-        """Whether the frames are too far apart to see which way the pattern moved, and how far."""
+        """Whether frames are too far apart to see the direction and shift of the pattern."""
         return self.frames_a_cycle < LEAST_FRAMES
 
     @property
     def not_told(self) -> str | None:
-        """Why frequency, length and direction are not measured; None if they are."""
+        """Reason why frequency, length and direction are unknown, or None."""
         if self.share < LEAST_SHARE:
             share = below(100.0 * self.share, 100.0 * LEAST_SHARE, digits=0)
             return (
@@ -86,7 +86,7 @@ class Wave:
 
 
 def below(value: float, limit: float, digits: int = 1) -> str:
-    """Return a number below a limit with as many digits as show that it is below."""
+    """A number with enough digits to show that it is below a limit."""
     while float(text := f"{value:.{digits}f}") >= limit and digits < 12:
         digits += 1
     return text
@@ -95,8 +95,8 @@ def below(value: float, limit: float, digits: int = 1) -> str:
 def measure_wave(track: Track) -> Wave:
     """Fit one travelling wave: first complex principal component of the analytic curvature.
 
-    Its phase falls along the body when the wave runs from head to tail; the slope is the number of
-    waves. A reversal within the recording lowers ``share`` and is counted in ``headward``.
+    The slope of its phase is the number of waves; it falls towards the tail if the wave runs that
+    way. A reversal within the recording lowers ``share`` and counts in ``headward``.
     """
     number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
     if missing_frames(number):
@@ -122,7 +122,7 @@ def measure_wave(track: Track) -> Wave:
 
 
 def _of_runs(track: Track, number: Ints) -> Wave:
-    """Wave of a recording with gaps: only runs of frames count."""
+    """Wave of a recording with gaps, from runs of frames."""
     curvature = smooth_curvature(track.angles_rad)
     found = gapped_wave(number, curvature)
     slope = _slope(found.mode)
@@ -140,7 +140,7 @@ def _of_runs(track: Track, number: Ints) -> Wave:
 
 
 def _slope(mode: Complexes) -> float:
-    """Signed waves on the body, by the phase of a mode (N,) along it."""
+    """Signed waves on the body, from the phase of a mode (N,)."""
     s = np.arange(len(mode)) / SEGMENTS
     fitted = np.polyfit(s, np.unwrap(np.angle(mode)), 1, w=np.abs(mode))
     return float(fitted[0] / (2.0 * np.pi))
@@ -151,11 +151,10 @@ def _bends(curvature: Floats) -> bool:
 
 
 def _turns_a_frame(phasor: Floats) -> float:
-    """How far the pattern (T,) turns from frame to frame, weighted by its energy.
+    """Turns of the pattern (T,) per frame, weighted by its energy.
 
-    Noise turns at any rate, so the phasor is smoothed over time as the joints are, well above the
-    frequency that comes out. The first and the last cycle count less and less towards the ends: the
-    analytic signal treats a recording as periodic.
+    The phasor is smoothed over time, well above the resulting frequency. The first and the last
+    cycle are tapered: the analytic signal treats a recording as periodic.
     """
     turns, smooth = 0.5, phasor
     for step in range(_STEPS):
@@ -169,10 +168,10 @@ def _turns_a_frame(phasor: Floats) -> float:
 
 
 def _headward(runs: Sequence[Floats], cycle: float) -> float:
-    """Part of the frames of runs (T, N) whose pulse speed is negative ([PT] 2.4, whole body).
+    """Part of the frames of runs (T, N) with negative pulse speed ([PT] 2.4, whole body).
 
-    Least squares of ``curvature_t = -U curvature_s``, its two sums taken over a quarter of a cycle
-    around each frame, as a single frame's difference is mostly noise.
+    Least squares of ``curvature_t = -U curvature_s`` over a quarter of a cycle around each frame,
+    because a single difference is mostly noise.
     """
     negative = []
     for curvature in runs:

@@ -1,8 +1,8 @@
 """The angle track: tangent angles along the path of the head, extended piece by piece.
 
-[PT] 2.6.4 interpolates the angles again and again, a fraction of a point at a time, which blurs
-them. Here the samples stay untouched and one accumulated shift gives the head's place on them. So
-with no sliding every point of the body passes through the angles of the head exactly.
+[PT] 2.6.4 interpolates the angles repeatedly, which blurs them. Here the samples stay as they are
+and one accumulated shift places the head on them. Without slip every point of the body passes
+through the angles of the head exactly.
 """
 
 import copy
@@ -35,7 +35,7 @@ class AngleTrack:
         return float(self._samples[-1])
 
     def append(self, piece_rad: Floats) -> None:
-        """Add ``piece_rad`` (n,), oldest (tail side) first, as it is."""
+        """Add ``piece_rad`` (n,), oldest (tail side) first."""
         self._samples = np.concatenate([self._samples, piece_rad])
 
     def with_piece(self, piece_rad: Floats) -> "AngleTrack":
@@ -51,7 +51,7 @@ class AngleTrack:
         return other
 
     def restart(self, body_rad: Floats) -> None:
-        """Go on from a body (N,), head first, that came about otherwise: its head is at the end."""
+        """Append a body (N,), head first, that did not follow the track; its head is the end."""
         self.append(body_rad[::-1])
 
     def body_rad(self, head: float) -> Floats:
@@ -71,12 +71,12 @@ class AngleTrack:
         return np.asarray(body + part * (before - body))
 
     def bodies_rad(self, first: int, last: int) -> Floats:
-        """(n, N) ``body_rad`` at the whole heads from ``first`` to ``last``, both included."""
+        """(n, N) ``body_rad`` at the whole heads from ``first`` to ``last``, inclusive."""
         heads = np.arange(first, last + 1)[:, None]
         return np.asarray(self._samples[heads - np.arange(1, self.points + 1)])
 
     def at_rad(self, sample: Floats) -> Floats:
-        """Angles at places on the track, between samples linearly; clamped to its ends."""
+        """Angles at places on the track, linearly interpolated and clamped to its ends."""
         return np.asarray(np.interp(sample, np.arange(self.end), self._samples))
 
     def displacement(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
@@ -85,5 +85,5 @@ class AngleTrack:
         return np.array([np.cos(angles).sum(), np.sin(angles).sum()])
 
     def samples(self, start: int) -> Floats:
-        """Samples from ``start`` on."""
+        """Samples from index ``start``."""
         return self._samples[start:]

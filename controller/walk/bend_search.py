@@ -1,7 +1,7 @@
 """Bend search: bends of the mean line over two half bodies at which a piece of track costs least.
 
-Each bend is over its limit, in [-1, 1]. About the best so far six others are judged, a hexagon, and
-then where the parabola through these seven costs is least.
+Bends are relative to their limit, in [-1, 1]. A hexagon about the best bends is judged, then the
+minimum of the parabola through these seven costs.
 """
 
 from typing import NamedTuple
@@ -23,7 +23,7 @@ _STEP = np.array([0.25, 0.5])
 
 
 class Vertex(NamedTuple):
-    """Where a parabola is least."""
+    """Minimum of a parabola."""
 
     bends: Floats
     """(2,)"""
@@ -39,13 +39,13 @@ def hexagon(bends: Floats) -> Floats:
 def vertex(bends: Floats, cost: float, costs: list[float]) -> Vertex:
     """Vertex of the parabola through ``cost`` at ``bends`` (2,) and ``costs`` at its hexagon.
 
-    At most a step away; at ``bends`` itself where the parabola has no least value. A hexagon that
-    the limit cuts off is treated as a whole one: the result is judged like all others.
+    The vertex is at most a step away, and at ``bends`` if the parabola has no minimum. A hexagon
+    that the limit cuts off is used as if it were complete: the result is judged like all others.
     """
     pairs = list(zip(costs[::2], costs[1::2], strict=True))
     slopes = [0.5 * (ahead - back) for ahead, back in pairs]
     curves = [ahead + back - 2.0 * cost for ahead, back in pairs]
-    # least squares for the slope, as three axes give two numbers; they give all three curvatures
+    # least squares: three axes give two slopes, and all three curvatures
     slope = (slopes[0] + 0.5 * (slopes[1] - slopes[2])) / 1.5, 0.5 * (slopes[1] + slopes[2])
     xx, xy = curves[0], 0.5 * (curves[1] - curves[2])
     yy = 0.5 * (curves[1] + curves[2]) - 0.25 * xx

@@ -1,10 +1,9 @@
-"""The course: the path in force through the waypoints, and how far the body has come on it.
+"""The course: the path in force through the waypoints, and the body's progress on it.
 
-A waypoint counts when the body's centre is near it. Where the body passes by one, is three quarters
-of its length off the path, or stands still, another path is planned from its head, in its
-direction, off the places where it stood still. The planning is spread over several control cycles;
-until it is done, the body goes on along the old path. Other waypoints may be set while the body is
-on its way.
+A waypoint counts when the body's centre is near it. Another path is planned from the head if the
+body passes by a waypoint, is 0.75 body lengths off the path, or stalls. That path avoids the places
+of earlier stalls. The planning is spread over control cycles; until it ends, the body follows the
+old path. The waypoints may change during the motion.
 """
 
 import math
@@ -21,9 +20,9 @@ from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.replanning import PathPlanner, PathRequest, Replanning
 
 _OFF_PATH_BODIES = 0.75
-# Body lengths of travel before another path may be planned: turning back needs about as much.
+# Body lengths of travel before another path may be planned: a turn needs about as much.
 _REPLAN_AFTER_BODIES = 2.0
-# A body that gains less than this on its path over so much travel stands still.
+# A body that gains less than this on its path over this travel is stalled.
 _STALL_BODIES = 0.25
 _STALL_AFTER_BODIES = 5.0
 _KEPT_M = 0.3
@@ -38,7 +37,8 @@ _BEYOND = 1.5
 def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -> float:
     """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
 
-    The path is taken to go on straight past its end, or the last carrot would turn the body around.
+    The path continues straight beyond its end, so that the last carrot does not turn the body
+    around.
     """
     at = along_m + carrot_m
     carrot = path.position(min(at, path.length_m))
@@ -51,8 +51,6 @@ def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -
 
 @dataclass(frozen=True, slots=True)
 class _Onward:
-    """A path that goes on otherwise than before."""
-
     path: SplinePath
     passed_m: list[float]
     """Arc lengths at the waypoints."""
@@ -79,12 +77,12 @@ class OnCourse:
 
     @property
     def missed(self) -> int:
-        """How often another path was laid to a waypoint."""
+        """Number of paths planned again because the body missed a waypoint."""
         return self.course.missed
 
     @property
     def replanned(self) -> str | None:
-        """Why another path was laid in the last step, if one was."""
+        """Reason for a new path in the last step, or None."""
         return self.course.replanned
 
     @property
@@ -98,7 +96,7 @@ class OnCourse:
 
 
 class Course:
-    """Waypoints in order, and the path to those that are left."""
+    """Waypoints in order, and the path to the remaining ones."""
 
     def __init__(
         self,
@@ -112,17 +110,10 @@ class Course:
         travel: float = 0.0,
         feedback: bool = True,
     ) -> None:
-        """Plan the first path.
+        """Plan the first path from ``start_m`` (2,), the head, through the waypoints in order.
 
-        Args:
-            plan: plans every path.
-            waypoints_m: in order.
-            start_m: (2,) where the head is.
-            radius_m: how near to a waypoint the centre has to come.
-            length_m: of the body.
-            travel_per_body: a body length of travel, in the motion's own unit.
-            travel: of the motion at its begin.
-            feedback: whether another path is laid where one failed.
+        A centre within ``radius_m`` counts. ``travel`` and ``travel_per_body`` (a body length) have
+        the motion's own unit. ``feedback``: a failed path is replaced.
 
         Raises:
             InputError: as the planner.
@@ -131,7 +122,7 @@ class Course:
         self._plan = plan
         self.waypoints_m = np.asarray(waypoints_m, float)
         """(k, 2) in order."""
-        self._goals_m: list[list[float]] = self.waypoints_m.tolist()  # to numbers once, for speed
+        self._goals_m: list[list[float]] = self.waypoints_m.tolist()  # plain numbers, for speed
         self._radius_m, self._length_m = radius_m, length_m
         self._per_body, self._feedback = travel_per_body, feedback
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
@@ -160,15 +151,15 @@ class Course:
         return self.reached == len(self._goals_m)
 
     def ahead_m(self, reach_m: float) -> Floats:
-        """(2,) the next waypoint, or a point of the path before it, ``reach_m`` ahead."""
+        """(2,) the point ``reach_m`` ahead on the path, at most the next waypoint."""
         at = min(float(self._along_m[0]) + reach_m, self._passed_m[self.reached])
-        return np.asarray(self.path.position(at))  # its end, where it leads to no waypoint yet
+        return np.asarray(self.path.position(at))  # the path's end if it leads to no waypoint yet
 
     @property
     def next_waypoint(self) -> tuple[Floats, float] | None:
-        """(2,) the next one, and the arc length at which the path passes it; None after the last.
+        """The next waypoint (2,) and its arc length on the path; None after the last.
 
-        The arc length is infinite where the path leads not to it.
+        The arc length is infinite if the path does not lead to it.
         """
         if self.complete:
             return None
@@ -176,12 +167,12 @@ class Course:
 
     @property
     def leads_on(self) -> bool:
-        """Whether the path leads to every waypoint that is left."""
+        """Whether the path leads to every remaining waypoint."""
         return not math.isinf(self._passed_m[-1])
 
     @property
     def astray(self) -> bool:
-        """Whether the way to the next waypoint has been missed before."""
+        """Whether the next waypoint has been missed before."""
         return self._missed_before == self.reached
 
     @property
@@ -191,7 +182,7 @@ class Course:
 
     @property
     def head_along_m(self) -> float:
-        """The same of the head."""
+        """Arc length of the path point nearest to the head."""
         return float(self._along_m[1])
 
     def path_m(self, count: int) -> Floats:
@@ -204,7 +195,7 @@ class Course:
         head_m: Floats,
         fall_back: Callable[[bool], None] = lambda lost: None,
     ) -> bool:
-        """Note how far the body has come; count a waypoint, and return True, if it is near it.
+        """Update the progress; count a waypoint and return True if the centre is near it.
 
         Arguments as in ``follow``.
         """
@@ -217,7 +208,7 @@ class Course:
         if math.hypot(x_m - centre_m[0], y_m - centre_m[1]) > self._radius_m:
             return False
         self.reached += 1
-        self._replanning = None  # it would lead to this waypoint first
+        self._replanning = None  # its path would lead to this waypoint first
         fall_back(False)
         return True
 
@@ -231,15 +222,8 @@ class Course:
     ) -> None:
         """Count a waypoint when the centre is near it; request another path if this one failed.
 
-        ``continue_planning`` plans it.
-
-        Args:
-            centre_m: (2,) of mass.
-            head_m: (2,)
-            heading_rad: of the body; asked only for another path.
-            travel: of the motion since its begin, whether or not the body came on.
-            fall_back: called with False when a waypoint is reached.
-
+        ``heading_rad`` is called only for another path. ``travel`` counts whether or not the body
+        advanced. ``fall_back`` is called with False when a waypoint is reached.
         """
         self._travel = travel
         if self.observe(centre_m, head_m, fall_back) or self.complete or self.is_planning:
@@ -259,17 +243,14 @@ class Course:
         return self._replanning is not None
 
     def cancel_planning(self) -> None:
-        """Drop the path that was requested, for a body that moves otherwise meanwhile."""
+        """Drop the requested path."""
         self._replanning = None
 
     def continue_planning(self, fall_back: Callable[[bool], None] = lambda lost: None) -> None:
-        """Do a cycle's work on the path that was requested; when it is done, it is in force.
+        """Do one cycle's work on the requested path; put it in force when it is complete.
 
-        If no safe path is found, the old one stays.
-
-        Args:
-            fall_back: called with whether the same waypoint was missed again.
-
+        If no safe path is found, the old one stays. ``fall_back`` is called with whether the same
+        waypoint was missed again.
         """
         replanning = self._replanning
         if replanning is None or not replanning.carry_on():
@@ -291,16 +272,10 @@ class Course:
         is_clear: Callable[[Floats], bool],
         heading_rad: Callable[[], float],
     ) -> None:
-        """Plan again what lies beyond the next piece of the path, as more of the ground is known.
+        """Plan the path again beyond its next piece, because more of the ground is known.
 
-        A piece that is not clear any more is left at once: then the path begins at the head, in the
-        body's direction. Where no path is found, the old one stays.
-
-        Args:
-            why: for ``replanned``.
-            is_clear: of points (n, 2).
-            heading_rad: of the body.
-
+        If that piece is not clear (test of points (n, 2)), the new path begins at the head, in the
+        body's direction. If no path is found, the old one stays.
         """
         path, along_m = self.path, float(self._along_m[1])
         join_m = min(along_m + _KEPT_M, path.length_m)
@@ -326,28 +301,17 @@ class Course:
         return float(self._gap_m[0])
 
     def lay_from_here(self, why: str, heading_rad: Callable[[], float]) -> None:
-        """Request another path from the head, in the body's direction; it counts as no miss.
-
-        ``continue_planning`` plans it. If no safe path is found, the old one stays.
-
-        Args:
-            why: for ``replanned``.
-            heading_rad: of the body.
-
-        """
+        """Request another path from the head, in the body's direction; it counts as no miss."""
         self._request(why, heading_rad, is_miss=False)
 
     def lead_to(self, left_m: Floats, heading_rad: Callable[[], float]) -> None:
-        """Go on to waypoints (k, 2) instead of those that are left.
+        """Replace the remaining waypoints by (k, 2) others; none end the course here.
 
-        Where they begin with those, the path goes on from its end; else it begins at the head.
-
-        Args:
-            left_m: in order; none to end here.
-            heading_rad: of the body; asked only for a path from the head.
+        If the new ones begin with the remaining ones, the path is extended from its end; else it
+        begins at the head. ``heading_rad`` is called only then.
 
         Raises:
-            InputError: as the planner; nothing has changed then.
+            InputError: as the planner; then nothing has changed.
 
         """
         before, self._replanning = (self.waypoints_m, self._goals_m), None
@@ -374,7 +338,7 @@ class Course:
     def _onward(self, join_m: float) -> "_Onward":
         """Keep the path up to ``join_m``, and plan from there.
 
-        It goes on in its direction, unless it ends there and bends little.
+        The new part keeps the path's direction, unless the path ends there and the bend is small.
 
         Raises:
             InputError: as the planner.
@@ -397,12 +361,11 @@ class Course:
         gaps_m = [more_m[-1], *left_m[np.isinf(passes)]]
         beyond_m = float(np.hypot(*np.diff(gaps_m, axis=0).T).sum())
         whole = SplinePath.tabulated(np.vstack([kept_m, more_m[1:]]))
-        # tabulated again it is a hair shorter: its last waypoint is not beyond its end
+        # tabulating again shortens the path slightly: keep its last waypoint within it
         passes = [at if math.isinf(at) else min(at, whole.length_m) for at in passes]
         return _Onward(whole, [*behind, *passes], whole.length_m + _BEYOND * beyond_m)
 
     def _failing(self, centre_m: Floats) -> str | None:
-        """Why the path in force has failed; None while it holds."""
         if self._is_stalled:
             return "no advance on the path"
         if self._has_passed(centre_m):
@@ -412,35 +375,34 @@ class Course:
         return None
 
     def _note_gain(self) -> None:
-        """Remember at which travel the body last came on by a share of its length."""
         along_m = float(self._along_m[0])
         if along_m > self._gained_m + _STALL_BODIES * self._length_m:
             self._gained_m, self._gained_at = along_m, self._travel
 
     @property
     def _is_stalled(self) -> bool:
-        """Whether the motion has travelled far, and the body not."""
         return (self._travel - self._gained_at) / self._per_body > _STALL_AFTER_BODIES
 
     def _has_passed(self, centre_m: Floats) -> bool:
-        """Whether the body is beyond the next waypoint on the path, and did not come near it."""
+        """Whether the body is beyond the next waypoint on the path without having come near it."""
         path, end_m = self.path, self.path.length_m
         along_m = float(self._along_m[0])
-        if along_m >= end_m - 1e-6:  # distance beyond the end, along the path's last direction
+        if (
+            along_m >= end_m - 1e-6
+        ):  # add the distance beyond the end, along the path's last direction
             last = path.position([end_m - 0.05, end_m])
             ahead = (last[1] - last[0]) / 0.05
             along_m += float((centre_m - last[1]) @ ahead)
         return bool(along_m > self._passed_m[self.reached] + self._radius_m)
 
     def _request(self, why: str, heading_rad: Callable[[], float], *, is_miss: bool) -> None:
-        """Request a path from the head through the waypoints that are left."""
         points_m = np.vstack([self._followers_m[1], self.waypoints_m[self.reached :]])
         stalls_m, number = np.array(self._stalls_m).reshape(-1, 2), self.reached + 1
         request = PathRequest(why, points_m, heading_rad(), stalls_m, number, is_miss)
         self._replanning = Replanning(request, self._plan)
 
     def _lay(self, from_m: Floats, heading_rad: float | None) -> None:
-        """Plan from a point, with the body's heading, through the waypoints that are left."""
+        """Plan from a point, with the body's heading, through the remaining waypoints."""
         points_m = np.vstack([from_m, self.waypoints_m[self.reached :]])
         stalls_m = np.array(self._stalls_m).reshape(-1, 2)
         number = self.reached + 1
@@ -448,7 +410,7 @@ class Course:
         self._follow_path(self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number))
 
     def _follow_path(self, path: SplinePath) -> None:
-        """Put a path in force that begins at the head, and leads to the waypoints left."""
+        """Put a path in force that begins at the head."""
         self.path = path
         self._gained_m, self._gained_at = 0.0, self._travel
         self._along_m[:] = 0.0
@@ -456,9 +418,9 @@ class Course:
         self._passed_m = [0.0] * self.reached + self._passes(self.path, left_m)
 
     def _passes(self, path: SplinePath, waypoints_m: Floats) -> list[float]:
-        """Arc lengths of a path at waypoints (k, 2), infinite from the first that it leads not to.
+        """Arc lengths of a path at waypoints (k, 2); infinite from the first beyond its reach.
 
-        A path on a map that does not reach a waypoint yet ends before it.
+        A path on a partial map may end before a waypoint.
         """
         passes, on = path.passes(waypoints_m), True
         for k, (waypoint, at) in enumerate(zip(waypoints_m, passes, strict=True)):

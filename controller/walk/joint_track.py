@@ -1,8 +1,8 @@
 """Joint track: joint goals along the path of the head, with a continuous first derivative.
 
-Joint angles are known at whole heads, where the skeleton falls on the samples; between them a
-quadratic B-spline runs, so that slope is continuous and the second derivative is known everywhere.
-That is what lets a time law keep joint speed *and* acceleration within limits.
+Joint angles are known at whole heads, where the skeleton falls on the samples. A quadratic B-spline
+connects them, so the second derivative is known everywhere and a time law can limit joint speed
+*and* acceleration.
 """
 
 import copy
@@ -25,14 +25,10 @@ class JointTrack:
         joints_of: Callable[[Floats], Floats],
         limit_rad: ArrayLike = np.inf,
     ) -> None:
-        """Follow ``track``.
+        """Follow ``track``; ``joints_of`` maps skeletons (..., N) to joints (..., J).
 
-        Args:
-            track: grown by others.
-            joints_of: maps skeletons (..., N) to joints (..., J).
-            limit_rad: (J,) half ranges; a window between two shapes that bends further is kept to
-                them, and the measured heading makes up for it in the next decision.
-
+        A window between two shapes that bends beyond ``limit_rad`` (J,) is clipped. The next
+        decision corrects the resulting heading.
         """
         self.track = track
         self._limit_rad = np.asarray(limit_rad, dtype=float)
@@ -47,7 +43,7 @@ class JointTrack:
         return np.asarray(clipped)
 
     def on(self, track: AngleTrack) -> "JointTrack":
-        """Return a copy on a track that begins as its own."""
+        """Return a copy on a track that begins like its own."""
         other = copy.copy(self)
         other.track = track
         return other
@@ -55,7 +51,7 @@ class JointTrack:
     def recent(self, first: int) -> tuple["JointTrack", int]:
         """Return a copy whose tables begin at a head, and the number of samples left out.
 
-        Its heads count from the begin of the track that is left.
+        Its heads count from the start of the remaining track.
         """
         other, first = copy.copy(self), max(first, self.first)
         left_out = first - self.track.points
@@ -64,17 +60,17 @@ class JointTrack:
         return other, left_out
 
     def restart(self) -> None:
-        """Begin again at the end of the track, where the body lies now."""
+        """Begin again at the end of the track, where the body is."""
         self.first = self.track.end
         self._q = self._joints_of(self.track.body_rad(float(self.first)))[None]
 
     @property
     def last(self) -> int:
-        """Largest head at which the goal no longer depends on what will be appended, plus one."""
+        """Largest head at which the goal does not depend on future samples, plus one."""
         return self.first + len(self._q) - 1
 
     def grow(self) -> bool:
-        """Read the samples that were appended to the track; return true if there were any."""
+        """Read the samples appended to the track; return whether there were any."""
         if self.track.end == self.last:
             return False
         bodies = self.track.bodies_rad(self.last + 1, self.track.end)
@@ -82,16 +78,16 @@ class JointTrack:
         return True
 
     def goal_rad(self, head: float) -> Floats:
-        """(J,) joint angles; beyond both ends of the known track the spline runs on straight."""
+        """(J,) joint angles; beyond the ends of the known track the spline continues straight."""
         goal = np.empty(self._q.shape[1])
         _spline(self._q, head - self.first, goal)
         return goal
 
     def bends(self, start: int) -> tuple[Floats, Floats]:
-        """Largest |dq/dS| and |d2q/dS2| over the joints near each whole head from ``start`` on.
+        """Largest |dq/dS| and |d2q/dS2| over the joints near each whole head from ``start``.
 
         Returns:
-            Two arrays (last - start + 1,): rad per segment, rad per segment squared, each the
+            Two arrays (last - start + 1,): rad per segment and rad per segment squared, each the
             largest within one segment to either side.
 
         """
@@ -124,7 +120,7 @@ def _bends(q: Floats, slope: Floats, turn: Floats) -> None:
 
 @compiled("void(float64[:, ::1], float64, float64[::1])", makes_arrays=False)
 def _spline(q: Floats, at: float, goal: Floats) -> None:
-    """Quadratic B-spline through the table ``q`` (n, J) at place ``at`` into ``goal`` (J,)."""
+    """Write the quadratic B-spline through table ``q`` (n, J) at ``at`` into ``goal`` (J,)."""
     last = len(q) - 1
     middle = int(min(max(np.rint(at), 0.0), float(last)))
     t = at - middle + 0.5

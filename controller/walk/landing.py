@@ -1,8 +1,8 @@
-"""Landing: a body swims along its course until it meets the ground, and walks on from there.
+"""Landing: a body swims along its course until it meets the ground, then walks.
 
-The measured pose alone shows the ground: a body that swims makes the same way in every cycle, and
-hardly any once its head lies on the beach. Legs unfold and the spine changes its wave in one join
-without a step (``controller.motion.source_switch``).
+Only the measured pose shows the ground: a swimming body advances equally in every cycle, and hardly
+at all once its head lies on the beach. The change of gait is one join without a step
+(``controller.motion.source_switch``).
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from snakewalk.controller.walk.steered_gait import SteeredGait
 
 
 class Landing(MotionWrapper, OnCourse):
-    """A ``MotionSource`` with ``PathProgress``: one steered gait, and another one ashore."""
+    """A ``MotionSource`` with ``PathProgress``: a steered gait in water, and another one ashore."""
 
     pulse_m_s = 0.0
     decision: Decision | None = None
@@ -36,10 +36,10 @@ class Landing(MotionWrapper, OnCourse):
 
         Args:
             swim: the gait in the water.
-            make_walk: of the cycles so far; the gait on land, on the same course.
-            robot: that both move.
-            headway: share of the best way of a cycle; a cycle that makes less is the last.
-            on_ashore: called with a text when the ground is met.
+            make_walk: makes the gait on land, on the same course, from the number of cycles so far.
+            robot: the robot of both gaits.
+            headway: share of the best advance per cycle; a cycle below it ends the swim.
+            on_ashore: called with a text when the body meets the ground.
 
         """
         OnCourse.__init__(self, swim.course)
@@ -54,7 +54,7 @@ class Landing(MotionWrapper, OnCourse):
 
     @property
     def ashore(self) -> bool:
-        """Whether it has met the ground."""
+        """Whether the body has met the ground."""
         return self._swim is None
 
     def begin(self, view: BodyView) -> Floats:
@@ -62,7 +62,7 @@ class Landing(MotionWrapper, OnCourse):
         return self.goal_rad()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         goal = self._switch.step(dt_s, view)
         if self._swim is not None and int(self._swim.cycles) > self._cycle:
             self._cycle = int(self._swim.cycles)
@@ -70,7 +70,6 @@ class Landing(MotionWrapper, OnCourse):
         return goal
 
     def _end_cycle(self, swim: SteeredGait, view: BodyView) -> None:
-        """Weigh the way of a whole cycle; walk if it is too short, and waypoints are left."""
         if self._before is not None:
             way_m = view.advance_since_m(self._before)
             if way_m < self._headway * self._best_m and not self.course.complete:

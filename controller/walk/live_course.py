@@ -1,7 +1,7 @@
-"""A live course: a person sets the waypoints of a motion while it is on its way.
+"""A live course: an operator sets the waypoints of a motion while it runs.
 
-The motion is any that goes along a course. At the last waypoint it comes to rest, holds its shape
-and waits for another; it is done when the person ends it.
+The motion rests at the last waypoint, holds its shape and waits for another. It is done when the
+operator ends it.
 """
 
 import math
@@ -55,16 +55,15 @@ class LiveCourse(MotionWrapper, OnCourse):
         check: Callable[[Floats], None],
         on_event: Callable[[str, str], None],
     ) -> None:
-        """Go on to the waypoints that the motion's course has.
+        """Follow the waypoints of the motion's course.
 
         Args:
             motion: along a course.
-            commands: set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``; others, and
-                those that could not be read, are reported as rejected.
-            check: raises ``InputError`` for a point (2,) where no waypoint may be, whatever path
-                leads there.
-            on_event: called with ("operator", text) for an action that was done, ("refused", text)
-                for one that was not.
+            commands: returns those set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``.
+                Other values are reported as rejected.
+            check: raises ``InputError`` for a point (2,) that cannot be a waypoint on any path.
+            on_event: called with ("operator", text) for an action, ("refused", text) for a
+                rejection.
 
         """
         OnCourse.__init__(self, motion.course)
@@ -78,27 +77,27 @@ class LiveCourse(MotionWrapper, OnCourse):
 
     @property
     def waypoints_m(self) -> Floats:
-        """(w, 2) in force, those reached first."""
+        """(w, 2) in force, reached ones first."""
         return self.course.waypoints_m
 
     @property
     def replanned(self) -> str | None:
-        """Why another path was laid in the last step, if one was."""
+        """Reason for a new path in the last step, or None."""
         return self._changed or self.course.replanned
 
     @property
     def done(self) -> bool:
-        """Whether the run was ended and the motion rests."""
+        """Whether the operator has ended the run and the motion rests."""
         return self._ends and self._motion.done
 
     @property
     def pulse_m_s(self) -> float:
-        """How fast the shape travels along the body."""
+        """Speed of the shape along the body."""
         return self._motion.pulse_m_s
 
     @property
     def decision(self) -> Decision | None:
-        """Made in the last step, if one was."""
+        """Decision of the last step, or None."""
         return self._motion.decision
 
     def begin(self, view: BodyView) -> Floats:
@@ -106,7 +105,7 @@ class LiveCourse(MotionWrapper, OnCourse):
         return self._motion.begin(view)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s``, and carry out what was set."""
+        """Advance by ``dt_s``, and carry out the commands."""
         self._changed = None
         goal_rad = self._motion.step(dt_s, view)
         self._time_s += dt_s
@@ -161,7 +160,7 @@ class LiveCourse(MotionWrapper, OnCourse):
         """(2,) of X,Y in metres.
 
         Raises:
-            InputError: the point does not exist, none may be there, or no path leads on to it.
+            InputError: the text is not a point, it repeats the last one, or none is allowed there.
 
         """
         try:
@@ -182,5 +181,5 @@ class LiveCourse(MotionWrapper, OnCourse):
 
 
 def _shown(point_m: Floats) -> str:
-    x_m, y_m = (round(float(at), 2) + 0.0 for at in point_m)  # no -0.00
+    x_m, y_m = (round(float(at), 2) + 0.0 for at in point_m)  # avoids -0.00
     return f"({x_m:.2f}, {y_m:.2f})"

@@ -1,8 +1,7 @@
-"""A walk over ground that it gets to know on its way, from a map that grows.
+"""A walk over unknown ground, on a map that grows as the snake moves.
 
-The map replaces the ground for all parts of the walk: its path, its predictions, and the pitch that
-fits it to the ground under it. Unknown places of the map are used as they are filled in there, and
-no path leads over them.
+The map replaces the ground in all parts of the walk: path, predictions, and pitch. Unknown places
+use the map's filled-in heights, and no path leads over them.
 """
 
 from collections.abc import Callable
@@ -19,7 +18,7 @@ from snakewalk.controller.walk.pilot import Pilot
 
 
 class MapWalk(MotionWrapper, OnCourse):
-    """A ``MotionSource`` with ``PathProgress``: a pilot, and a map that changes under it."""
+    """A ``MotionSource`` with ``PathProgress``: a pilot on a map that changes."""
 
     def __init__(
         self,
@@ -30,15 +29,10 @@ class MapWalk(MotionWrapper, OnCourse):
         change_ground: Callable[[HeightField], None],
         replan_m: float,
     ) -> None:
-        """Begin with the map as it is.
+        """Begin with the current map, to which the caller adds pictures.
 
-        Args:
-            pilot: of the walk, whose course plans by ``planner``.
-            ground_map: someone else adds pictures to it.
-            planner: the pilot's.
-            change_ground: called with the ground by which the pilot predicts and bends.
-            replan_m: travel of the walk between two plans of a path that ends before a waypoint.
-
+        ``planner`` is the course's. ``change_ground`` sets the ground of the pilot's predictions
+        and pitch. A path that ends before a waypoint is planned again after ``replan_m`` of travel.
         """
         OnCourse.__init__(self, pilot.course)
         MotionWrapper.__init__(self, pilot)
@@ -48,12 +42,12 @@ class MapWalk(MotionWrapper, OnCourse):
 
     @property
     def pulse_m_s(self) -> float:
-        """How fast the shape travels along the body."""
+        """Speed of the shape along the body."""
         return self._pilot.pulse_m_s
 
     @property
     def decision(self) -> Decision | None:
-        """Made in the last step, if one was."""
+        """Decision of the last step, or None."""
         return self._pilot.decision
 
     def begin(self, view: BodyView) -> Floats:
@@ -61,7 +55,7 @@ class MapWalk(MotionWrapper, OnCourse):
         return self._pilot.begin(view)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         goal_rad = self._pilot.step(dt_s, view)
         self._travel_m += self._pilot.pulse_m_s * dt_s
         if self.course.replanned is not None:
@@ -76,7 +70,7 @@ class MapWalk(MotionWrapper, OnCourse):
         return goal_rad
 
     def _renew(self, view: BodyView) -> None:
-        """Plan again if the path leads over what is seen to be unsafe, or may lead farther now."""
+        """Plan again if the path is now seen to be unsafe, or can lead farther."""
         course = self.course
         ahead_m = course.path.piece_m(course.head_along_m, course.path.length_m)
         if not self._planner.clear(ahead_m):

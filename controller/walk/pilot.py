@@ -1,10 +1,9 @@
 """The pilot: the snake walk along a path, as a motion source with path progress.
 
-It reads the measured body and returns joint goals, has the walker decide on the next shape before
-the track runs out, and counts waypoints.
-
-With ``feedback`` off it believes that the body goes where the track goes, without slip: the printed
-method, kept to show what a body with friction makes of it.
+It reads the measured body, returns joint goals and counts waypoints. It requests the next shape
+before the track ends.
+With ``feedback`` off it assumes that the body follows the track without slip. This is the printed
+method, kept to show its effect on a body with friction.
 """
 
 import copy
@@ -37,7 +36,7 @@ from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.twin_answers import Coasting, TwinAsker
 from snakewalk.controller.walk.twin_rollout import LENGTH_BODIES, TwinRollout
 
-# Segments of track that remain when the next piece is decided: the time law looks ahead.
+# Segments of track left when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
 _THINK_SEGMENTS = 9.0
 """Track on which a decision is thought about, a little in each cycle, before it is needed."""
@@ -45,7 +44,7 @@ _RECENT_SEGMENTS = 30
 """Track behind the head, besides the body, that a twin elsewhere is sent."""
 _PITCH_SMOOTHING_S = 0.1
 
-# Shorter steps are saved up: they are too short to measure a speed.
+# Shorter steps are accumulated: they are too short to measure a speed.
 _SHORTEST_STEP_S = 1e-5
 
 
@@ -55,21 +54,21 @@ class ShapeChooser(Protocol):
     track: AngleTrack
 
     def think(self, look: Callable[[], PathPose]) -> bool:
-        """Spend a cycle on the next decision; only the first call after a decision looks.
+        """Spend a cycle on the next decision; only the first call after a decision calls ``look``.
 
         Returns:
-            Whether there is more to think about.
+            Whether more thinking is useful.
 
         """
         ...
 
     def decide(self, pose: PathPose) -> Decision:
-        """Append the next piece; it is thought out beforehand if there was time for that."""
+        """Append the next piece, prepared by ``think`` if there was time."""
         ...
 
 
 class AimedChooser(Protocol):
-    """Chooses by the direction of an aim alone."""
+    """A chooser that uses only the direction of an aim."""
 
     track: AngleTrack
 
@@ -79,14 +78,14 @@ class AimedChooser(Protocol):
 
 
 class Aimed:
-    """A ``ShapeChooser`` of one that needs no more than a direction, and no time."""
+    """Adapts an ``AimedChooser`` to ``ShapeChooser``."""
 
     def __init__(self, chooser: AimedChooser) -> None:
         self._chooser = chooser
         self.track = chooser.track
 
     def think(self, look: Callable[[], PathPose]) -> bool:
-        """Nothing: it decides at once."""
+        """Return False: it decides at once."""
         return False
 
     def decide(self, pose: PathPose) -> Decision:
@@ -96,14 +95,14 @@ class Aimed:
 
 @runtime_checkable
 class TriesPieces(Protocol):
-    """A ``ShapeChooser`` that tries pieces where it is given the means."""
+    """A ``ShapeChooser`` that tries pieces if ``try_piece`` is set."""
 
     try_piece: Callable[[PathPose, Floats], Rolled] | None
 
 
 @runtime_checkable
 class AsksAboutPieces(Protocol):
-    """A ``ShapeChooser`` that asks about pieces, and may get answers before it decides."""
+    """A ``ShapeChooser`` that asks about pieces; answers may arrive before it decides."""
 
     ask: Callable[[PathPose, Sequence[Floats]], None] | None
     answers: Callable[[], Mapping[int, Rolled | None]]
@@ -114,7 +113,7 @@ class UsesFriction(Protocol):
     """A motion, or a ``ShapeChooser``, whose predictions use friction."""
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Use this friction from now on."""
+        """Use this friction from the next prediction."""
         ...
 
 
@@ -186,15 +185,15 @@ class Pilot(OnCourse):
 
     @property
     def pulse_m_s(self) -> float:
-        """TimeLaw speed u: how fast the shape travels along the body."""
+        """Speed of the shape along the body, from the time law."""
         return self._time_law.speed_segments_s * self._segment_m
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now; before the first step, of the initial shape."""
+        """(J,) current joint targets; before the first step, those of the initial shape."""
         return self._goal_rad
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) from the last steps: the speed of half a step ago, carried on by its change."""
+        """(J,) from the last steps: the speed half a step ago, extrapolated by its change."""
         if self._last_s == 0.0:
             return np.zeros(len(self._goal_rad))
         speed = (self._goal_rad - self._last_rad) / self._last_s
@@ -203,38 +202,38 @@ class Pilot(OnCourse):
         return np.asarray(speed + 0.5 * self._last_s * gain_rad_s2)
 
     def pace(self) -> Pace:
-        """The robot's limits: the next motion is not known."""
+        """The robot's limits, because the next motion is unknown."""
         return self._pace
 
     def begin(self, view: BodyView) -> Floats:
-        """Fit the first shape to the ground under the body; returns the first targets (J,)."""
+        """Fit the first shape to the ground under the body; return the first targets (J,)."""
         self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
         self._last_rad = self._earlier_rad = self._goal_rad
         return self._goal_rad
 
     @property
     def at_end(self) -> bool:
-        """Whether the head has come to the end of the track."""
+        """Whether the head has reached the end of the track."""
         return self.head >= self._time_law.joints.track.end - 1.0
 
     def end_on(self, piece_rad: Floats) -> None:
-        """Append a piece (n,) of track, the last until ``go_on`` or ``restart``."""
+        """Append a piece (n,) of track and decide no more until ``go_on`` or ``restart``."""
         self._chooser.track.append(piece_rad)
         self._decides = False
 
     def go_on(self, think_anew: Callable[[], None]) -> None:
-        """Decide again what comes next; ``think_anew`` of the chooser."""
+        """Resume deciding; ``think_anew`` resets the chooser."""
         think_anew()
         self._decides = True
 
     def watch(self, view: BodyView) -> None:
-        """Count waypoints while something else moves the body."""
+        """Count waypoints while another motion moves the body."""
         self.course.cancel_planning()
         self.course.observe(view.centre_m[:2], view.link_m[0, :2], self._fall_back)
         self.decision = None
 
     def restart(self, view: BodyView, restart: Callable[[Floats], None]) -> None:
-        """Go on, from rest, with the body as it lies; ``restart`` of the chooser gets it (N,)."""
+        """Start again from rest with the measured body (N,); ``restart`` of the chooser gets it."""
         points = self._chooser.track.points
         at = (np.arange(points) + 0.5) * self._links / points - 0.5
         restart(np.interp(at, np.arange(self._links), view.headings_rad))
@@ -249,7 +248,7 @@ class Pilot(OnCourse):
         self._last_s = self._earlier_s = self._saved_s = 0.0
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         self._saved_s += dt_s
         if self._saved_s < _SHORTEST_STEP_S:
             return self._goal_rad
@@ -284,8 +283,8 @@ class Pilot(OnCourse):
     def _think(self, view: BodyView) -> bool:
         """Think about the next piece of track, or decide; return whether that fills the cycle.
 
-        While a path is planned, every second cycle at least is left for that. At rest there is time
-        for both, so the path comes first: the piece depends on it.
+        While a path is planned, at least every second cycle is left for that. At rest the path
+        comes first, because the piece depends on it.
         """
         if not self._decides or (self._at_rest and self.course.is_planning):
             return False
@@ -302,25 +301,24 @@ class Pilot(OnCourse):
         return False
 
     def _move(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on along the track; the goals (J,) there."""
         self._time_law.advance(dt_s)
         goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
         return goal_rad if self._roll is None else self._roll(goal_rad, view, dt_s)
 
     def use_twin(self, twin: TwinRollout) -> None:
-        """Let the chooser try pieces of track on a twin of the robot."""
+        """Let the chooser try pieces of track on a twin."""
         if isinstance(self._chooser, TriesPieces):
             self._twin = twin
             self._chooser.try_piece = self._try_piece
 
     def use_asker(self, asker: TwinAsker) -> None:
-        """Let the chooser ask a twin elsewhere about pieces of track."""
+        """Let the chooser ask a twin in another process about pieces of track."""
         if isinstance(self._chooser, AsksAboutPieces):
             self._asker = asker
             self._chooser.ask, self._chooser.answers = self._ask, asker.results
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Use this friction from now on, in the chooser and in the twin."""
+        """Use this friction in the chooser and in the twins."""
         if isinstance(self._chooser, UsesFriction):
             self._chooser.use_friction(friction)
         if self._twin is not None:
@@ -330,11 +328,11 @@ class Pilot(OnCourse):
 
     @property
     def twin(self) -> TwinRollout | None:
-        """On which pieces of track are tried, where there is one."""
+        """The twin on which pieces of track are tried, or None."""
         return self._twin
 
     def coasting(self, piece_rad: Floats) -> "Pilot":
-        """Return a copy that goes on by itself to the end of the track and a piece (n,) more."""
+        """Return a copy that moves to the end of the track plus a piece (n,), without decisions."""
         now = Coasting(self._time_law, self._roll, self._pitch_rad)
         return self._coasting_from(now, piece_rad)
 
@@ -345,19 +343,17 @@ class Pilot(OnCourse):
         return other
 
     def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
-        """Predict the body on a piece (n,) that would be appended to the track."""
         return self.tried_from(
             Coasting(self._time_law, self._roll, self._pitch_rad), pose, piece_rad
         )
 
     def _ask(self, pose: PathPose, pieces_rad: Sequence[Floats]) -> None:
-        """Ask what becomes of the body on pieces (n,) that would be appended to the track."""
         assert self._asker is not None
         recent = self._time_law.recent(_RECENT_SEGMENTS)
         self._asker.ask(pose, Coasting(recent, self._roll, self._pitch_rad), pieces_rad)
 
     def tried_from(self, state: Coasting, pose: PathPose, piece_rad: Floats) -> Rolled:
-        """Return what becomes of a body that goes on so, on a piece (n,) more of track.
+        """Predict the body that continues from ``state`` on a piece (n,) appended to its track.
 
         Raises:
             PhysicsError: the twin diverged.
@@ -372,7 +368,7 @@ class Pilot(OnCourse):
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
         """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
 
-        The pitch is smoothed over ``_PITCH_SMOOTHING_S``, because the ground is known in facets.
+        The pitch is smoothed over ``_PITCH_SMOOTHING_S``, because the ground consists of facets.
         """
         if self._pitch_fitter is None:
             return goal_rad
@@ -386,9 +382,9 @@ class Pilot(OnCourse):
         return goal_rad + self._pitch_rad
 
     def _ahead(self, view: BodyView) -> tuple[Floats, Floats]:
-        """Head (2,) and headings (L,) of the links when the current goals have become the pitch.
+        """Head (2,) and headings (L,) of the links ``_pitch_lead_s`` ahead on the track.
 
-        The body is taken to follow its track: goals for the ground under it now would come late.
+        The pitch is fitted there because goals for the ground under the body now would be late.
         """
         track, head_m = self._time_law.joints.track, view.link_m[0, :2]
         headings_rad = view.headings_rad
@@ -401,17 +397,17 @@ class Pilot(OnCourse):
         return head_m + pulse * self._segment_m * forward, headings_rad
 
     def _at_links(self, body: Floats) -> Floats:
-        """Values (L,) at the links' middles of values (N,) along the body."""
+        """Values (L,) at the links' middles, from values (N,) along the body."""
         return np.interp(self._middles, self._segments, body)
 
     def path_pose(self, view: BodyView) -> PathPose:
-        """Where the body is, and where its path leads."""
+        """Pose of the body, and its path ahead."""
         offset, aim = self._aim(view)
         at = round(self.along_m / PATH_STEP_M)
         return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
 
     def _path_table(self) -> TabulatedPath:
-        """Table of the path in force, made once a path and waypoint."""
+        """Table of the path in force, made once per path and waypoint."""
         path, course = self.path, self.course
         made_of = path, course.reached
         if self._table is None or self._table_of != made_of:
@@ -423,7 +419,7 @@ class Pilot(OnCourse):
         return self._table
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
-        """Offset from track to world, and the direction of the aim there."""
+        """Offset from track to world, and the world direction of the aim."""
         headings_rad, head_m, centre_m = view.headings_rad, view.link_m[0, :2], view.centre_m[:2]
         believed_rad = self._at_links(self._chooser.track.body_rad(self.head))
         offset = offset_rad(headings_rad, believed_rad)
@@ -438,7 +434,7 @@ class Pilot(OnCourse):
             head_m = self._dead_reckoned(self._start[0], offset)
             along_m = self.path.nearest(head_m, self.along_m)
             return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
-        # The piece begins where the track ends now: aim from where the head will be by then.
+        # The piece begins at the end of the track: aim from the position of the head by then.
         lead_m = (self._chooser.track.end - self.head) * self._segment_m
         heading = headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])

@@ -1,9 +1,9 @@
-"""The snake walk that predicts: W proposes shapes, a rollout says where each would carry the body.
+"""The predictive snake walk: W proposes shapes, and a rollout predicts where each carries the body.
 
-[PT] 2.6.2 with additions for a body on a slope. A state is walked for a part of its length; every
-tenth of a body the rest of it is bent again, as far as the head has not been there. States and
-bends are judged by ``Steering``. W orders the states, so that the walk never repeats itself; the
-rollout chooses among the first of them.
+[PT] 2.6.2 with additions for slopes. A state is walked for a part of its length. Every tenth of a
+body the part that the head has not reached is bent again. ``Steering`` judges states and bends. W
+orders the states, so that the walk never repeats itself; the rollout chooses among the first of
+them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -66,7 +66,7 @@ class _Option:
 
 
 class _Tried(NamedTuple):
-    """A piece of track, and what its rollout costs; many a decision."""
+    """A piece of track and the cost of its rollout."""
 
     cost_m2: float
     progress: float
@@ -88,14 +88,14 @@ class PredictiveWalker:
         joints: int,
         accept: Callable[[Floats], bool] = lambda body: True,
     ) -> None:
-        """Start on the first shape.
+        """Start on the first shape of the library, whose means are zero.
 
         Args:
-            shapes_rad: the library; zero means.
+            shapes_rad: the library.
             walk: limits of the proposed states.
-            make_steering: for the track that this walker grows.
-            joints: of yaw, along the body.
-            accept: whether a body (N,) may be made: joints within limits, nothing touches.
+            make_steering: called with this walker's track.
+            joints: number of yaw joints.
+            accept: whether a body (N,) is within joint limits and does not touch itself.
 
         """
         if len(shapes_rad) == 0:
@@ -131,31 +131,31 @@ class PredictiveWalker:
         """
 
     def restart(self, body_rad: Floats) -> None:
-        """Go on with another state from a body (N,) that came about otherwise than by the track."""
+        """Continue with another state from a body (N,) that did not follow the track."""
         self.track.restart(body_rad)
         self.steering.forget()
         self._option, self._bends = None, np.zeros(2)
         self.think_anew()
 
     def think_anew(self) -> None:
-        """Go on with another state."""
+        """Discard the current thoughts and state."""
         self._thinking, self._until = None, self._at
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Roll out with this friction from now on."""
+        """Roll out with this friction from the next decision."""
         self.steering.use_friction(friction)
 
     def fall_back(self, lost: bool) -> None:
-        """Set whether to go on as a serpenoid: at the very last, steered the same way."""
+        """Set whether to continue as a serpenoid, the last resort, steered the same way."""
         if lost != self._lost:
             self._lost = lost
             self.think_anew()
 
     def think(self, look: Callable[[], PathPose]) -> bool:
-        """Spend a cycle on the next decision; only the first call looks where the body is.
+        """Spend a cycle on the next decision; only the first call calls ``look``.
 
         Returns:
-            Whether there is more to think about.
+            Whether more thinking is useful.
 
         """
         if self._thinking is None:
@@ -166,7 +166,7 @@ class PredictiveWalker:
         return next(self._thinking, False)
 
     def decide(self, pose: PathPose) -> Decision:
-        """Append the best piece of those judged so far; at rest, of all."""
+        """Append the best piece judged so far; at rest, the best of all."""
         if self._thinking is None:
             self.think(lambda: pose)
         while self.track.end == self.track.points and self.think(lambda: pose):
@@ -193,21 +193,19 @@ class PredictiveWalker:
 
     @property
     def _is_new(self) -> bool:
-        """Whether the next piece begins another state."""
         return self._at >= self._until
 
     def _best(self) -> _Tried:
-        """Cheapest piece whose body may be made; the cheapest if none may."""
+        """Cheapest piece with an accepted body; the cheapest of all if no body is accepted."""
         ranked = sorted(self._tried, key=lambda each: each.cost_m2)
         return next(filter(self._may_be_made, ranked), ranked[0])
 
     def _may_be_made(self, tried: _Tried) -> bool:
-        """Whether the body at the end of the proposed piece may be made."""
         old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
         return self._accept(np.concatenate([tried.piece_rad[: self._keep][::-1], old]))
 
     def _tried_best(self, pose: PathPose, best: _Tried) -> _Tried:
-        """Try the best piece on a simulated body where it is steep; where that fails, others."""
+        """On steep ground try the best piece on a simulated body; if it fails, try others."""
         if not self.try_piece or self._walk.tries == 0 or not self.steering.is_steep(pose):
             return best
         found = self._on_twin(pose, best)
@@ -218,19 +216,19 @@ class PredictiveWalker:
             if tried.cost_m2 < found.cost_m2:
                 found = tried
         if found.option is not best.option:
-            self._until = self._at  # another state begins here
+            self._until = self._at  # another state begins
         return found
 
     def _on_twin(self, pose: PathPose, piece: _Tried) -> _Tried:
-        """Return the piece with its cost on the simulated body, and its progress there."""
+        """Return the piece with its cost and progress on the simulated body."""
         assert self.try_piece is not None
         cost_m2, progress = self.steering.cost(self.try_piece(pose, piece.piece_rad))
         return piece._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
 
     def _answered_best(self, best: _Tried) -> _Tried:
-        """Return the piece that is best on a simulated body elsewhere, of those answered in time.
+        """Return the best piece of those that the remote twin has answered in time.
 
-        Without an answer about the best piece on paper, another one has to be good.
+        Without an answer about the best piece on paper, another one must be good.
         """
         found: _Tried | None = None
         is_best_known = False
@@ -249,11 +247,11 @@ class PredictiveWalker:
         if self._in_trouble and not is_best_known:
             return best
         if found.option is not best.option:
-            self._until = self._at  # another state begins here
+            self._until = self._at  # another state begins
         return found
 
     def _ask_about(self, pose: PathPose) -> Iterator[bool]:
-        """Ask about the best piece and others, in trouble about the others first."""
+        """Ask about the best piece and others; in trouble about the others first."""
         best = self._best()
         if self.ask is None or self._lost or self._walk.tries == 0 or not best.cost_m2 < np.inf:
             return
@@ -266,7 +264,7 @@ class PredictiveWalker:
         self.ask(pose, [each.piece_rad for each in self._asked])
 
     def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
-        """Pieces unlike each other, the cheapest first: of the state under way, and of others."""
+        """Dissimilar pieces, cheapest first: of the current state, and of others."""
         self._roll(pose, [(best.option, bends) for bends in FAR])
         if not self._is_new:
             options = self._new_options(pose)
@@ -277,7 +275,7 @@ class PredictiveWalker:
         return self._unlike(best)
 
     def _unlike(self, best: _Tried) -> list[_Tried]:
-        """Return judged pieces that are unlike the best and each other, the cheapest first."""
+        """Return judged pieces that differ from the best and each other, cheapest first."""
         chosen = [best]
         for each in sorted(self._tried, key=lambda each: each.cost_m2):
             if len(chosen) == self._walk.tries:
@@ -292,7 +290,7 @@ class PredictiveWalker:
         return chosen[1:]
 
     def _judge(self, pose: PathPose) -> Iterator[bool]:
-        """Judge options and bends, a batch at a time, the most likely ones first."""
+        """Judge options and bends in batches, the most likely ones first."""
         bends = self._bends[None]
         if self._is_new:
             bends = np.append(SCREEN, bends, axis=0)
@@ -312,9 +310,9 @@ class PredictiveWalker:
         yield from self._ask_about(pose)
 
     def _narrow(self, pose: PathPose) -> Iterator[bool]:
-        """Judge bends about the best, and where a parabola through them is least.
+        """Judge bends about the best, and the minimum of a parabola through them.
 
-        Where the least may lie beyond them, it is done again about the best of them.
+        If the minimum may lie outside, repeat about the best of them.
         """
         for _ in range(2):
             middle = self._best_so_far()
@@ -353,7 +351,7 @@ class PredictiveWalker:
         ]
 
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
-        """Possible next pieces: the rest of the state, or another."""
+        """Possible next pieces: the rest of the current state, or new states."""
         if self._option is not None and not self._is_new:
             state, going_on = self._option.state, self._option.wave_rad[self._at :]
             return [_Option(state, self._option.near, self._base_rad, going_on)]
@@ -362,7 +360,7 @@ class PredictiveWalker:
     def _new_options(
         self, pose: PathPose, carrier: SerpenoidParameters | None = None
     ) -> list[_Option]:
-        """Other states: the smoothest of the first of W; lost, serpenoids."""
+        """Other states: the smoothest of the first of W; as a fallback, serpenoids."""
         points, walk = self.track.points, self._walk
         if self._lost:
             return [self._serpenoid(each) for each in SERPENOIDS]
@@ -382,21 +380,21 @@ class PredictiveWalker:
         ]
 
     def _serpenoid(self, carrier: SerpenoidParameters) -> _Option:
-        """A plain serpenoid for a state's length; it goes on, or begins as the track bends."""
+        """A plain serpenoid of a state's length that continues its carrier or joins the track."""
         points, at = self.track.points, self._phase(carrier)
         waves = carrier.wave_rad(at - 1 + np.arange(self._walked + points + 1), points)
         base = self.track.last_rad - waves[0]
         return _Option(SERPENOID, 1, float(base), waves[1:], carrier, at)
 
     def _phase(self, carrier: SerpenoidParameters) -> int:
-        """Sample of a carrier that comes next: it goes on, or begins as the track bends."""
+        """Next sample of a carrier: it continues, or begins as the track bends."""
         option = self._option
         if option is not None and option.carrier is carrier:
             return option.carrier_at + self._at
         return phase_at_end(self.track, carrier)[1]
 
     def _waves_rad(self, states: Indices) -> Floats:
-        """(n, m) what follows the tails' angles, oldest first; a state repeats itself."""
+        """(n, m) angles after the tails', oldest first; a state repeats itself."""
         shapes = self._shapes[states][:, ::-1]
         join = round(_JOIN * shapes.shape[1]) + 2
         joined = np.linspace(shapes[:, -1], shapes[:, 0], join, axis=1)
@@ -405,7 +403,7 @@ class PredictiveWalker:
         return np.take(whole, np.arange(1, count + 1), axis=1, mode="wrap")
 
     def _roughness(self, angles_rad: Floats) -> Floats:
-        """Mean square (n,) of the joints' accelerations on angles (n, m), in a unit of its own."""
+        """Mean square (n,) of the joints' accelerations on angles (n, m), in arbitrary units."""
         tail_rad = self.track.samples(self.track.end - 2 * self._span)
         rough = np.empty(len(angles_rad))
         _roughness(tail_rad, angles_rad, self._span, rough)
@@ -429,10 +427,10 @@ def _bend(
 
 @compiled("void(float64[::1], float64[:, ::1], int64, float64[::1])")
 def _roughness(tail_rad: Floats, angles_rad: Floats, span: int, rough: Floats) -> None:
-    """Write how rough (n,) joints are on angles (n, m) behind the track's last two spans.
+    """Write the roughness (n,) of the joints on angles (n, m) behind the track's last two spans.
 
-    A joint is the difference of the mean angles over two spans; rough is the mean square of its
-    second differences.
+    A joint is the difference of the mean angles over two spans; its roughness is the mean square of
+    its second differences.
     """
     row = np.empty(len(tail_rad) + angles_rad.shape[1])
     row[: len(tail_rad)] = tail_rad

@@ -1,4 +1,4 @@
-"""A path that is planned again, a little in each control cycle."""
+"""Planning of a new path, spread over control cycles."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -19,28 +19,28 @@ class PathPlanner(Protocol):
     def __call__(
         self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats, number: int = 1
     ) -> SplinePath:
-        """Plan through (n, 2) points in order, from a heading where one is given.
+        """Plan through (n, 2) points in order, from a heading if one is given.
 
-        The path keeps off places ``avoid_m`` (k, 2) where another way exists. ``number`` is that of
-        the second point, a waypoint, for messages about it.
+        The path avoids places ``avoid_m`` (k, 2) if possible. ``number`` is that of the second
+        point, a waypoint, for messages.
         """
         ...
 
 
 @runtime_checkable
 class PlansInSteps(Protocol):
-    """A ``PathPlanner`` may offer this."""
+    """Optional extension of a ``PathPlanner``."""
 
     def in_steps(
         self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats, number: int = 1
     ) -> Steps[SplinePath]:
-        """Plan as a call does; each step is one of at most about a millisecond."""
+        """Plan like a call; each step lasts about a millisecond at most."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PathRequest:
-    """A path that is wanted, from where the body was when it was."""
+    """A requested path, from the body's position at the time of the request."""
 
     why: str
     points_m: Floats
@@ -55,19 +55,19 @@ class PathRequest:
 
 
 class Replanning:
-    """A requested path under way."""
+    """Planning of a requested path."""
 
     def __init__(self, request: PathRequest, plan: PathPlanner) -> None:
         self.request = request
         self._unfinished = Unfinished(_steps(request, plan))
 
     def carry_on(self) -> bool:
-        """Do the work of a control cycle; return whether the planning is over."""
+        """Do one control cycle's work; return whether the planning is over."""
         return self._unfinished.carry_on(UNITS_PER_CYCLE)
 
     @property
     def path(self) -> SplinePath | None:
-        """Result, when the planning is over; None if all ways are unsafe."""
+        """Result after the planning; None if every path is unsafe."""
         return self._unfinished.result
 
 

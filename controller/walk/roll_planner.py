@@ -1,4 +1,4 @@
-"""Plans of side rolls: an arc to lie in, and how far whole turns bring the body up a slope."""
+"""Plans of side rolls: an arc to roll in, and the number of turns up a slope."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class RollPlan:
 
 
 class RollPlanner:
-    """Predicts rolls of one robot on one ground: one girth a turn, across the body's mean line."""
+    """Predicts rolls of a robot on a ground: one girth per turn, across the body's mean line."""
 
     def __init__(
         self,
@@ -65,27 +65,21 @@ class RollPlanner:
         ground: HeightField,
         safe: Callable[[Floats], bool] = lambda point_m: True,
     ) -> None:
-        """``safe`` says whether the centre (2,) of a body may come to a place."""
+        """``safe`` returns whether the body's centre (2,) may be at a place."""
         self._robot, self._ground, self._safe = robot, ground, safe
         self.turn_m = 2.0 * np.pi * robot.body_radius_m
         """Way of one turn, without slip."""
 
     def best(self, pose: PathPose, walker: PredictiveWalker, target_m: Floats) -> RollPlan | None:
-        """Return the roll that brings the body to its target fastest; None if none does."""
+        """Return the roll that approaches the target fastest; None if no roll does."""
         plans = list(self._plans(pose, walker, target_m))
         return max(plans, key=lambda plan: plan.speed_m_s, default=None)
 
     def to_go_m(self, target_m: Floats, links_m: Floats, heading_rad: float, side: float) -> Floats:
-        """Distance (k + 1,) from the target now and after each of k whole turns.
+        """Distances (k + 1,) from the target (2,) now and after each of k whole turns.
 
-        They end where the body would not roll uphill any more, or come to unsafe ground.
-
-        Args:
-            target_m: (2,)
-            links_m: (L, 2) where the links are.
-            heading_rad: of the body's mean line.
-            side: 1 to roll to the left, -1 to the right.
-
+        They end before a turn that climbs too little or comes to unsafe ground. ``links_m`` is (L,
+        2), the heading is that of the body's mean line, and ``side`` is 1 (left) or -1.
         """
         turn_m = side * self.turn_m * np.array([-np.sin(heading_rad), np.cos(heading_rad)])
         uphill = np.array(
@@ -106,17 +100,10 @@ class RollPlanner:
     def tried(
         self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, heading_rad: float
     ) -> list[RollPlan]:
-        """Return plans that are worth a try, the fastest on paper first.
+        """Return plans worth a try towards a target (2,), the fastest on paper first.
 
-        The plans are arcs that are laid by the track, at once or after a turn away from them, and
-        bends that the joints make at once.
-
-        Args:
-            pose: of the body.
-            walker: of the track.
-            target_m: (2,)
-            heading_rad: of the body's mean line.
-
+        An arc is laid by the track, at once or after a turn to the other side, or made by the
+        joints at once.
         """
         plans = self._plans(pose, walker, target_m)
         for turn in _TURNS_RAD.tolist():
@@ -128,7 +115,7 @@ class RollPlanner:
     def _plans(
         self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, turn_rad: float = 0.0
     ) -> list[RollPlan]:
-        """Plans of arcs by the track, after a turn to the other side."""
+        """Plans of arcs laid by the track, after a turn to the other side."""
         points, plans = walker.track.points, list[RollPlan]()
         ramp = np.arange(1, points + 1) / points
         arcs = walker.track.last_rad + ARCS_RAD[:, None] * ramp
@@ -152,7 +139,7 @@ class RollPlanner:
         heading_rad: float,
         laid_s: float,
     ) -> list[RollPlan]:
-        """Return the plan to roll in an arc that lies so after ``laid_s``; none if none is nearer.
+        """Return the plan to roll in an arc that is complete after ``laid_s``; or no plan.
 
         The arc's centre (2,) and heading are those of its mean line.
         """
@@ -166,12 +153,12 @@ class RollPlanner:
         return [RollPlan(bend_rad, piece_rad, turns, target_m, speed_m_s)]
 
     def _arc_m(self, centre_m: Floats, heading_rad: float, bend_rad: float) -> Floats:
-        """Centres (L, 2) of links that lie in an arc."""
+        """Centres (L, 2) of links in an arc."""
         ends = np.array(self._robot.link_ends)
         angle = heading_rad + bend_rad * (0.5 - 0.5 * (ends[:-1] + ends[1:]) / ends[-1])
         forward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         lengths_m = np.array(self._robot.link_lengths_m)[:, None]
-        at_m = np.cumsum(-lengths_m * forward, axis=0)  # their ends towards the tail
+        at_m = np.cumsum(-lengths_m * forward, axis=0)  # tail-side ends of the links
         at_m += 0.5 * (lengths_m - self._robot.mean_link_length_m) * forward
         return np.asarray(centre_m + at_m - at_m.mean(axis=0))
 

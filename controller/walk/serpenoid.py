@@ -23,7 +23,7 @@ class SerpenoidParameters:
     """Decisions per body length."""
 
     def wave_rad(self, sample: Ints, points: int) -> Floats:
-        """Angles about the mean line at samples of a track, ``points`` on a body."""
+        """Angles about the mean line at samples of a track, with ``points`` per body."""
         return np.asarray(self.amplitude_rad * np.sin(2.0 * np.pi * self.waves * sample / points))
 
 
@@ -37,7 +37,7 @@ class Serpenoid:
     ) -> None:
         self._p = parameters or SerpenoidParameters()
         self._base_rad = 0.0
-        self._at = points  # of the wave's next sample
+        self._at = points  # index of the wave's next sample
         self._points = points
         self.track = AngleTrack(self._p.wave_rad(np.arange(points), points)[::-1])
 
@@ -60,10 +60,10 @@ SERPENOID = -1
 
 
 def phase_at_end(track: AngleTrack, parameters: SerpenoidParameters) -> tuple[float, int]:
-    """Join a serpenoid to a track of others: at its last angle, bending the same way.
+    """Join a serpenoid to another track: at its last angle, bending the same way.
 
     Returns:
-        Angle of the mean line, and the sample of the wave that comes next.
+        Angle of the mean line, and the next sample of the wave.
 
     """
     points = track.points

@@ -1,7 +1,4 @@
-"""Shape filters: which shapes this robot can use on this ground.
-
-The library and every piece of a walk are tested by them.
-"""
+"""Shape filters: which shapes this robot can use on this ground."""
 
 from collections.abc import Callable, Mapping
 
@@ -25,9 +22,11 @@ def shape_filters(
 ) -> dict[str, ShapeFilter]:
     """Tests by reason, cheapest first: each maps shapes (S, points) to a mask (S,) of bad ones.
 
-    No turn beyond ``states.turn_limit_rad``: a walk decides again after a part of a shape, so that
-    a coil's turn is never completed as it was aimed. Joints inside the limits after retargeting, no
-    part of the body on another, a quasi-static gain above the limit (docs/method.md).
+    - The turn exceeds ``states.turn_limit_rad``. A walk decides again after part of a shape, so it
+      never completes a coil's turn as aimed.
+    - Joints exceed their limits after retargeting.
+    - Parts of the body touch.
+    - The quasi-static gain is below the limit (docs/method.md).
     """
     joints_rad = Retarget(robot, points).joints_rad
     limit = np.array(robot.limit_rad)
@@ -54,7 +53,7 @@ def shape_filters(
 
 
 def passes_all(filters: Mapping[str, ShapeFilter]) -> Callable[[Floats], bool]:
-    """Return a test of one body (N,): whether it passes every filter."""
+    """Return a test whether one body (N,) passes every filter."""
 
     def passes(body_rad: Floats) -> bool:
         return not any(is_bad(body_rad[None])[0] for is_bad in filters.values())

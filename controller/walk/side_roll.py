@@ -1,12 +1,9 @@
-"""Side rolls: a body that its walk does not bring up a slope rolls up it like a log.
+"""Side rolls: a body rolls like a log up a slope that its walk does not climb.
 
-Straight up a slope of 18 degrees the best wave makes 0.05 m/s, and a body that stands at the foot
-of such a slope stays there. The same body in an arc, its ends uphill, rolls up 20 degrees as fast
-as it turns, by its girth a turn. An arc that opens downhill stands on its bend, and tips over. So
-where the way to a waypoint was missed, each decision compares two predictions of how fast the
-waypoint comes nearer: that of the best rollout, and that of a roll. To roll, the last piece of the
-walk's track is an arc, laid out by the same rollout; rolling is joined to it, and the walk to
-rolling, without a step in speed.
+An arc with its ends uphill rolls up 20 degrees by its girth per turn; one that opens downhill tips
+over. The best wave makes 0.05 m/s straight up 18 degrees, and nothing from rest at the foot.
+After a missed waypoint each decision compares two predicted speeds towards it: of the best rollout
+and of a roll. The walk's last piece of track is then the arc. The joins have no step in speed.
 """
 
 from collections.abc import Callable
@@ -70,9 +67,9 @@ _OFF_PATH_M = 0.2
 
 
 class SideRolls(MotionWrapper, OnCourse):
-    """A ``MotionSource`` with ``PathProgress``: a pilot's walk, and rolls where they climb better.
+    """A ``MotionSource`` with ``PathProgress``: a pilot's walk, and rolls if they climb better.
 
-    Needs a body that is round, and pitch joints that carry links.
+    It needs a round body, and pitch joints that carry links.
     """
 
     def __init__(
@@ -93,8 +90,8 @@ class SideRolls(MotionWrapper, OnCourse):
             walker: the pilot's chooser.
             robot: round, with yaw and pitch joints.
             planner: of rolls, for the same robot.
-            climb_progress: predicted progress of the walk from which on it needs no roll.
-            pulse_m_s: wanted speed of the walk: its progress is a share of this.
+            climb_progress: predicted progress above which the walk needs no roll.
+            pulse_m_s: wanted speed of the walk, the unit of its progress.
             on_event: called with the kind of an event, and a line of text.
 
         """
@@ -127,23 +124,23 @@ class SideRolls(MotionWrapper, OnCourse):
 
     @property
     def pulse_m_s(self) -> float:
-        """How fast the shape travels along the body; 0 while it rolls or begins to walk again."""
+        """Speed of the shape along the body; 0 while it rolls or begins to walk again."""
         return 0.0 if self.rolling or self._switch.blending else self._pilot.pulse_m_s
 
     def pace(self) -> Pace:
-        """The robot's limits: the next motion is not known."""
+        """The robot's limits, because the next motion is unknown."""
         return self._pilot.pace()
 
     def use_twin(self, twin: TwinRollout) -> None:
-        """Let the walk try pieces of track on a twin of the robot."""
+        """Let the walk try pieces of track on a twin."""
         self._pilot.use_twin(twin)
 
     def use_asker(self, asker: TwinAsker) -> None:
-        """Let the walk ask a twin elsewhere about pieces of track."""
+        """Let the walk ask a twin in another process about pieces of track."""
         self._pilot.use_asker(asker)
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Let the walk use this friction from now on."""
+        """Let the walk use this friction."""
         self._pilot.use_friction(friction)
 
     def begin(self, view: BodyView) -> Floats:
@@ -151,7 +148,7 @@ class SideRolls(MotionWrapper, OnCourse):
         return self._pilot.begin(view)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         if self._rolling is not None:
             self._pilot.watch(view)
             if self._rolling.is_over(dt_s, view, self._planner):
@@ -165,7 +162,7 @@ class SideRolls(MotionWrapper, OnCourse):
         return goal_rad
 
     def _consider(self, view: BodyView) -> None:
-        """Let a roll follow the decision just made, if it climbs better."""
+        """Plan a roll after the latest decision, if it climbs better."""
         course, progress = self.course, self._walker.outlook
         if (
             course.complete
@@ -187,9 +184,9 @@ class SideRolls(MotionWrapper, OnCourse):
             self._pilot.end_on(plan.piece_rad)
 
     def _target_m(self, view: BodyView) -> Floats:
-        """(2,) the next waypoint if it is near, else a point of the path before it.
+        """(2,) the next waypoint if it is near, else a point ahead on the path.
 
-        A path that turns a body about leads away from a waypoint at its side.
+        A path that turns the body around leads away from a waypoint at its side.
         """
         next_one = self.course.next_waypoint
         if next_one is not None and np.hypot(*(next_one[0] - view.centre_m[:2])) <= _TARGET_M:
@@ -197,7 +194,7 @@ class SideRolls(MotionWrapper, OnCourse):
         return self.course.ahead_m(_TARGET_M)
 
     def _best(self, view: BodyView, target_m: Floats) -> RollPlan | None:
-        """Return the fastest roll to a target: on the twin where there is one, else on paper."""
+        """Return the fastest roll to a target: on the twin if there is one, else on paper."""
         pose, twin = self._pilot.path_pose(view), self._pilot.twin
         if twin is None:
             return self._planner.best(pose, self._walker, target_m)
@@ -210,7 +207,7 @@ class SideRolls(MotionWrapper, OnCourse):
         return max(found, key=lambda plan: plan.speed_m_s, default=None)
 
     def _tried(self, plan: RollPlan, view: BodyView, twin: TwinRollout) -> RollPlan:
-        """Return a plan with the turns and the speed that are best on the twin."""
+        """Return a plan with the best turns and speed on the twin."""
         roll = _RollOnTwin(
             self._pilot.coasting(plan.piece_rad),
             _cycle(plan, self._robot),
@@ -232,12 +229,12 @@ class SideRolls(MotionWrapper, OnCourse):
                 speed_m_s = (begin_m - to_go_m) / (time_s + _WALK_ON_S)
                 if speed_m_s > best_m_s and roll.turns > 0.0:
                     best_m_s, turns = speed_m_s, max(1, round(roll.turns))
-        except RuntimeError:  # it has diverged
+        except RuntimeError:  # the twin diverged
             best_m_s = 0.0
         return replace(plan, speed_m_s=best_m_s, turns=turns)
 
     def _roll(self, view: BodyView, plan: RollPlan) -> None:
-        """Begin to roll; walk on if the body does not lie as it was meant to."""
+        """Begin to roll; continue the walk if the body does not lie as planned."""
         headings = view.headings_rad
         bent = plan.side * float(headings[0] - headings[-1]) > 0.5 * abs(plan.bend_rad)
         lies = bent or plan.at_once
@@ -252,7 +249,6 @@ class SideRolls(MotionWrapper, OnCourse):
         self._on_event("roll", f"rolls uphill to its {word}: {plan.turns} turns are planned")
 
     def _walk_on(self, view: BodyView, rolling: "_Rolling") -> None:
-        """Hand the body back to the walk."""
         self._on_event("roll", rolling.text(view))
         self._plan = self._rolling = None
         self._pilot.restart(view, self._walker.restart)
@@ -264,7 +260,6 @@ class SideRolls(MotionWrapper, OnCourse):
 
 
 def _cycle(plan: RollPlan, robot: RobotConfig) -> GaitCycle:
-    """The gait that rolls in the arc of a plan."""
     parameters = RollingParameters(
         frequency_hz=FREQUENCY_HZ, bend_rad=abs(plan.bend_rad), mirror=plan.side < 0.0
     )
@@ -272,12 +267,12 @@ def _cycle(plan: RollPlan, robot: RobotConfig) -> GaitCycle:
 
 
 class _RollOnTwin:
-    """Moves a twin along the rest of a track, and then in a roll."""
+    """Moves a twin along the rest of a track, then in a roll."""
 
     def __init__(
         self, pilot: Pilot, cycle: GaitCycle, robot: RobotConfig, *, at_once: bool
     ) -> None:
-        """Accept a pilot that coasts; ``at_once``: it rolls from where the body is."""
+        """Accept a coasting pilot; ``at_once`` skips the track."""
         self._pilot, self._cycle, self._robot = pilot, cycle, robot
         self._at_once = at_once
         self._roll: Blend | None = None
@@ -285,11 +280,11 @@ class _RollOnTwin:
 
     @property
     def turns(self) -> float:
-        """That were asked of the body so far."""
+        """Turns commanded so far."""
         return self._rolled_s * self._cycle.frequency_hz
 
     def move(self, dt_s: float, view: BodyView) -> Floats:
-        """Goals (J,) of the next cycle, of length ``dt_s``."""
+        """Goals (J,) of the next cycle."""
         if self._roll is not None:
             self._rolled_s += dt_s
             return self._roll.step(dt_s, view)
@@ -313,7 +308,7 @@ class _Rolling:
         self._turned_rad = self._time_s = 0.0
 
     def is_over(self, dt_s: float, view: BodyView, planner: RollPlanner) -> bool:
-        """Whether the turns are made, or the time limit has passed, or the body rolls down."""
+        """Whether to stop: turns done, time over, rolling down or away, or no gain left."""
         roll_rad = body_roll_rad(view)
         self._turned_rad -= self._plan.side * float(wrap(roll_rad - self._roll_rad))
         self._roll_rad = roll_rad
@@ -342,7 +337,6 @@ class _Rolling:
         return False
 
     def text(self, view: BodyView) -> str:
-        """How it went."""
         gone_m = float(np.hypot(*(view.centre_m - self._start_m)[:2]))
         turns = self._turned_rad / (2.0 * np.pi)
         return f"rolled {turns:.1f} turns in {self._time_s:.1f} s, {gone_m:.2f} m; walks on"

@@ -1,8 +1,7 @@
-"""A steered gait: a gait with a turn goes along a path through waypoints.
+"""A steered gait: a gait with a turn follows a path through waypoints.
 
-The straight motion is turned along the path, as [KP] 4.4 bends the motion of its animals along
-theirs. Here a parameter of the gait's own turns it, from the measured place of the body in every
-cycle.
+[KP] 4.4 bends the motion of its animals along a path. Here a parameter of the gait turns it, from
+the measured pose in every cycle.
 """
 
 import numpy as np
@@ -38,7 +37,7 @@ CYCLES_PER_BODY = 4.0
 
 
 class SteeredGait(OnCourse):
-    """A ``MotionSource`` with ``PathProgress``: it comes to rest when all waypoints are reached."""
+    """A ``MotionSource`` with ``PathProgress``: it rests when all waypoints are reached."""
 
     pulse_m_s = 0.0
     decision: Decision | None = None
@@ -54,12 +53,8 @@ class SteeredGait(OnCourse):
     ) -> None:
         """Begin at phase 0, straight.
 
-        Args:
-            gait: one that is ``steered_by`` a parameter.
-            robot: that it moves.
-            course: of which a body length is ``CYCLES_PER_BODY``.
-            carrot_m: how far ahead on the path the body aims.
-            cycles: that the course has seen before.
+        A body length of the course is ``CYCLES_PER_BODY``; it has seen ``cycles`` before. The body
+        aims ``carrot_m`` ahead on the path.
 
         Raises:
             InputError: as ``check_turns``.
@@ -90,20 +85,20 @@ class SteeredGait(OnCourse):
 
     @property
     def turn(self) -> float:
-        """The gait's turn now."""
+        """Current turn of the gait."""
         return float(self._turn.angle_rad[0])
 
     @property
     def frequency_hz(self) -> float:
-        """Cycles a second at full rate: as asked, or what the joints can follow while it turns."""
+        """Cycles per second at full rate: as configured, or limited by the joints while turning."""
         return float(self._rate_rad_s / TURN)
 
     def begin(self, view: BodyView) -> Floats:
-        """(J,) where the gait begins, whatever the ground."""
+        """(J,) first targets, whatever the ground."""
         return self.goal_rad()
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) current joint targets."""
         return self._joints_rad(self._phase_rad, self.turn)
 
     def velocity_rad_s(self) -> Floats:
@@ -117,11 +112,11 @@ class SteeredGait(OnCourse):
         return np.asarray((after - before) / (2.0 * half_s))
 
     def pace(self) -> Pace:
-        """The robot's limits: when it turns is not known."""
+        """The robot's limits, because the next turn is unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         course, centre_m = self.course, view.centre_m[:2]
         heading_rad = view.heading_rad
         course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self.cycles)
@@ -144,11 +139,11 @@ class SteeredGait(OnCourse):
 
 
 def check_turns(gait: Gait, robot: RobotConfig) -> None:
-    """Refuse a gait that cannot be steered by its turn on this robot.
+    """Reject a gait that its turn cannot steer on this robot.
 
     Raises:
-        InputError: the gait cannot be steered, its turn is given, joints are missing or do not bend
-            so far at the largest turn.
+        InputError: the gait cannot be steered, its turn is set, joints are missing or do not bend
+            far enough at the largest turn.
 
     """
     if gait.steered_by is None:

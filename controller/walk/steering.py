@@ -1,8 +1,7 @@
-"""Predictive steering: of several pieces of track, the one whose rollout follows the path best.
+"""Predictive steering: chooses the piece of track whose rollout follows the path best.
 
-The difference between the body's motion and the prediction, per length of pulse, is identified
-during the motion and added to every rollout. Its causes are friction that differs from the
-configured, uneven loads, or a soft joint.
+The difference between motion and prediction, per length of pulse, is identified during the motion
+and added to every rollout. Its causes are wrong friction, uneven loads, or a soft joint.
 """
 
 from collections import deque
@@ -36,7 +35,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 @dataclass(frozen=True, slots=True)
 class PathPose:
-    """Where the body is, and where its path leads."""
+    """Pose of the body, and its path ahead."""
 
     head: float
     """Segments that the head has travelled along the track."""
@@ -54,7 +53,7 @@ class PathPose:
 
 @dataclass(frozen=True, slots=True)
 class SteeringWeights:
-    """Weights of a rollout's cost, in square metres; chosen on seeds that no table shows."""
+    """Weights of a rollout's cost, in square metres; chosen on unpublished seeds."""
 
     off_path: float = 1.0
     """Mean square distance of the centre from the path."""
@@ -83,7 +82,7 @@ _UPDATE = 0.25
 
 
 class Steering:
-    """Judges pieces of track by where they would carry the body."""
+    """Judges pieces of track by their predicted motion."""
 
     def __init__(
         self,
@@ -104,7 +103,7 @@ class Steering:
         """Identified so far."""
 
     def observe(self, pose: PathPose) -> None:
-        """Compare what the body did over the last span of pulse with its prediction."""
+        """Compare the motion over the last span of pulse with its prediction."""
         past, self._tree_of = self._past, None
         past.append(pose)
         while len(past) > 2 and past[1].head <= pose.head - _SPAN_SEGMENTS:
@@ -126,39 +125,39 @@ class Steering:
         )
 
     def roll_out(self, pose: PathPose, pieces_rad: Floats) -> Rolled:
-        """Predict the body on pieces (C, n) that would be appended to the track.
+        """Predict the body on pieces (C, n) appended to the track.
 
-        The common part of the pieces is rolled out once for a pose, until another one is observed.
+        The common part of the pieces is rolled out once per pose.
         """
         if self._tree is None or self._tree_of is not pose:
             self._tree, self._tree_of = self._begin(pose, self.drift, self._tree), pose
         return self._tree.roll(pieces_rad)
 
     def is_steep(self, pose: PathPose) -> bool:
-        """Whether a body here, or a length on along its path, lies on a slope of 8 degrees."""
+        """Whether the slope under the body or a length ahead exceeds 8 degrees."""
         points_m = pose.path.points_m[pose.path_at : pose.path_at + _AHEAD_POINTS : 6]
         return self._rollout.steepest(points_m + pose.centre_m - points_m[0]) > _STEEP
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Roll out with this friction, from the next decision onwards; the rest is drift."""
+        """Roll out with this friction from the next decision; the remainder is drift."""
         self._rollout.use_friction(friction)
 
     def forget(self) -> None:
-        """Leave out what came before: the body has moved otherwise than by its track."""
+        """Discard past poses, because the body did not follow its track."""
         self._past.clear()
 
     def judge(self, pose: PathPose, pieces_rad: Floats) -> tuple[Floats, Floats]:
-        """Roll out pieces (C, n) that would be appended to the track.
+        """Roll out pieces (C, n) appended to the track.
 
         Returns:
-            Cost (C,) in square metres; progress (C,) along the path, over that at the wanted pulse
+            Cost (C,) in square metres; progress (C,) along the path, relative to the wanted pulse
             without slip.
 
         """
         return self.cost(self.roll_out(pose, pieces_rad))
 
     def cost(self, rolled: Rolled) -> tuple[Floats, Floats]:
-        """Cost and progress, as ``judge`` returns them, of rollouts that have been made."""
+        """Cost and progress of rollouts, as ``judge`` returns them."""
         cost, progress = np.empty(len(rolled.columns)), np.empty(len(rolled.columns))
         _cost(rolled.columns, self._weights, self._cruise_m_s, cost, progress)
         return cost, progress
@@ -183,7 +182,7 @@ class Steering:
 def _cost(
     columns: Floats, weights: Floats, cruise_m_s: float, cost: Floats, progress: Floats
 ) -> None:
-    """Write the cost (C,), and the progress over that at the cruise speed, of ``Rolled``."""
+    """Write the cost (C,) of ``Rolled``, and the progress relative to the cruise speed."""
     off_path, end, head, heading_m = weights[0], weights[1], weights[2], weights[3]
     pass_by, near_m, delay_m2 = weights[4], weights[5], weights[6]
     for k in range(len(columns)):

@@ -1,9 +1,8 @@
 """Time law: how fast the head may travel along the track within joint speed and acceleration.
 
-Joint speed alone, ``u = min(u0, limit / max |dq/dS|)``, would make the head's speed jump where the
-shape bends quickly. Here half of the acceleration limit is left to the bending (``q'' u^2``), and
-half to speeding up and braking (``q' du/dt``). The brake looks ahead over all of the track that is
-known.
+A speed limit alone, ``u = min(u0, limit / max |dq/dS|)``, lets the head's speed jump. Here half of
+the acceleration limit is for bending (``q'' u^2``), half for speeding up and braking (``q'
+du/dt``). Braking looks ahead over the known track.
 """
 
 import copy
@@ -41,24 +40,23 @@ class TimeLaw:
         self._rest()
 
     def _rest(self) -> None:
-        """Stand on the first head of the joints."""
         self.head = float(self.joints.first)
         """Segments travelled."""
         self.speed_segments_s = 0.0
         self._first = self.joints.first
-        self._allowed = np.zeros(1)  # the next motion is not known
+        self._allowed = np.zeros(1)  # the next motion is unknown
         self._slope = np.zeros(1)
 
     def on(self, track: AngleTrack) -> "TimeLaw":
-        """Return a copy that goes on by itself, on a track that begins as its own."""
+        """Return an independent copy on a track that begins like its own."""
         other = copy.copy(self)
         other.joints = self.joints.on(track)
         return other
 
     def recent(self, segments: int) -> "TimeLaw":
-        """Return a copy that goes on by itself, without the track ``segments`` behind the head.
+        """Return an independent copy without the track ``segments`` behind the head.
 
-        Its heads count from the begin of the track that is left.
+        Its heads count from the start of the remaining track.
         """
         other = copy.copy(self)
         other.joints, left_out = self.joints.recent(int(self.head) - segments)
@@ -66,20 +64,20 @@ class TimeLaw:
         return other
 
     def restart(self) -> None:
-        """Begin again, at rest, at the end of the track, where the body lies now."""
+        """Begin again, at rest, at the end of the track."""
         self.joints.restart()
         self._rest()
 
     def stop(self) -> None:
-        """Slow down to rest from now on."""
+        """Slow down to rest."""
         self._stopping = True
 
     def go_on(self) -> None:
-        """Come back to the cruise speed from now on."""
+        """Return to the cruise speed."""
         self._stopping = False
 
     def advance(self, dt_s: float) -> float:
-        """Move on by ``dt_s``; returns the head, never beyond what is known of the track."""
+        """Advance by ``dt_s``; return the head, never beyond the known track."""
         if self.joints.grow():
             self._look_ahead()
         slew = -self._slew if self._stopping else self._slew
@@ -96,17 +94,17 @@ class TimeLaw:
         return self.head
 
     def goal_rad(self) -> Floats:
-        """(J,) joint goals at the head's place."""
+        """(J,) joint goals at the head."""
         return self.joints.goal_rad(self.head)
 
     def _look_ahead(self) -> None:
-        """Tabulate the speed allowed from the head's place on, braking distance included."""
+        """Tabulate the allowed speed from the head onwards, braking included."""
         self._first = max(self.joints.first, int(self.head) - 1)
         slope, turn = self.joints.bends(self._first)
         self._slope = slope
         allowed = np.empty(len(slope))
         _allow(slope, turn, self._speed_limit, self._half_acceleration, self._cruise, allowed)
-        # the track behind the end may be as steep as the steepest so far: be able to brake for it
+        # the unknown track may be as steep as the steepest so far: be able to brake for it
         self._least = min(self._least, float(allowed.min()))
         allowed[-1] = self._least
         _brake(allowed, slope, self._half_acceleration)
@@ -115,7 +113,7 @@ class TimeLaw:
 
 @compiled("float64(float64[::1], float64)")
 def _limit_at(allowed: Floats, at: float) -> float:
-    """Between two places the squares of the speeds lie on a line, as in even braking."""
+    """Speed limit between two places; its square is linear, as in uniform braking."""
     at = min(max(at, 0.0), len(allowed) - 1.0)
     low = max(min(int(at), len(allowed) - 2), 0)
     part = at - low
@@ -137,7 +135,7 @@ def _moved(
     allowed: Floats,
     slope: Floats,
 ) -> tuple[float, float]:
-    """Place from the tables' start on, and speed, after ``dt_s``; ``slew`` < 0 stops."""
+    """Return place (from the tables' start) and speed after ``dt_s``; ``slew`` < 0 stops."""
     bend = slope[max(min(int(at), len(slope) - 1), 0)]
     thrust = min(abs(slew), half_acceleration / max(bend, _TINY))
     limit = min(_limit_at(allowed, at), _limit_at(allowed, at + speed * dt_s))
@@ -156,7 +154,7 @@ def _allow(
 ) -> None:
     """Write the speed allowed at each place: the least of it and its neighbours.
 
-    So between two places no limit is missed, and none is a step.
+    This respects the limits between two places, without steps.
     """
     for k in range(len(slope)):
         allowed[k] = cruise
@@ -169,7 +167,7 @@ def _allow(
 
 @compiled("void(float64[::1], float64[::1], float64)")
 def _brake(allowed: Floats, slope: Floats, half_acceleration: float) -> None:
-    """Lower the speeds so that each place's can be braked down to the next one's."""
+    """Limit each speed so that the body can brake to the next."""
     for k in range(len(allowed) - 2, -1, -1):
         brake = half_acceleration / max(slope[k], slope[k + 1], _TINY)
         allowed[k] = min(allowed[k], np.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))

@@ -1,4 +1,4 @@
-"""Pieces of track tried on a twin elsewhere, whose answers come later or not at all."""
+"""Pieces of track tried on a twin in another process; answers may come late or never."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from snakewalk.drivers.types import BodyPose
 
 @dataclass(frozen=True, slots=True)
 class Coasting:
-    """How a pilot goes on by itself; plain data, which can be sent to another process."""
+    """State of a pilot that continues without decisions; plain data for another process."""
 
     time_law: TimeLaw
     """With the end of the track."""
@@ -28,7 +28,7 @@ class Coasting:
 
 @dataclass(frozen=True, slots=True)
 class TwinQuestion:
-    """Pieces of track to try on a twin, in this order."""
+    """Pieces of track to try on a twin, in order."""
 
     number: int
     bodies: tuple[tuple[BodyPose, Floats], ...]
@@ -53,19 +53,19 @@ class TwinAnswer:
 
 
 class TwinAnswers(Protocol):
-    """A twin that answers questions; neither method waits."""
+    """A twin that answers questions; neither method blocks."""
 
     def ask(self, question: TwinQuestion) -> None:
-        """Ask, and drop the question before."""
+        """Ask, and drop the previous question."""
         ...
 
     def arrived(self) -> Sequence[TwinAnswer]:
-        """Return the answers that have arrived since the last call."""
+        """Return the answers since the last call."""
         ...
 
 
 class TwinAsker:
-    """Asks about one robot, and keeps the results of the last question."""
+    """Asks about one robot, and stores the results of the last question."""
 
     def __init__(self, robot: RobotConfig, answers: TwinAnswers, friction: FrictionConfig) -> None:
         self._robot, self._answers = robot, answers
@@ -77,15 +77,15 @@ class TwinAsker:
         self._results: dict[int, Rolled | None] = {}
 
     def observe(self, view: BodyView, dt_s: float) -> None:
-        """Process the measured body, ``dt_s`` after the last."""
+        """Store the measured body, ``dt_s`` after the last."""
         self._seen, self._cycle_s = [*self._seen[-1:], view], dt_s
 
     def forget(self) -> None:
-        """Leave out the bodies and results so far: the robot has moved otherwise."""
+        """Discard bodies and results, because the robot did not follow its track."""
         self._seen, self._results = [], {}
 
     def ask(self, pose: PathPose, coasting: Coasting, pieces_rad: Sequence[Floats]) -> None:
-        """Ask about pieces (n,) of track, from where the robot is."""
+        """Ask about pieces (n,) of track, from the robot's last two bodies."""
         self._number, self._results = self._number + 1, {}
         bodies = tuple(seen_state(self._robot, view) for view in self._seen)
         if len(bodies) == 2:
@@ -97,7 +97,7 @@ class TwinAsker:
             )
 
     def results(self) -> dict[int, Rolled | None]:
-        """Return the results of the last question that have arrived, by the piece's number."""
+        """Return the results of the last question so far, by piece number."""
         for answer in self._answers.arrived():
             if answer.number == self._number:
                 columns = answer.columns
@@ -107,8 +107,8 @@ class TwinAsker:
 
 @runtime_checkable
 class AsksTwin(Protocol):
-    """A motion that asks a twin about its next pieces, if it has one."""
+    """A motion that can ask a twin about its next pieces."""
 
     def use_asker(self, asker: TwinAsker) -> None:
-        """Ask by this."""
+        """Ask through ``asker``."""
         ...

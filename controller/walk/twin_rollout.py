@@ -1,7 +1,7 @@
 """A rollout on a twin: a piece of track is tried on a simulated body.
 
-The balance of forces on paper knows no weight that rests on few links of a body on rough ground; a
-body that physics moves does. It costs a hundred times as much.
+It includes weight that rests on few links on rough ground, which the balance of forces on paper
+does not. It costs a hundred times as much.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,24 +26,24 @@ class Twin(Protocol):
     def begin(
         self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
     ) -> None:
-        """Put it where the robot is, moving as the robot did since ``dt_s`` ago."""
+        """Place it at the robot's pose, moving as the robot did since ``dt_s`` ago."""
         ...
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Lay it on ground with this friction."""
+        """Set the friction of its ground."""
         ...
 
     def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
-        """Hold goals (J,) for ``dt_s``; returns the head's pose and the joints (J,) then."""
+        """Hold goals (J,) for ``dt_s``; return the head's pose and the joints (J,) then."""
         ...
 
 
 @runtime_checkable
 class UsesTwin(Protocol):
-    """A motion that tries what it will do, where it is given the means."""
+    """A motion that can try its next pieces on a twin."""
 
     def use_twin(self, twin: "TwinRollout") -> None:
-        """Try it on this twin."""
+        """Try pieces on this twin."""
         ...
 
 
@@ -53,7 +53,7 @@ class TwinRollout:
     def __init__(
         self, robot: RobotConfig, make_twin: Callable[[], Twin], friction: FrictionConfig
     ) -> None:
-        """``make_twin`` is asked before each rollout, and may return the same one."""
+        """``make_twin`` is called before each rollout; it may return the same twin."""
         self._robot, self._make_twin = robot, make_twin
         self.friction = friction
         """Friction of the ground that the twin is laid on."""
@@ -62,26 +62,26 @@ class TwinRollout:
 
     @property
     def cycle_s(self) -> float:
-        """Length of the cycles that were seen, and of those that are tried."""
+        """Length of the observed and the simulated cycles."""
         return self._dt_s
 
     def observe(self, view: BodyView, dt_s: float) -> None:
-        """Process the measured body, ``dt_s`` after the last."""
+        """Store the measured body, ``dt_s`` after the last."""
         self._seen = [*self._seen[-1:], view]
         self._dt_s = dt_s
 
     def forget(self) -> None:
-        """Leave out what was seen: the next body is not seen one cycle after it."""
+        """Discard observed bodies: the next one will not follow them by one cycle."""
         self._seen = []
 
     def roll(
         self, pose: PathPose, is_over: Callable[[], bool], move: Callable[[float, BodyView], Floats]
     ) -> Rolled:
-        """Move the twin, from where the robot is, until ``is_over``.
+        """Move the twin from the robot's pose until ``is_over``, which is first False.
 
         Args:
-            pose: with the path to measure by.
-            is_over: asked before each cycle; not yet at once.
+            pose: contains the path to measure progress on.
+            is_over: called before each cycle.
             move: called with the length of a cycle and the body; returns goals (J,).
 
         """
@@ -98,12 +98,9 @@ class TwinRollout:
     def bodies(
         self, move: Callable[[float, BodyView], Floats], longest_s: float
     ) -> Iterator[BodyView]:
-        """Move the twin from where the robot is; its body after each cycle, for ``longest_s``.
+        """Yield the twin's body after each cycle, from the robot's pose, for ``longest_s``.
 
-        Args:
-            move: as for ``roll``.
-            longest_s: until it ends by itself.
-
+        ``move`` as in ``roll``.
         """
         twin, robot, view = self._make_twin(), self._robot, self._seen[-1]
         twin.use_friction(self.friction)
@@ -119,6 +116,6 @@ class TwinRollout:
 
 
 def seen_state(robot: RobotConfig, view: BodyView) -> tuple[BodyPose, Floats]:
-    """Head's pose and joints (J,) of a body seen."""
+    """Head pose and joints (J,) of an observed body."""
     pose = BodyPose(0.0, view.link_m[0], view.rotation[0])
     return pose, chain_angles_rad(robot, view)

@@ -1,7 +1,7 @@
-"""The walk by the printed rule ([PT] 2.6.2): the next shape heads towards the aim.
+"""The walk by the printed rule ([PT] 2.6.2): the next shape points towards the aim.
 
-A linear ramp may cancel the heading error of the chosen shape; ``ramp_limit_rad = 0`` is the rule
-as printed. ``predictive_walker`` is the walk that runs on hills.
+A linear ramp may cancel the heading error of the chosen shape; ``ramp_limit_rad = 0`` is the
+printed rule. ``predictive_walker`` is for hills.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,10 +33,8 @@ class Walker:
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
         """Choose the next shape and append its tail part.
 
-        Args:
-            offset_rad: rotation from the track's angles to the world.
-            aim_rad: where the next shape shall head, in the world.
-
+        ``offset_rad`` rotates the track's angles to the world, in which ``aim_rad`` is the wanted
+        heading.
         """
         walk, track = self._walk, self.track
         placed = self._shapes + (track.last_rad - self._shapes[:, -1])[:, None]
@@ -49,7 +47,7 @@ class Walker:
         return Decision(state, float(error[state]), ramp, near, self._star.distinct)
 
     def _choose(self, ranks: Iterator[int], placed_rad: Floats, error_rad: Floats) -> int:
-        """First in the order of W whose body is acceptable; the very first if none."""
+        """First state in the order of W whose body is accepted; the first of all if none is."""
         first = -1
         for state in ranks:
             if self._fits(self._piece(placed_rad[state], error_rad[state])):
@@ -67,7 +65,7 @@ class Walker:
         return np.asarray(placed_rad[::-1][:keep] + bend)
 
     def _fits(self, piece_rad: Floats) -> bool:
-        """Whether the body is acceptable when the piece has become its front."""
+        """Whether the body is accepted with the piece as its front."""
         if self._accept is None:
             return True
         old = self.track.body_rad(self.track.end)[: self.track.points - len(piece_rad)]

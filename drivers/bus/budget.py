@@ -1,7 +1,7 @@
 """Wire time of a control cycle, computed before a run, and the rate that it allows.
 
-A cycle is one sync write and one sync read, or *fast* sync read, of N servos. Each byte lasts ten
-bit times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
+A cycle is one sync write and one sync read, or *fast* sync read, of N servos. A byte lasts ten bit
+times (start, eight data bits, stop). Packet lengths: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
 from collections.abc import Sequence
@@ -50,22 +50,22 @@ class WireBudget:
 
     @property
     def total_bytes(self) -> int:
-        """On the wire in a cycle."""
+        """Bytes on the wire in a cycle."""
         return self.write_bytes + self.request_bytes + self.reply_bytes
 
     @property
     def cycle_s(self) -> float:
-        """Shortest possible cycle; adapters and stuffing only add to it."""
+        """Shortest possible cycle; adapters and stuffing extend it."""
         return self.total_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
 
     @property
     def reply_s(self) -> float:
-        """From the end of the request to the end of the replies."""
+        """Time from the end of the request to the end of the replies."""
         return self.reply_bytes * BITS_PER_BYTE / self.baud + self.return_delay_s
 
     @property
     def age_s(self) -> float:
-        """Age of the first read values at the end of the longest cycle."""
+        """Age of the first values at the end of the longest cycle."""
         before_bytes = self.write_bytes + GROUP_BYTES + self.servos
         return self.cycle_s - before_bytes * BITS_PER_BYTE / self.baud
 
@@ -75,14 +75,14 @@ class WireBudget:
         return 1.0 / self.cycle_s
 
     def share(self, rate_hz: float) -> float:
-        """Part of the time that the wire is busy at ``rate_hz``; beyond 1 it is impossible."""
+        """Share of the time that the wire is busy at ``rate_hz``; above 1 is impossible."""
         return rate_hz * self.cycle_s
 
     def check(self, rate_hz: float) -> None:
-        """Refuse a rate above the limit.
+        """Reject a rate above the limit.
 
         Raises:
-            BudgetError: with the limit and what would raise it.
+            BudgetError: with the limit and a remedy.
 
         """
         if self.share(rate_hz) > 1.0:
@@ -100,8 +100,8 @@ def check_ages(
     """Reject a cycle in which safety or the servos' watchdogs would stop each run.
 
     Raises:
-        BudgetError: values are too old when the cycle is complete, or the servos hear nothing for
-            too long between two cycles.
+        BudgetError: values are too old at the end of the cycle, or the pause between cycles exceeds
+            the watchdog.
 
     """
     faults = []
@@ -138,8 +138,8 @@ def wire_budget(
         baud: bit/s.
         fast: fast sync read (one common reply) instead of sync read (one packet each).
         read_bytes: length of the block read from each servo.
-        goal_bytes: length of the goal written to each; 0 for a cycle that only reads.
-        slow_read_bytes: length of the second block of the cycles that read the slow state.
+        goal_bytes: length of each goal; 0 for a cycle that only reads.
+        slow_read_bytes: length of the second block in cycles that read the slow state.
         return_delay_s: register 9 of each servo, s. A fast read waits once, a sync read N times.
 
     """
@@ -156,15 +156,12 @@ def wire_budget(
 
 
 def chain_budget(servos: int, baud: int, *, fast: bool) -> WireBudget:
-    """Budget of the longest cycle of a ``ServoChain``: one that also compares a setting."""
+    """Budget of the longest cycle of a ``ServoChain``, which also compares a setting."""
     return wire_budget(servos, baud, fast=fast, slow_read_bytes=max(SLOW_STATE_BYTES, CHECK_BYTES))
 
 
 def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
-    """``chain_budget`` of a robot's servos, and of its IMU where it has one.
-
-    Where segments are on ports of their own, that of the busiest port: all of them run at once.
-    """
+    """``chain_budget`` of a robot's servos and IMU; of several ports, that of the busiest."""
     facts = robot.servo_records[0]
     if facts.protocol == "feetech":
         counts = [len(set(port.ids)) for port in robot.ports] or [robot.joint_count]
@@ -180,7 +177,7 @@ def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
 
 
 def _feetech_budget(facts: ServoModel, servos: int, baud: int) -> WireBudget:
-    """Budget of the longest cycle of a chain of Feetech servos on one port."""
+    """Budget of the longest cycle of Feetech servos on one port."""
     state = [facts.registers["Present Position"], facts.registers["Present Load"]]
     if facts.measures_current:
         state.append(facts.registers["Present Current"])
@@ -215,7 +212,7 @@ def plain_reads_text(
 ) -> str:
     """Return the report that fast reads were given up.
 
-    ``budget`` is that of plain reads. ``ports`` are those that gave up; empty for one port.
+    ``budget`` is that of plain reads; ``ports`` gave up, empty for a single port.
     """
     line = f"fast sync reads given up after {failures} failures in a row, plain from now on"
     if ports:

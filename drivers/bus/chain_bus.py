@@ -1,4 +1,4 @@
-"""Bus of a chain: one port, or a port for each segment of the chain."""
+"""Bus of a chain: one port, or one port per segment."""
 
 from collections.abc import Iterable, Sequence
 from typing import Protocol
@@ -14,11 +14,11 @@ from snakewalk.drivers.protocol.control_table import ControlTable
 
 
 class GroupCycle(Protocol):
-    """A group read of servos, and the write of their goals: ``ControlCycle`` describes it."""
+    """Group read of servos, and write of their goals; see ``ControlCycle``."""
 
     @property
     def fast(self) -> bool:
-        """Whether all reads are fast ones."""
+        """Whether all reads are fast."""
         ...
 
     @property
@@ -33,7 +33,7 @@ class GroupCycle(Protocol):
 
     @property
     def since_sent_s(self) -> float:
-        """How old the values of a read are at most, s."""
+        """Largest possible age of the values of a read, s."""
         ...
 
     def write_goals(self, goals: NDArray[np.int32]) -> None:
@@ -46,23 +46,23 @@ class GroupCycle(Protocol):
 
 
 class ChainBus(Protocol):
-    """Interface for start-up, cycle and shutdown of a chain; ``DynamixelBus`` describes it."""
+    """Interface for start-up, cycle and shutdown of a chain; see ``DynamixelBus``."""
 
     @property
     def parts(self) -> Sequence[DynamixelBus]:
-        """The bus on each port; one that is on one port is its own only part."""
+        """The bus on each port; a bus on one port is its only part."""
         ...
 
     def port_of(self, servo_id: int) -> BytePort:
-        """Port that a servo, or another device, is on."""
+        """Port of a servo or another device."""
         ...
 
     def reopen(self) -> None:
-        """Close and open what is gone; raises ``PortError`` while it is not there."""
+        """Close and open lost ports; raises ``PortError`` if one is still missing."""
         ...
 
     def table_of(self, servo_id: int) -> ControlTable:
-        """Control table of one servo's model."""
+        """Control table of a servo's model."""
         ...
 
     def ping(self, servo_id: int) -> PingReply:
@@ -70,21 +70,21 @@ class ChainBus(Protocol):
         ...
 
     def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
-        """Ping each servo; returns those that replied."""
+        """Ping each servo; return those that replied."""
         ...
 
     def read(self, servo_id: int, name: str) -> int:
-        """Value of a register by its name."""
+        """Value of a register."""
         ...
 
     def read_each(
         self, servo_id: int, names: Iterable[str], optional: Iterable[str] = ()
     ) -> dict[str, int]:
-        """Values of many registers, by as few requests as can be."""
+        """Values of many registers, in few requests."""
         ...
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
-        """Write a register by its name."""
+        """Write a register."""
         ...
 
     def write_verified(self, servo_id: int, name: str, value: int) -> None:
@@ -92,7 +92,7 @@ class ChainBus(Protocol):
         ...
 
     def reboot(self, servo_id: int) -> None:
-        """Restart a servo: its alarms, its torque and its RAM settings are gone."""
+        """Restart a servo: it loses alarms, torque and RAM settings."""
         ...
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
@@ -114,5 +114,5 @@ class ChainBus(Protocol):
         ...
 
     def device_block(self, device_id: int, address: int, length: int) -> GroupCycle:
-        """Group read of one device that is not a servo."""
+        """Group read of a device that is not a servo."""
         ...

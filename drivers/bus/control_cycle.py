@@ -1,11 +1,11 @@
-"""The control cycle on the wire: goals to all servos, the state block from all of them.
+"""The control cycle on the wire: goals to all servos, then a read of their state blocks.
 
-- In a group read the servos behind a silent one stay silent, so requests list a silent servo last.
-- After an incomplete or damaged reply the cycle discards all bytes until the line is quiet.
-- An adapter may stall for longer than that. After a failure, requests therefore have a length of
-  which no reply is pending (``pending_replies``), and a late reply has the wrong length.
+- In a group read the servos after a silent one do not reply, so requests list it last.
+- After an incomplete or damaged reply the cycle discards bytes until the line is quiet.
+- An adapter may stall for longer. After a failure, requests have a length that no pending reply has
+  (``pending_replies``), so a late reply has the wrong length.
 - A repeated reply arrives sooner than the line could carry it, or adds surplus bytes.
-- After repeated failures plain reads replace fast ones: there, damage affects only one packet.
+- After repeated failures plain reads replace fast ones: damage then affects only one packet.
 """
 
 from __future__ import annotations
@@ -82,18 +82,17 @@ class ControlCycle:
 
         Args:
             port: the line; its servos have a return delay of 0.
-            ids: servos, in the order of all arrays here.
+            ids: servos, in the order of all arrays.
             goal_address: of the goal register, 4 bytes.
             read_address: of the block.
             read_bytes: its length.
             fast: begin with fast sync read.
-            latency_s: how long adapter and driver may hold bytes back, at most.
-            pending: pending replies of this port, shared by all who send requests on it; None: only
-                this cycle does.
-            line: reservation of this port's line, shared in the same way.
+            latency_s: largest delay of adapter and driver.
+            pending: pending replies of this port, shared by all senders; None: this cycle is alone.
+            line: reservation of this port's line, shared likewise.
             spin_s: on a device, poll from this time before the expected end of the reply, for at
-                most twice the time. 0: always sleep. None: ``SPIN_S`` from ``SPIN_FROM_BAUD``
-                upwards, else 0.
+                most twice the time. 0: always sleep. None: ``SPIN_S`` from ``SPIN_FROM_BAUD``, else
+                0.
 
         """
         self._port = port
@@ -122,15 +121,13 @@ class ControlCycle:
         self.counters = CycleCounters()
 
     def _goal_write(self, ids: Sequence[int], address: int) -> GroupWrite:
-        """Packet that writes goals."""
         return GroupWrite(ids, address)
 
     def _read_request(self, ids: Sequence[int], length: int, *, fast: bool) -> GroupReadRequest:
-        """Packet that reads ``length`` bytes of the block."""
         return GroupReadRequest(ids, self.read_address, length, fast=fast)
 
     def _native_path(self, spin_s: float | None) -> FastPath | None:
-        """Fast path of the port; None where all must go through the port's own calls."""
+        """Fast path of the port; None if it must use the port's own calls."""
         port, latency_s = self._port, self._latency_s
         packets = self._goals, self._default_request, self._line
         if isinstance(port, FastPathPort):
@@ -151,14 +148,14 @@ class ControlCycle:
 
     @property
     def given_up_on(self) -> tuple[str, ...]:
-        """The port's name, where fast reads were given up on it."""
+        """The port's name if fast reads were given up."""
         return (self._port.name,) if self.counters.fast_given_up else ()
 
     @property
     def since_sent_s(self) -> float:
-        """How long ago the last packet had left the line, s.
+        """Time since the last packet left the line, s.
 
-        After a read: how old its values are at most, as no servo measures before it was asked.
+        After a read it bounds the age of the values: no servo measures before the request.
         """
         return self._line.since_sent_s
 
@@ -174,7 +171,7 @@ class ControlCycle:
             self._port.write(self._goals.encode(goals)[sent:])
 
     def transact(self, goals: NDArray[np.int32]) -> GroupReadReply:
-        """``write_goals`` and ``read`` in one: both packets leave in one write, back to back.
+        """``write_goals`` and ``read``, with both packets in one write.
 
         Raises:
             PortError: the port is gone.
@@ -194,9 +191,9 @@ class ControlCycle:
         return self.finish_read()
 
     def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
-        """Send the request, behind goals (N,) if there are any; ``finish_read`` has the reply.
+        """Send the request, after goals (N,) if given; ``finish_read`` returns the reply.
 
-        Between the two, requests may begin on other ports.
+        Requests on other ports may begin between the two.
 
         Raises:
             PortError: the port is gone.
@@ -244,7 +241,7 @@ class ControlCycle:
         )
 
     def _without_late(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
-        """The reply without the results that may belong to an older request."""
+        """The reply without results that may belong to an older request."""
         new = np.array(
             [
                 not self._pending.is_pending(i, request.length, fast=request.fast)
@@ -259,13 +256,13 @@ class ControlCycle:
         )
 
     def _next_request(self) -> GroupReadRequest:
-        """The default request, unless order, kind or length must differ now."""
+        """The default request, unless order, kind or length must differ."""
         length, default = self.read_bytes, self._default_request
         none_pending = self._pending.empty
         if self._order is self._default_order and self.fast is default.fast and none_pending:
             return default
         if not none_pending:
-            # on a silent bus some lengths stay free for the reads after its first reply
+            # on a silent bus keep some lengths for the reads after its first reply
             responding, spares = self._responding(), SPARE_LENGTHS
             if not responding:
                 responding, spares = [*self._ids], SPARE_LENGTHS // 2
@@ -281,7 +278,7 @@ class ControlCycle:
         return request
 
     def _responding(self) -> list[int]:
-        """IDs of the servos that have replied lately."""
+        """IDs of the servos that have replied recently."""
         return [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
 
     def _send(self, packet: bytes) -> None:
@@ -289,7 +286,7 @@ class ControlCycle:
         self._port.write(packet)
 
     def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
-        """Send a request; until when its reply is awaited."""
+        """Send a request; return the deadline of its reply."""
         packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
         if self._failed_in_a_row:  # these bytes answer an older request
             self.counters.late_bytes += self._port.getBytesAvailable()
@@ -302,13 +299,13 @@ class ControlCycle:
     def _receive_rest(
         self, request: GroupReadRequest, raw: bytes, remaining_s: float
     ) -> tuple[bytes, GroupReadReply]:
-        """Receive the rest of an irregular reply of which ``raw`` has arrived."""
+        """Receive the rest of an irregular reply that begins with ``raw``."""
         return self._receive(request, raw, self._port.clock.now_s() + remaining_s)
 
     def _receive(
         self, request: GroupReadRequest, raw: bytes, deadline_s: float
     ) -> tuple[bytes, GroupReadReply]:
-        """Receive and parse the reply, and then what stuffing has added to it."""
+        """Receive and parse the reply, then the bytes added by stuffing."""
         port, expected = self._port, request.reply_bytes
         if len(raw) < expected:
             raw += port.read_until(expected - len(raw), deadline_s)
@@ -320,7 +317,7 @@ class ControlCycle:
             raw = self._with_surplus(request, raw, deadline_s)
         reply = request.parse(raw)
         while len(raw) >= request.reply_bytes and not reply.complete:
-            more = request.missing_bytes(raw)  # stuffed bytes, or an older reply, come on top
+            more = request.missing_bytes(raw)  # stuffed bytes or an older reply are additional
             surplus = len(raw) + more - expected
             got = self._port.read_until(more, deadline_s + surplus * self._byte_s) if more else b""
             if not got:
@@ -330,14 +327,14 @@ class ControlCycle:
         return raw, reply
 
     def _with_surplus(self, request: GroupReadRequest, raw: bytes, deadline_s: float) -> bytes:
-        """The bytes of a reply behind which there are more, and those of one that is behind it."""
+        """The bytes of a reply and of a second one after it."""
         port, expected = self._port, request.reply_bytes
         if not request.parse(raw[:expected]).whole:
             return raw
         more_s = port.clock.now_s() + 2 * HEAD * self._byte_s
         raw += port.read_until(expected + HEAD - len(raw), more_s)
         if request.header not in raw[expected:]:
-            return raw[:expected]  # noise, as when an adapter turns the line round
+            return raw[:expected]  # noise, as when an adapter switches direction
         return raw + port.read_until(2 * expected - len(raw), deadline_s)
 
     def _came_twice(self, request: GroupReadRequest, deadline_s: float) -> bool:
@@ -349,7 +346,6 @@ class ControlCycle:
 
     @property
     def _byte_s(self) -> float:
-        """Time of a byte on the line."""
         return BITS_PER_BYTE / self._port.getBaudRate()
 
     def _succeeded(self) -> None:
@@ -368,7 +364,7 @@ class ControlCycle:
         *,
         timed_out: bool,
     ) -> None:
-        """Count, and prepare for late replies of the servos that have ``responded`` at all."""
+        """Count, and prepare for late replies; ``responded`` marks servos with any reply."""
         self.counters.timeouts += timed_out
         self.counters.unclean += not timed_out
         self._clean_in_a_row = 0
@@ -382,7 +378,7 @@ class ControlCycle:
         missing = np.flatnonzero(~reply.answered)
         self._pending.add([request.ids[k] for k in missing], request.length, fast=request.fast)
         if not responded.all():
-            first = int(np.argmin(responded))  # those behind it could not respond
+            first = int(np.argmin(responded))  # those after it could not respond
             self._order = (*order[:first], *order[first + 1 :], order[first])
         drained = self._port.drain_until_quiet(self._latency_s)
         self.counters.drained_bytes += drained

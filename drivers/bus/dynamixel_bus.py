@@ -1,8 +1,8 @@
 """The DYNAMIXEL bus: pings, registers, reboots, and the group codecs of a chain.
 
-dynamixel-sdk pings and reboots. Its defects (docs/reference/sdk-defects.md) are avoided:
-``drivers.bus.register_io`` reads and writes registers, ``drivers.bus.probe`` pings all servos, and
-an exception in a port leaves the port free.
+dynamixel-sdk pings and reboots. To avoid its defects (docs/reference/sdk-defects.md),
+``register_io`` reads and writes registers, ``probe`` pings all servos, and an exception in a port
+leaves the port free.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -55,7 +55,7 @@ class PingReply:
 
 
 class DynamixelBus:
-    """Servos of one model, or of several, on one byte port."""
+    """Servos on one byte port."""
 
     def __init__(
         self,
@@ -69,13 +69,13 @@ class DynamixelBus:
 
         Args:
             port: the line.
-            model: model of all servos, or of each by its ID; a servo that is not listed is taken
-                for the first. A model is a name, a file or a record.
-            latency_s: how long adapter and driver may hold bytes back.
-            tries: how often a transaction is begun at most.
+            model: of all servos, or by ID; unlisted servos have the first. A name, a file or a
+                record.
+            latency_s: largest delay of adapter and driver.
+            tries: largest number of attempts of a transaction.
 
         Raises:
-            ControlTableError: a model is not known.
+            ControlTableError: a model is unknown.
 
         """
         self.port = port
@@ -93,18 +93,18 @@ class DynamixelBus:
 
     @property
     def parts(self) -> "tuple[DynamixelBus, ...]":
-        """The bus itself; a ``SegmentedBus`` has one for each port."""
+        """The bus itself; a ``SegmentedBus`` has one per port."""
         return (self,)
 
     def port_of(self, servo_id: int) -> BytePort:
-        """Port that a servo, or another device, is on."""
+        """Port of a servo or another device."""
         return self.port
 
     def reopen(self) -> None:
         """Close and open the port.
 
         Raises:
-            PortError: it is not there.
+            PortError: it is missing.
 
         """
         reopen(self.port)
@@ -113,7 +113,7 @@ class DynamixelBus:
         """Ping one servo.
 
         Raises:
-            NoAnswerError: nobody answered.
+            NoAnswerError: no reply.
 
         """
 
@@ -127,7 +127,7 @@ class DynamixelBus:
         return self._retry(once)
 
     def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
-        """Ping each servo; returns those that replied."""
+        """Ping each servo; return those that replied."""
         found = {}
         for servo_id in servo_ids:
             try:
@@ -137,7 +137,7 @@ class DynamixelBus:
         return found
 
     def scan(self) -> dict[int, PingReply]:
-        """All servos at the port's baud rate, by a broadcast ping; lasts most of a second."""
+        """All servos at the port's baud rate, by a broadcast ping of almost a second."""
         return {
             reply.servo_id: PingReply(
                 reply.servo_id,
@@ -151,7 +151,7 @@ class DynamixelBus:
     def probe(self, servo_id: int, block: tuple[str, str] | None = None) -> Probe:
         """Ping 5 times until quiet, or read from the first to the last register of a block.
 
-        Finds two servos of one ID, which a ping does not.
+        Unlike a ping, it finds two servos with one ID.
 
         Raises:
             PortError: the port is gone.
@@ -162,11 +162,11 @@ class DynamixelBus:
         return probe(self.port, servo_id, PROBES, self.latency_s, ends)
 
     def read(self, servo_id: int, name: str) -> int:
-        """Value of a register by its name.
+        """Value of a register.
 
         Raises:
             ControlTableError: no such register.
-            NoAnswerError: nobody answered.
+            NoAnswerError: no reply.
             ServoError: the servo refused.
 
         """
@@ -176,15 +176,14 @@ class DynamixelBus:
     def read_each(
         self, servo_id: int, names: Iterable[str], optional: Iterable[str] = ()
     ) -> dict[str, int]:
-        """Values of many registers by one request for the block in which they lie.
+        """Values of many registers, one request per block.
 
-        A servo that refuses a block is asked register by register.
-
-        ``optional`` registers, which a firmware may lack, are missing from the result, or 0.
+        A servo that refuses a block is asked register by register. ``optional`` registers, which a
+        firmware may lack, are missing from the result, or 0.
 
         Raises:
             ControlTableError: no such register.
-            NoAnswerError: nobody answered.
+            NoAnswerError: no reply.
             ServoError: the servo refused.
 
         """
@@ -220,11 +219,11 @@ class DynamixelBus:
         )
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
-        """Write a register by its name, in ``tries`` attempts, or in as many as other transactions.
+        """Write a register; ``tries`` None: as other transactions.
 
         Raises:
-            ControlTableError: no such register, or the value does not fit it.
-            NoAnswerError: nobody answered.
+            ControlTableError: no such register, or the value does not fit.
+            NoAnswerError: no reply.
             ServoError: the servo refused.
 
         """
@@ -238,10 +237,10 @@ class DynamixelBus:
         )
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
-        """Write one value to all servos at once, without confirmation.
+        """Write one value to all servos, without confirmation.
 
         Raises:
-            ControlTableError: no such register, or the value does not fit it.
+            ControlTableError: no such register, or the value does not fit.
 
         """
         register = self._shared(servo_ids, name)
@@ -253,16 +252,16 @@ class DynamixelBus:
         self.port.write(raw)
 
     def write_kept(self, servo_id: int, name: str, value: int) -> None:
-        """Write a register of the EEPROM so that it outlasts power-off; raises as ``write``."""
+        """Write an EEPROM register so that it persists; raises as ``write``."""
         self.write(servo_id, name, value)
 
     def write_verified(self, servo_id: int, name: str, value: int, *, kept: bool = False) -> None:
         """Write a register if it differs, and read it back: EEPROM wears out, and writes get lost.
 
-        With ``kept`` it writes as ``write_kept`` does.
+        ``kept`` uses ``write_kept``.
 
         Raises:
-            BusError: it does not read back as written.
+            BusError: the value read back differs.
 
         """
         if self.read(servo_id, name) == value:
@@ -273,7 +272,7 @@ class DynamixelBus:
             raise BusError(f"servo {servo_id}: {name}: wrote {value}, reads back {got}")
 
     def reboot(self, servo_id: int) -> None:
-        """Restart a servo: clears hardware errors, torque goes off, its turn count is lost."""
+        """Restart a servo: it loses hardware errors, torque and turn count."""
 
         def once() -> None:
             result, error = self._sdk.reboot(self.port, servo_id)
@@ -286,7 +285,7 @@ class DynamixelBus:
         """Control cycle of these servos: writes Goal Position, reads the state block.
 
         Raises:
-            ControlTableError: the model lacks one of the registers.
+            ControlTableError: the model lacks a register.
 
         """
         first, *_, last = self.table.state_names
@@ -296,7 +295,7 @@ class DynamixelBus:
         """Group read of the slow state block: voltage and temperature.
 
         Raises:
-            ControlTableError: the model lacks one of the registers.
+            ControlTableError: the model lacks a register.
 
         """
         return self.block(servo_ids, "Present Input Voltage", "Present Temperature", fast=fast)
@@ -304,10 +303,10 @@ class DynamixelBus:
     def block(
         self, servo_ids: Sequence[int], first: str, last: str, *, fast: bool = True
     ) -> ControlCycle:
-        """Group read of the registers from ``first`` to ``last``, both included.
+        """Group read of the registers from ``first`` to ``last``, inclusive.
 
         Raises:
-            ControlTableError: the model lacks one of the registers.
+            ControlTableError: the model lacks a register.
 
         """
         end = self._shared(servo_ids, last)
@@ -325,7 +324,7 @@ class DynamixelBus:
         )
 
     def device_block(self, device_id: int, address: int, length: int) -> ControlCycle:
-        """Group read of one device that is not a servo, from an address."""
+        """Group read of a device that is not a servo."""
         return ControlCycle(
             self.port,
             (device_id,),
@@ -338,14 +337,14 @@ class DynamixelBus:
         )
 
     def table_of(self, servo_id: int) -> ControlTable:
-        """Control table of one servo's model."""
+        """Control table of a servo's model."""
         return self._tables.get(servo_id, self.table)
 
     def _shared(self, servo_ids: Sequence[int], name: str) -> Register:
-        """A register that all servos of a group have, at one place.
+        """A register that all servos of a group have at one address.
 
         Raises:
-            ControlTableError: a model lacks it, or has it elsewhere.
+            ControlTableError: a model lacks it, or has it at another address.
 
         """
         tables = {self.table_of(servo_id).model: servo_id for servo_id in servo_ids}
@@ -385,7 +384,7 @@ class DynamixelBus:
 
 
 def _blocks(registers: Iterable[Register]) -> list[list[Register]]:
-    """Registers by address, parted where there is much between two of them."""
+    """Registers by address, split at large gaps."""
     blocks: list[list[Register]] = []
     end = 0
     for register in sorted(set(registers), key=lambda each: each.address):

@@ -1,7 +1,6 @@
 """Fast path: the regular control cycle of one kind of port, in fewer calls.
 
-It accepts only what is exactly as expected. Anything else is handed back as it arrived, and
-``ControlCycle`` continues with it.
+It accepts only regular replies. It returns all other bytes unchanged to ``ControlCycle``.
 """
 
 from typing import Protocol, runtime_checkable
@@ -15,19 +14,19 @@ from snakewalk.drivers.bus.line_reservation import LineReservation
 
 
 class FastPath(Protocol):
-    """One group read of servos, alone or behind their goals."""
+    """Group read of servos, alone or after their goals."""
 
     @property
     def remaining_s(self) -> float:
-        """Longest remaining time of the reply of an irregular cycle."""
+        """Longest remaining time of an irregular reply."""
         ...
 
     def write(self, goals: NDArray[np.int32]) -> int:
-        """Send goals (N,); returns how many bytes were taken, 0 where the port must send them."""
+        """Send goals (N,); return the number of bytes sent, 0 if the port must send them."""
         ...
 
     def begin(self, goals: NDArray[np.int32] | None) -> bool:
-        """Send the request, behind ``goals`` (N,) if there are any; False if nothing was sent.
+        """Send the request, after ``goals`` (N,) if given; False if nothing was sent.
 
         Raises:
             PortError: the port is gone.
@@ -39,7 +38,7 @@ class FastPath(Protocol):
         """Receive the reply to the request of ``begin``.
 
         Returns:
-            The reply; the bytes that arrived, if they are irregular.
+            The reply, or the bytes if they are irregular.
 
         """
         ...
@@ -47,7 +46,7 @@ class FastPath(Protocol):
 
 @runtime_checkable
 class FastPathPort(Protocol):
-    """A byte port that has one of its own: a simulated line."""
+    """A byte port with a fast path of its own: a simulated line."""
 
     def fast_path(
         self,
@@ -57,5 +56,5 @@ class FastPathPort(Protocol):
         *,
         latency_s: float,
     ) -> FastPath | None:
-        """Prepare the packets; None where all must go through the port's own calls."""
+        """Prepare the packets; None if the port's own calls must be used."""
         ...

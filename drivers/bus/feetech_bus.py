@@ -1,8 +1,7 @@
 """The bus of Feetech servos: ``DynamixelBus`` with Feetech's packets.
 
-Register values are those of the table: the bus converts byte order, signs and alarms. A servo
-forgets EEPROM registers at power-off that were written while Lock was 1; ``write_kept`` unlocks for
-one write.
+The bus converts byte order, signs and alarms to the table's values. A servo loses EEPROM registers
+at power-off that were written while Lock was 1; ``write_kept`` unlocks for one write.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -42,7 +41,7 @@ _REPLY_S = 0.005
 
 
 class FeetechBus(DynamixelBus):
-    """Feetech servos of one model, or of several of one byte order, on one byte port."""
+    """Feetech servos of one byte order on one byte port."""
 
     def __init__(
         self,
@@ -55,7 +54,7 @@ class FeetechBus(DynamixelBus):
         """Prepare; nothing is sent.
 
         Raises:
-            ControlTableError: a model is not known, or is not from Feetech.
+            ControlTableError: a model is unknown, or not from Feetech.
 
         """
         super().__init__(port, model, latency_s=latency_s, tries=tries)
@@ -70,7 +69,7 @@ class FeetechBus(DynamixelBus):
         """Ping one servo and read its model number.
 
         Raises:
-            NoAnswerError: nobody answered.
+            NoAnswerError: no reply.
 
         """
         status = self._retry(lambda: self._exchange(servo_id, FeetechInstruction.PING, b"", 0))
@@ -78,7 +77,7 @@ class FeetechBus(DynamixelBus):
         return PingReply(servo_id, number, None, bool(status.error & ALERT))
 
     def answering(self) -> list[int]:
-        """IDs that answer a ping at the port's baud rate, each asked once; lasts 3 seconds."""
+        """IDs that reply to one ping at the port's baud rate; lasts 3 seconds."""
         found = []
         for servo_id in range(MAX_ID + 1):
             try:
@@ -93,10 +92,10 @@ class FeetechBus(DynamixelBus):
         return self.find(self.answering())
 
     def read_bytes(self, servo_id: int, register: Register) -> bytes:
-        """Bytes of a register as they are on the wire.
+        """Bytes of a register as on the wire.
 
         Raises:
-            NoAnswerError: nobody answered.
+            NoAnswerError: no reply.
 
         """
         span = bytes((register.address, register.size))
@@ -121,11 +120,11 @@ class FeetechBus(DynamixelBus):
         return probe_with(self.port, servo_id, PROBES, packet, reply_bytes, wait_s, FeetechParser)
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
-        """Write a register by its name; in the EEPROM area, until power-off while Lock is 1.
+        """Write a register; an EEPROM register lasts until power-off while Lock is 1.
 
         Raises:
-            ControlTableError: no such register, or the value does not fit it.
-            NoAnswerError: nobody answered.
+            ControlTableError: no such register, or the value does not fit.
+            NoAnswerError: no reply.
 
         """
         table = self.table_of(servo_id)
@@ -134,12 +133,12 @@ class FeetechBus(DynamixelBus):
         self._retry(lambda: self._exchange(servo_id, FeetechInstruction.WRITE, params, 0), tries)
 
     def write_kept(self, servo_id: int, name: str, value: int) -> None:
-        """Write a register of the EEPROM so that it outlasts power-off: unlock, write, lock.
+        """Write an EEPROM register so that it persists: unlock, write, lock.
 
-        The port changes to a new baud rate as well.
+        The port follows a new baud rate.
 
         Raises:
-            ControlTableError: no such register, or the value does not fit it.
+            ControlTableError: no such register, or the value does not fit.
             BusError: the servo does not reply.
 
         """
@@ -153,10 +152,10 @@ class FeetechBus(DynamixelBus):
         self.write(servo_id, "Lock", 1)
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
-        """Write one value to all servos at once, without confirmation.
+        """Write one value to all servos, without confirmation.
 
         Raises:
-            ControlTableError: no such register, or the value does not fit it.
+            ControlTableError: no such register, or the value does not fit.
 
         """
         self._shared(servo_ids, name)
@@ -166,7 +165,7 @@ class FeetechBus(DynamixelBus):
             self._send(packet.encode(np.full(len(servo_ids), value, np.int32)))
 
     def reboot(self, servo_id: int) -> None:
-        """Restart a servo: torque goes off; RAM and what was written under Lock are forgotten."""
+        """Restart a servo: it loses torque, RAM, and values written under Lock."""
         self._retry(lambda: self._exchange(servo_id, FeetechInstruction.RESTART, b"", 0))
 
     def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
@@ -186,7 +185,7 @@ class FeetechBus(DynamixelBus):
         """Group read of the registers from ``first`` to ``last``, converted.
 
         Raises:
-            ControlTableError: the model lacks one of the registers.
+            ControlTableError: the model lacks a register.
 
         """
         del fast
@@ -197,7 +196,7 @@ class FeetechBus(DynamixelBus):
         return self._cycle(servo_ids, (start.address, length), convert)
 
     def device_block(self, device_id: int, address: int, length: int) -> ControlCycle:
-        """Raise an error: no device of Protocol 2.0 is on this bus.
+        """Raise an error: this bus has no devices of Protocol 2.0.
 
         Raises:
             ControlTableError: always.
@@ -223,7 +222,7 @@ class FeetechBus(DynamixelBus):
         )
 
     def _facts_of(self, servo_ids: Iterable[int]) -> ServoModel:
-        """Model of some servos, or of the first if they are of several with the same words."""
+        """Model of some servos, which must have the same byte order and group reads."""
         facts = [self.table_of(each).facts for each in servo_ids]
         if len({(each.byte_order, each.sync_read) for each in facts}) > 1:
             names = ", ".join(dict.fromkeys(each.model for each in facts))
@@ -244,8 +243,8 @@ class FeetechBus(DynamixelBus):
         """Reply of ``length`` bytes of one servo to one instruction.
 
         Raises:
-            NoAnswerError: nobody answered.
-            BusError: a reply of another length came.
+            NoAnswerError: no reply.
+            BusError: a reply has another length.
 
         """
         port, packet = self.port, frame(servo_id, code, params)
@@ -278,10 +277,10 @@ def servo_bus(
     latency_s: float = 0.004,
     tries: int = 3,
 ) -> DynamixelBus:
-    """Bus of a port for the protocol of its servos; arguments as of ``DynamixelBus``.
+    """Bus of a port for the protocol of its servos; arguments as ``DynamixelBus``.
 
     Raises:
-        ControlTableError: a model is not known, or servos of two protocols are on the port.
+        ControlTableError: a model is unknown, or the port has servos of two protocols.
 
     """
     bus = DynamixelBus(port, model, latency_s=latency_s, tries=tries)

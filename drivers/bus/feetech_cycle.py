@@ -33,7 +33,7 @@ Convert = Callable[[Bytes], Bytes]
 
 
 class FeetechReadRequest(GroupReadRequest):
-    """One sync read of ``length`` bytes at ``address`` from ``ids``, or a read of one servo."""
+    """Sync read of ``length`` bytes at ``address`` from ``ids``, or a read of one servo."""
 
     header = HEADER
 
@@ -51,7 +51,7 @@ class FeetechReadRequest(GroupReadRequest):
         self.reply_bytes = len(self.ids) * self.frame_bytes
 
     def parse(self, raw: bytes) -> GroupReadReply:
-        """Find each servo's result in the bytes that arrived before the deadline."""
+        """Find each servo's result in the bytes."""
         reader = FeetechParser()
         by_id, unexpected = self._in_turn(reader.feed(raw))
         unexpected += reader.dropped_bytes + reader.pending
@@ -61,14 +61,14 @@ class FeetechReadRequest(GroupReadRequest):
         return reply._replace(whole=True, flawless=not reply.error.any())
 
     def missing_bytes(self, raw: bytes) -> int:
-        """How many bytes more would complete the replies; 0 if none would."""
+        """Number of bytes that would complete the replies, or 0."""
         reader = FeetechParser()
         missing = len(self.ids) - len(self._in_turn(reader.feed(raw))[0])
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
 
 class FeetechWrite(GroupWrite):
-    """Sync write of one register to ``ids``, in their order."""
+    """Sync write of one register to ``ids``."""
 
     def __init__(self, ids: Sequence[int], name: str, facts: ServoModel) -> None:
         self._ids, self._name, self._facts = tuple(ids), name, facts
@@ -90,7 +90,7 @@ class FeetechWrite(GroupWrite):
 
 
 class FeetechCycle(ControlCycle):
-    """Goals of Feetech servos, and a converted block of them, by sync read."""
+    """Goals and a converted block of Feetech servos, by sync read."""
 
     def __init__(
         self,
@@ -106,8 +106,8 @@ class FeetechCycle(ControlCycle):
     ) -> None:
         """Prepare the packets.
 
-        ``span`` is address and length of the block on the wire. ``convert`` makes the returned
-        block (N, n) of it (N, length).
+        ``span`` is address and length of the block on the wire. ``convert`` maps it (N, length) to
+        the returned block (N, n).
         """
         self._facts, self._convert, self._clock = facts, convert, port.clock
         super().__init__(
@@ -122,7 +122,7 @@ class FeetechCycle(ControlCycle):
         )
 
     def finish_read(self) -> GroupReadReply:
-        """Receive the reply to the request of ``begin_read``, converted."""
+        """Receive the converted reply to the request of ``begin_read``."""
         reply = super().finish_read()
         return reply._replace(data=self._convert(reply.data))
 
@@ -141,7 +141,7 @@ class FeetechCycle(ControlCycle):
 
 
 class FeetechSingleReads(FeetechCycle):
-    """Cycle of servos without sync read: goals by sync write, a read of each servo in turn."""
+    """Cycle of servos without sync read: goals by sync write, then one read per servo."""
 
     def __init__(
         self,
@@ -155,7 +155,7 @@ class FeetechSingleReads(FeetechCycle):
         pending: PendingReplies,
         line: LineReservation,
     ) -> None:
-        """Prepare the packets; arguments as of ``FeetechCycle``."""
+        """Prepare the packets; arguments as ``FeetechCycle``."""
         make = partial(FeetechCycle, latency_s=latency_s, pending=pending, line=line)
         self._singles = [make(port, (each,), facts, span, convert) for each in ids]
         super().__init__(
@@ -165,18 +165,18 @@ class FeetechSingleReads(FeetechCycle):
 
     @property
     def since_sent_s(self) -> float:
-        """How old the values of a read are at most, s."""
+        """Largest possible age of the values of a read, s."""
         return self._clock.now_s() - self._begun_s
 
     def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
-        """Send goals (N,) if there are any; the servos are asked in ``finish_read``."""
+        """Send goals (N,) if given; ``finish_read`` asks the servos."""
         if goals is not None:
             self.write_goals(goals)
         self._begun_s = self._clock.now_s()
         self.counters.reads += 1
 
     def finish_read(self) -> GroupReadReply:
-        """Ask each servo."""
+        """Read each servo."""
         replies = [each.read() for each in self._singles]
         for name in ("timeouts", "unclean", "copies", "drained_bytes", "late_bytes"):
             total = sum(getattr(each.counters, name) for each in self._singles)

@@ -1,4 +1,4 @@
-"""Feetech servos on a line: found by pings of their own protocol, and named by their registers."""
+"""Scan for Feetech servos: pings of their own protocol, and model numbers."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ _ORDERS: Final[dict[int, Literal["little", "big"]]] = {0: "little", 1: "big"}
 
 @dataclass(frozen=True, slots=True)
 class FeetechServo:
-    """One servo that answered a ping."""
+    """A servo that answered a ping."""
 
     servo_id: int
     model: str
@@ -47,9 +47,9 @@ def find_feetech(
     *,
     latency_s: float = 0.004,
 ) -> list[FeetechServo]:
-    """Servos at each baud rate, by ID; leaves the port at the rate it had.
+    """Servos at each baud rate, by ID; the port keeps its rate.
 
-    Each ID is pinged only at a rate at which a broadcast ping gets any reply.
+    Single IDs are pinged only at rates at which a broadcast ping gets a reply.
 
     Raises:
         PortError: the port is gone.
@@ -74,7 +74,6 @@ def find_feetech(
 
 
 def _anybody(port: BytePort) -> bool:
-    """Whether a broadcast ping is answered."""
     packet = frame(BROADCAST_ID, FeetechInstruction.PING)
     port.clearPort()
     port.write(packet)

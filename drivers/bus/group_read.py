@@ -1,7 +1,7 @@
-"""Group reads: one (fast) sync read to many servos, and their reply as one result per servo.
+"""Group reads: one (fast) sync read of many servos, with one result per servo.
 
 A complete reply without stuffing is decoded in one compiled pass (``drivers.protocol.frames``). In
-any other reply only results that certainly belong to the request are valid.
+any other reply a result is valid only if it certainly belongs to the request.
 """
 
 from collections.abc import Sequence
@@ -53,12 +53,12 @@ class GroupReadReply(NamedTuple):
 
     @property
     def valid_count(self) -> int:
-        """Number of servos whose block is valid."""
+        """Number of valid blocks."""
         return len(self.valid) if self.flawless else int(np.count_nonzero(self.valid))
 
 
 class GroupReadRequest:
-    """One sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
+    """Sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
 
     header = HEADER
     """First bytes of each packet."""
@@ -97,7 +97,7 @@ class GroupReadRequest:
         """Length of the whole reply without stuffing."""
 
     def parse(self, raw: bytes) -> GroupReadReply:
-        """Find each servo's result in the bytes that arrived before the deadline."""
+        """Find each servo's result in the bytes."""
         if len(raw) == self.reply_bytes:
             reply = self._regular(np.frombuffer(raw, np.uint8))
             if reply is not None:
@@ -105,7 +105,7 @@ class GroupReadRequest:
         return self._salvage_fast(raw) if self.fast else self._salvage_plain(raw)
 
     def regular(self, status: int, data: Bytes, error: Bytes) -> GroupReadReply:
-        """Regular reply: ``status`` is what the frame reader returned; ``data`` is kept."""
+        """Regular reply from the frame reader's ``status``; keeps ``data``."""
         if status == FLAWLESS:
             return GroupReadReply(data, *self._flawless)
         error = error.copy()
@@ -113,9 +113,9 @@ class GroupReadRequest:
         return GroupReadReply(data, valid, error, self._all, clean=True, whole=True)
 
     def missing_bytes(self, raw: bytes) -> int:
-        """How many bytes more would complete the replies; 0 if none would.
+        """Number of bytes that would complete the replies, or 0.
 
-        Stuffing made plain ones longer, or an older reply is in front.
+        They are missing if stuffing made plain replies longer, or an older reply came first.
         """
         if self.fast:
             start = raw.rfind(self._fast_head)
@@ -125,7 +125,6 @@ class GroupReadRequest:
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
     def _regular(self, raw: Bytes) -> GroupReadReply | None:
-        """The reply if it is regular, else None."""
         data = np.empty((len(self.ids), self.length), np.uint8)
         if self.fast:
             status = read_fast(raw, self.heads[0], self.id_bytes, data, self._error)
@@ -145,16 +144,16 @@ class GroupReadRequest:
     def _in_turn(self, packets: Sequence[object]) -> tuple[dict[int, StatusPacket], int]:
         """Replies of this length by servo, and the number of damaged or misplaced packets.
 
-        Servos reply in the order of the request, so packets of every longest run in that order are
-        new, and earlier packets of the same servo are copies of old ones. If two replies have one
-        place, neither is valid.
+        Servos reply in the order of the request. Packets of every longest run in that order are
+        new; earlier packets of the same servo are copies of old ones. Two replies at one place are
+        both invalid.
         """
         told = [
             packet
             for before, packet in zip([None, *packets], packets, strict=False)
             if isinstance(packet, StatusPacket)
             and packet.servo_id in self._index
-            and len(packet.params) in (self.length, 0)  # else to another, older request
+            and len(packet.params) in (self.length, 0)  # else to an older request
             and packet != before  # an immediate copy has the same content
         ]
         turns = [self._index[packet.servo_id] for packet in told]
@@ -172,9 +171,9 @@ class GroupReadRequest:
         return by_id, len(packets) - len(by_id)
 
     def _salvage_fast(self, raw: bytes) -> GroupReadReply:
-        """Results in front of the first damage, each proved by its CRC of everything so far."""
+        """Results before the first damage; a CRC proves each."""
         by_id: dict[int, StatusPacket] = {}
-        start = raw.rfind(self._fast_head)  # of two, the first is an older one that came twice
+        start = raw.rfind(self._fast_head)  # of two, the first is a repeated older one
         if start < 0:
             return self._partial(by_id, clean=not raw)
         at = start + len(self._fast_head)
@@ -199,7 +198,7 @@ class GroupReadRequest:
         for servo_id, packet in by_id.items():
             k = self._index[servo_id]
             answered[k], error[k] = True, packet.error
-            # an error status may lack data: a reply, but no value
+            # an error status may lack data
             if packet.result == 0 and len(packet.params) == self.length:
                 data[k] = np.frombuffer(packet.params, np.uint8)
                 valid[k] = True
@@ -207,7 +206,7 @@ class GroupReadRequest:
 
 
 def _run_lengths(values: Sequence[int]) -> list[int]:
-    """Return for each value the length of the longest rising run that ends with it."""
+    """Length of the longest rising run that ends with each value."""
     lengths: list[int] = []
     for k, value in enumerate(values):
         lower = [lengths[j] for j in range(k) if values[j] < value]

@@ -15,7 +15,7 @@ from snakewalk.drivers.protocol.packet import (
 
 
 class GroupWrite:
-    """Sync write of 4-byte registers at ``address`` to ``ids``, in their order."""
+    """Sync write of 4-byte registers at ``address`` to ``ids``."""
 
     def __init__(self, ids: Sequence[int], address: int) -> None:
         head = address.to_bytes(2, "little") + (4).to_bytes(2, "little")
@@ -27,11 +27,11 @@ class GroupWrite:
         """Bytes of the packet, unless it is stuffed."""
 
     def template(self) -> NDArray[np.uint8]:
-        """Packet to fill, a new array."""
+        """New packet to fill."""
         return self._frame.copy()
 
     def encode(self, values: NDArray[np.int32]) -> bytes:
-        """Packet that writes ``values`` (N,); stuffed where the values need it."""
+        """Packet that writes ``values`` (N,), stuffed if necessary."""
         self._values[:] = values
         sendable = fill(self._frame, self._values)
         raw = self._frame.tobytes()

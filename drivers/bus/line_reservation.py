@@ -1,4 +1,4 @@
-"""Time until which a line carries the bytes that were sent: no reply begins earlier.
+"""Time until which a line carries the sent bytes: no reply begins earlier.
 
 A write returns before its bytes have left. A reply that is complete before it can have crossed the
 line is a copy of an older one.
@@ -22,34 +22,34 @@ class LineReservation:
         self._clock, self._paced, self._in_vain = clock, paced, 0
         self.free_s = np.array([clock.now_s()])
         """(1,) when all that was sent will have left, on the clock, s; compiled code writes it."""
-        # the same memory: numpy needs three times as long for a number
+        # the same memory: numpy needs three times as long for a scalar
         self._free_s = self.free_s.data.cast("B").cast("d")
 
     @property
     def zero_s(self) -> float | None:
-        """Zero of the clock in the machine's monotonic time; None of a clock without one."""
+        """Zero of the clock in the machine's monotonic time, or None."""
         return self._clock.zero_s if isinstance(self._clock, WallClock) else None
 
     @property
     def since_sent_s(self) -> float:
-        """How long ago all that was sent had left the line; 0 while it is still on it."""
+        """Time since all sent bytes left the line; 0 before."""
         return max(0.0, self._clock.now_s() - self._free_s[0])
 
     def reserve(self, wire_s: float) -> float:
-        """Note that something is sent now; when all will have left, on the clock, s."""
+        """Note a packet sent now; return the clock time at which all bytes will have left, s."""
         free_s = max(self._clock.now_s(), self._free_s[0]) + wire_s
         self._free_s[0] = free_s
         return free_s
 
     def came_twice(self, free_s: float, request_s: float, reply_s: float) -> bool:
-        """Whether a reply that is complete now cannot be that to the last request.
+        """Whether a reply that is complete now came too early for the last request.
 
-        ``free_s`` is the time at which the request will have left.
+        The request will have left at ``free_s``.
         """
         late_s = self._clock.now_s() - free_s - reply_s
         return self._paced and late_s < -(1.0 - _LEAST_SHARE) * (request_s + reply_s)
 
     def note_copies(self, *, answered: bool) -> None:
-        """Note that replies had come twice, and whether the right one was behind them."""
+        """Note repeated replies, and whether the right one came after them."""
         self._in_vain = 0 if answered else self._in_vain + 1
         self._paced = self._paced and self._in_vain < _IN_VAIN

@@ -1,7 +1,7 @@
-"""Requested replies that did not arrive: they may still arrive, and must not count as new.
+"""Missing replies: they may still arrive, and must not count as new.
 
-A status packet contains the servo's ID and its length, but not the request. A reply therefore
-belongs to the present request only if no older request for that length is pending.
+A status packet has the servo's ID and its length, but not the request. So a reply belongs to the
+present request only if no older request for that length is pending.
 """
 
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ class PendingReplies:
     def __init__(self, clock: Clock, horizon_s: float = HORIZON_S) -> None:
         self._clock = clock
         self._horizon_s = horizon_s
-        # servo, fast, length -> until when such a reply may arrive; may hold expired entries
+        # servo, fast, length -> time until which such a reply may arrive; may hold expired entries
         self._until_s: dict[tuple[int, bool, int], float] = {}
         self._last_s = 0.0
 
@@ -44,7 +44,7 @@ class PendingReplies:
     def free_length(
         self, servo_ids: Iterable[int], shortest: int, *, fast: bool, spares: int = SPARE_LENGTHS
     ) -> int:
-        """Shortest reply length that no servo still has pending; ``shortest`` if all do."""
+        """Shortest reply length that no servo has pending; ``shortest`` if all do."""
         ids = tuple(servo_ids)
         for length in range(shortest, shortest + spares):
             if not any(self.is_pending(servo_id, length, fast=fast) for servo_id in ids):

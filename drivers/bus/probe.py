@@ -1,4 +1,4 @@
-"""Requests that receive until the line is quiet: they show servos with one ID, or other masters."""
+"""Requests that receive until the line is quiet: they reveal equal IDs and other masters."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -74,16 +74,16 @@ def probe(
 
 
 class ReplyParser(Protocol):
-    """Packets out of received bytes."""
+    """Parser of received bytes."""
 
     dropped_bytes: int
 
     @property
     def pending(self) -> int:
-        """Bytes of a packet that is not complete."""
+        """Bytes of an incomplete packet."""
 
     def feed(self, data: bytes, /) -> Sequence[object]:
-        """Packets that are complete with these bytes."""
+        """Packets that these bytes complete."""
 
 
 def probe_with(
@@ -95,7 +95,7 @@ def probe_with(
     wait_s: float,
     new_parser: Callable[[], ReplyParser],
 ) -> Probe:
-    """Send a request several times, each time until the line is quiet, in any protocol.
+    """Send a request of any protocol several times, each time until the line is quiet.
 
     ``wait_s`` is the time for servo, adapter and driver besides the wire.
 
@@ -118,7 +118,7 @@ def probe_with(
         while True:
             data = port.read_until(reply_bytes, deadline_s)
             if not data and reader.pending and is_patient and not waited:
-                waited = True  # only a part of the reply has come yet
+                waited = True  # only a part of the reply has arrived
                 rest = max(1, reply_bytes - reader.pending)
                 data = port.read_until(rest, port.clock.now_s() + _REST_S)
                 is_patient = bool(data)  # else replies are cut off, not late
@@ -148,7 +148,7 @@ class Overheard:
 
 
 def overhear(port: BytePort, seconds: float) -> Overheard:
-    """Send nothing for some time, and count what arrives.
+    """Send nothing for some time, and count unrequested packets and bytes.
 
     Raises:
         PortError: the port is gone.
@@ -173,7 +173,7 @@ class BroadcastReply:
 
 
 def broadcast_ping(port: BytePort) -> BroadcastReply:
-    """Ping all servos at the port's baud rate; lasts most of a second, and 4.5 s at 9600 baud.
+    """Ping all servos at the port's baud rate; lasts almost a second, 4.5 s at 9600 baud.
 
     Raises:
         PortError: the port is gone.

@@ -1,7 +1,6 @@
 """Group reads and writes of one register on a bus of Protocol 1.0 servos.
 
-Each servo gets its own READ, because an AX-12A has neither sync read nor bulk read. Goals are one
-SYNC WRITE.
+An AX-12A has neither sync read nor bulk read, so each servo gets a READ. Goals are one SYNC WRITE.
 """
 
 from collections.abc import Sequence
@@ -58,7 +57,7 @@ class Protocol1Block:
 
     @property
     def since_sent_s(self) -> float:
-        """How old the values of a read are at most, s."""
+        """Largest possible age of the values of a read, s."""
         return self._port.clock.now_s() - self._sent_at_s
 
     def write_goals(self, goals: NDArray[np.int32]) -> None:
@@ -96,9 +95,9 @@ class Protocol1Block:
         )
 
     def _ask(self, k: int) -> Packet1 | None:
-        """Ask one servo; its intact reply, or None.
+        """Read one servo; return its intact reply, or None.
 
-        After a missing reply it discards all bytes until the line is quiet.
+        After a missing reply it first discards bytes until the line is quiet.
         """
         port = self._port
         if not self._is_quiet:

@@ -1,4 +1,4 @@
-"""Reading and writing one register of one servo, with a strict codec in place of the SDK's."""
+"""Reads and writes of one register of one servo, with a strict codec instead of the SDK's."""
 
 from snakewalk.drivers.bus.budget import STATUS_BYTES
 from snakewalk.drivers.bus.line_reservation import LineReservation
@@ -31,10 +31,10 @@ def read_register(
 ) -> bytes:
     """Bytes of a register.
 
-    Requests more bytes than the register has while a reply of its length is pending.
+    While a reply of its length is pending, it requests more bytes.
 
     Raises:
-        NoAnswerError: nobody answered.
+        NoAnswerError: no reply.
         ServoError: the servo refused.
         BusError: the reply has a wrong length.
 
@@ -67,7 +67,7 @@ def write_register(
     """Write ``data`` to a register.
 
     Raises:
-        NoAnswerError: nobody answered.
+        NoAnswerError: no reply.
         ServoError: the servo refused.
 
     """
@@ -77,7 +77,7 @@ def write_register(
 
 
 def check_accepted(servo_id: int, what: str, error: int) -> None:
-    """Raise ``ServoError`` if the error byte says more than an alert."""
+    """Raise ``ServoError`` if the error byte has more than an alert."""
     code = error & ~ALERT
     if code:
         known = code in ResultError._value2member_map_
@@ -127,7 +127,7 @@ def _exchange(
 
 
 def _is_other(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:
-    """Whether a reply is known to belong to another request."""
+    """Whether a reply certainly belongs to another request."""
     length = len(reply.params)
     if length == data_bytes or reply.result:
         return False

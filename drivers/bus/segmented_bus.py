@@ -1,8 +1,7 @@
-"""The bus of a chain whose segments are on ports of their own: one transaction a port and cycle.
+"""The bus of a chain with one port per segment: one transaction per port and cycle.
 
 Requests begin on all ports before the bus waits for a reply. A fault of one port ends the cycle of
-all; its error names the port. Commands to all servos, such as torque off, go to every port that
-works.
+all; its error names the port. Commands to all servos, such as torque off, go to every working port.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,16 +20,13 @@ from snakewalk.drivers.protocol.control_table import ControlTable
 
 
 class SegmentedBus:
-    """Servos of one chain, each on the part of its segment; implements ``ChainBus``."""
+    """Servos of one chain on several ports; implements ``ChainBus``."""
 
     def __init__(self, parts: Sequence[tuple[DynamixelBus, Sequence[int]]]) -> None:
-        """Prepare; nothing is sent.
-
-        Args:
-            parts: bus of each port, and the IDs that are on it. The ports share one clock.
+        """Prepare; nothing is sent. ``parts`` are bus and IDs of each port.
 
         Raises:
-            ValueError: their clocks differ, or an ID is on two of them.
+            ValueError: the ports' clocks differ, or an ID is on two ports.
 
         """
         if len({id(bus.port.clock) for bus, _ in parts}) != 1:
@@ -39,7 +35,7 @@ class SegmentedBus:
         if len(self._bus_of) != sum(len(ids) for _, ids in parts):
             raise ValueError("an ID is on one port")
         self._parts = tuple(bus for bus, _ in parts)
-        self._lost: dict[DynamixelBus, None] = {}  # in the order in which they went
+        self._lost: dict[DynamixelBus, None] = {}  # in order of loss
 
     @property
     def parts(self) -> Sequence[DynamixelBus]:
@@ -47,14 +43,14 @@ class SegmentedBus:
         return self._parts
 
     def port_of(self, servo_id: int) -> BytePort:
-        """Port that a servo, or another device, is on."""
+        """Port of a servo or another device."""
         return self._bus_of[servo_id].port
 
     def reopen(self) -> None:
-        """Close and open the ports that are gone.
+        """Close and open the lost ports.
 
         Raises:
-            PortError: one is still not there.
+            PortError: one is still missing.
 
         """
         for bus in tuple(self._lost):
@@ -62,7 +58,7 @@ class SegmentedBus:
             del self._lost[bus]
 
     def table_of(self, servo_id: int) -> ControlTable:
-        """Control table of one servo's model."""
+        """Control table of a servo's model."""
         return self._bus_of[servo_id].table_of(servo_id)
 
     def ping(self, servo_id: int) -> PingReply:
@@ -71,7 +67,7 @@ class SegmentedBus:
             return bus.ping(servo_id)
 
     def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
-        """Ping each servo; returns those that replied."""
+        """Ping each servo; return those that replied."""
         found: dict[int, PingReply] = {}
         for servo_id in servo_ids:
             with self._with_port_name(servo_id) as bus:
@@ -79,7 +75,7 @@ class SegmentedBus:
         return found
 
     def read(self, servo_id: int, name: str) -> int:
-        """Value of a register by its name; raises as ``DynamixelBus.read``."""
+        """Value of a register; raises as ``DynamixelBus.read``."""
         with self._with_port_name(servo_id) as bus:
             return bus.read(servo_id, name)
 
@@ -91,12 +87,12 @@ class SegmentedBus:
             return bus.read_each(servo_id, names, optional)
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
-        """Write a register by its name; raises as ``DynamixelBus.write``."""
+        """Write a register; raises as ``DynamixelBus.write``."""
         with self._with_port_name(servo_id) as bus:
             bus.write(servo_id, name, value, tries)
 
     def write_verified(self, servo_id: int, name: str, value: int) -> None:
-        """Write a register if it differs, and read it back; raises as ``DynamixelBus`` does."""
+        """Write a register if it differs, and read it back; raises as ``DynamixelBus``."""
         with self._with_port_name(servo_id) as bus:
             bus.write_verified(servo_id, name, value)
 
@@ -106,11 +102,11 @@ class SegmentedBus:
             bus.reboot(servo_id)
 
     def sync_write(self, servo_ids: Sequence[int], name: str, value: int) -> None:
-        """Write one value to all servos, also on the ports behind one that is gone.
+        """Write one value to all servos, even if a port is gone.
 
         Raises:
-            ControlTableError: no such register, or the value does not fit it.
-            PortError: a port is gone; the others have got it.
+            ControlTableError: no such register, or the value does not fit.
+            PortError: a port is gone; the others have the value.
 
         """
         self._each(
@@ -133,13 +129,13 @@ class SegmentedBus:
         return self._cycles(servo_ids, lambda bus, ids: bus.block(ids, first, last, fast=fast))
 
     def device_block(self, device_id: int, address: int, length: int) -> "SegmentedCycle":
-        """Group read of one device that is not a servo."""
+        """Group read of a device that is not a servo."""
         return self._cycles(
             [device_id], lambda bus, _: bus.device_block(device_id, address, length)
         )
 
     def _places(self, servo_ids: Sequence[int]) -> dict[DynamixelBus, list[int]]:
-        """Places in ``servo_ids`` of the servos of each part that has any."""
+        """Indices in ``servo_ids`` of the servos of each port."""
         found: dict[DynamixelBus, list[int]] = {}
         for place, servo_id in enumerate(servo_ids):
             found.setdefault(self._bus_of[servo_id], []).append(place)
@@ -165,7 +161,7 @@ class SegmentedBus:
         do: Callable[[DynamixelBus, list[int]], None],
         places: Mapping[DynamixelBus, list[int]],
     ) -> None:
-        """Do something on each port, on the others also where one is gone; then raise its error."""
+        """Call ``do`` for each port, even if one is gone; then raise its error."""
         gone: list[PortError] = []
         for bus, at in places.items():
             try:
@@ -180,7 +176,7 @@ class SegmentedBus:
 
     @contextmanager
     def _with_port_name(self, servo_id: int) -> Iterator[DynamixelBus]:
-        """Bus of one servo, whose faults are reported with the name of its port."""
+        """Bus of one servo; its errors get the name of its port."""
         bus = self._bus_of[servo_id]
         try:
             yield bus
@@ -193,7 +189,7 @@ class SegmentedBus:
 
 
 class SegmentedCycle:
-    """Control cycle, or group read, of servos on several ports; implements ``GroupCycle``."""
+    """Group read and goals of servos on several ports; implements ``GroupCycle``."""
 
     def __init__(
         self,
@@ -207,8 +203,8 @@ class SegmentedCycle:
 
         Args:
             cycles: of each port.
-            places: of each port's servos in the arrays of all.
-            each: ``SegmentedBus._each``: does something on all ports that are there.
+            places: indices of each port's servos in the common arrays.
+            each: ``SegmentedBus._each``.
 
         """
         self._cycles, self._places, self._each = cycles, places, each
@@ -216,7 +212,7 @@ class SegmentedCycle:
 
     @property
     def fast(self) -> bool:
-        """Whether all reads are fast ones."""
+        """Whether all reads are fast."""
         return all(cycle.fast for cycle in self._cycles.values())
 
     @property
@@ -226,20 +222,20 @@ class SegmentedCycle:
 
     @property
     def counters(self) -> CycleCounters:
-        """Irregular reads so far, of all ports together."""
+        """Irregular reads so far, of all ports."""
         each = (astuple(cycle.counters) for cycle in self._cycles.values())
         return CycleCounters(*map(sum, zip(*each, strict=True)))
 
     @property
     def since_sent_s(self) -> float:
-        """How old the values of a read are at most, s: those of the port that was asked first."""
+        """Largest possible age of the values of a read, s."""
         return max(cycle.since_sent_s for cycle in self._cycles.values())
 
     def write_goals(self, goals: NDArray[np.int32]) -> None:
         """Send raw goals (N,).
 
         Raises:
-            PortError: a port is gone; the servos on the others have their goals.
+            PortError: a port is gone; the other servos have their goals.
 
         """
         self._each(lambda bus, at: self._cycles[bus].write_goals(goals[at]), self._places)
@@ -248,7 +244,7 @@ class SegmentedCycle:
         """Read the block of all servos: ask on all ports, then receive.
 
         Raises:
-            PortError: a port is gone; the replies of the others are received all the same.
+            PortError: a port is gone; the other replies are received.
 
         """
         asked: dict[DynamixelBus, list[int]] = {}
@@ -268,7 +264,7 @@ class SegmentedCycle:
         return self._whole(replies)
 
     def _whole(self, replies: Mapping[DynamixelBus, GroupReadReply]) -> GroupReadReply:
-        """One reply with the results of all ports at their servos' places."""
+        """One reply with the results of all ports."""
         width = next(iter(replies.values())).data.shape[1]
         data = np.zeros((self._count, width), np.uint8)
         valid, answered = np.zeros(self._count, np.bool_), np.zeros(self._count, np.bool_)

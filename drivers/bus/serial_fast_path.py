@@ -1,8 +1,4 @@
-"""The regular control cycle on a serial device, nearly all of it compiled.
-
-The fast path accepts only replies that are exactly as expected. Anything else is handed back as it
-arrived, and ``ControlCycle`` continues with it.
-"""
+"""The regular control cycle on a serial device, mostly compiled; see ``fast_path``."""
 
 import numpy as np
 from numba import boolean, float64, int32, int64, intp, types, uint8, uintp
@@ -43,7 +39,7 @@ _ROW, _ROWS = uint8[::1], uint8[:, ::1]
 
 @compiled(int64(float64[::1], int64, int64))
 def _reserve_line(free_s: Floats, from_ns: int, wire_ns: int) -> int:
-    """Note what was sent at ``from_ns`` on the port's clock; how long until it has left, ns."""
+    """Note bytes sent at ``from_ns`` (port's clock); return the time until they have left, ns."""
     free_s[0] = max(from_ns * 1e-9, free_s[0]) + wire_ns * 1e-9
     return int(free_s[0] * 1e9) - from_ns
 
@@ -52,9 +48,9 @@ def _reserve_line(free_s: Floats, from_ns: int, wire_ns: int) -> int:
 def _send_goals(
     fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64], free_s: Floats
 ) -> int:
-    """Fill ``values`` into the sync write and send it; returns how many bytes were taken.
+    """Fill ``values`` into the sync write and send it; return the number of bytes sent.
 
-    None are taken where the frame must be stuffed, or the device is gone or full.
+    It is 0 if the frame needs stuffing, or the device is gone or full.
     """
     frame = work[: plan[WRITE_BYTES]]
     if not fill(frame, values):
@@ -68,9 +64,9 @@ def _send_goals(
 
 @compiled(int64(int32, _ROW, int32[::1], int64[::1]))
 def _send_request(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
-    """Discard the input, send the request, behind ``values`` if there are any.
+    """Discard the input, send the request, after ``values`` if given.
 
-    Returns how many bytes were taken.
+    Returns the number of bytes sent.
     """
     begin = int(plan[WRITE_BYTES])
     end = begin + int(plan[REQUEST_BYTES])
@@ -95,15 +91,15 @@ def _receive(
 
     Args:
         fd: descriptor, non-blocking.
-        work: the packets, the expected reply, and the received one, in the order of the plan.
+        work: packets, expected reply, and received bytes, in the order of the plan.
         data: (N, length) filled, unless irregular.
-        with_goals: whether the request was sent behind goals.
+        with_goals: whether goals preceded the request.
         plan: (``PLAN_SIZE``,) the numbers above.
         free_s: (1,) of the line's ``LineReservation``.
 
     Returns:
-        Result of the frame reader for a complete reply. ``-1 - n``: ``n`` bytes arrived, either too
-        few or one too many; one too many means that the line carries more than the reply.
+        Result of the frame reader for a complete reply. ``-1 - n``: ``n`` bytes arrived, too few or
+        one too many; then the line carries more than the reply.
 
     """
     begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])
@@ -131,7 +127,7 @@ def _receive(
 
 
 class SerialFastPath:
-    """One group read of servos on ``port``, alone or behind their goals."""
+    """Group read of servos on ``port``, alone or after their goals."""
 
     def __init__(
         self,
@@ -143,16 +139,9 @@ class SerialFastPath:
         latency_s: float,
         spin_s: float,
     ) -> None:
-        """Prepare the packets.
+        """Prepare the packets; the clock of ``line`` is a ``WallClock``.
 
-        Args:
-            port: with a descriptor.
-            goals: the sync write of ``write`` and ``transact``.
-            request: the group read.
-            line: of the port, whose clock is a ``WallClock``.
-            latency_s: how long adapter and driver may hold bytes back, at most.
-            spin_s: argument of ``ControlCycle``.
-
+        ``latency_s`` is the largest delay of adapter and driver. ``spin_s`` as in ``ControlCycle``.
         """
         self._port, self._request, self._free_s = port, request, line.free_s
         count = len(request.ids)
@@ -176,11 +165,11 @@ class SerialFastPath:
 
     @property
     def remaining_s(self) -> float:
-        """Longest remaining time of the reply of an irregular cycle."""
+        """Longest remaining time of an irregular reply."""
         return float(self._plan[REMAINING_NS] * 1e-9)
 
     def write(self, goals: NDArray[np.int32]) -> int:
-        """Send goals (N,); returns how many bytes were taken, 0 where the port must send them."""
+        """Send goals (N,); return the number of bytes sent, 0 if the port must send them."""
         fd = self._port.descriptor
         if fd is None:
             return 0
@@ -191,7 +180,7 @@ class SerialFastPath:
         return int(_send_goals(fd, self._work, values, self._plan, self._free_s))
 
     def begin(self, goals: NDArray[np.int32] | None) -> bool:
-        """Send the request, behind ``goals`` (N,) if there are any; False if nothing was sent.
+        """Send the request, after ``goals`` (N,) if given; False if nothing was sent.
 
         Raises:
             PortError: the port is gone.
@@ -217,10 +206,10 @@ class SerialFastPath:
         """Receive the reply to the request of ``begin``.
 
         Returns:
-            The reply; the bytes that arrived, if they are irregular.
+            The reply, or the bytes if they are irregular.
 
         """
-        # while the bytes are on the line: time that costs nothing
+        # the bytes are on the line meanwhile: this time is free
         fd, with_goals = self._awaited
         if self._port.getBaudRate() != self._baud:
             self._update_wire_times()
@@ -234,7 +223,6 @@ class SerialFastPath:
         return self._room[: len(self._room) - 1 if found == IRREGULAR else -1 - found].tobytes()
 
     def _update_wire_times(self) -> None:
-        """Times on the line at the port's present baud rate."""
         self._baud = baud = self._port.getBaudRate()
         plan = self._plan
         counts = int(plan[WRITE_BYTES]), int(plan[REQUEST_BYTES]), len(self._room) - 1

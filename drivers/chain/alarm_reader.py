@@ -1,4 +1,4 @@
-"""Alarms: Hardware Error Status(70) of the servos whose status packets carry an alert."""
+"""Alarms: Hardware Error Status(70) of servos whose status packets carry an alert."""
 
 from collections.abc import Collection
 
@@ -14,7 +14,7 @@ _FLAPPING = 10
 
 
 class AlarmReader:
-    """Reads an alarm as soon as there is an alert; an alert without an alarm is read again."""
+    """Reads the alarm after an alert; reads again if the register shows no alarm."""
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, readings: Readings) -> None:
         self._bus, self._robot, self._readings = bus, robot, readings
@@ -29,9 +29,9 @@ class AlarmReader:
         self._alerts.clear()
 
     def update(self, alerted: Collection[int]) -> list[str]:
-        """Read the alarms of joints whose newest reply carries an alert; returns lines to report.
+        """Read the alarms of joints with an alert; return lines to report.
 
-        Call it after every group read of the state, also without an alert.
+        Call it after every group read of the state, even without an alert.
 
         Raises:
             PortError: the port is gone.

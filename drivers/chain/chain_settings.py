@@ -1,4 +1,4 @@
-"""Registers that shape the motion or the safety of a chain, and their values."""
+"""Registers, and their values, that affect the motion or the safety of a chain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ FEETECH_SETTINGS = ("Lock", "Acceleration", "Goal Velocity")
 
 @dataclass(frozen=True, slots=True)
 class ChainSetting:
-    """A register that shapes the motion or the safety of a chain, and what it must hold."""
+    """A register that affects the motion or the safety of a chain, and its value."""
 
     register: str
     value: int
@@ -33,29 +33,29 @@ class ChainSetting:
     """Whether other values come from a factory or another robot; else a change is reported."""
 
     def value_in(self, registers: Mapping[str, int]) -> int:
-        """Whole value that the register should hold, where it holds what is in ``registers``."""
+        """Register value to write, with the bits outside the mask from ``registers``."""
         return registers[self.register] & ~self.bits | self.value & self.bits
 
 
 def chain_settings(
     robot: RobotConfig, units: JointUnits, joint: int, goal_pwm: int
 ) -> tuple[ChainSetting, ...]:
-    """Settings of one joint's servo, in the order in which they are written.
+    """Settings of one joint's servo, in the order of writing.
 
     ``goal_pwm`` is the servo's PWM Limit(36).
     """
     low, high = units.limits_raw[joint]
     pitch = robot.all_axes[joint] == "p"
-    if pitch and not units.limits_current[joint]:  # such a model is as soft as its output is small
+    if pitch and not units.limits_current[joint]:  # such a model is soft only with a small output
         goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
     if robot.servo_records[joint].protocol == "feetech":
         return _feetech_settings(robot, units, joint, goal_pwm)
     mode = CURRENT_POSITION_MODE if units.current_mode[joint] else POSITION_MODE
     return (
         ChainSetting("Return Delay Time", 0),
-        # before the rest: a new mode resets the gains
+        # first: a new mode resets the gains
         ChainSetting("Operating Mode", mode),
-        # Torque that a goal or a power-up switches on is torque without a watchdog
+        # torque switched on by a goal or at power-up would have no watchdog
         ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
         ChainSetting(STARTUP, 0, usual=False),
         ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
@@ -75,9 +75,9 @@ def chain_settings(
 def _feetech_settings(
     robot: RobotConfig, units: JointUnits, joint: int, goal_pwm: int
 ) -> tuple[ChainSetting, ...]:
-    """Settings of one joint's Feetech servo, in the order in which they are written.
+    """Settings of one joint's Feetech servo, in the order of writing.
 
-    Lock comes first: the servo forgets later writes to the EEPROM area at power-off.
+    Lock comes first: the servo loses later writes to the EEPROM area at power-off.
     """
     facts = robot.servo_records[joint]
     low, high = units.limits_raw[joint]
@@ -101,7 +101,7 @@ def _feetech_settings(
 
 
 def limitations(robot: RobotConfig) -> list[str]:
-    """Return protections that a robot's servos lack, one line for each model and reason."""
+    """Protections that a robot's servos lack, one line per model and reason."""
     lines = []
     for facts in {facts.model: facts for facts in robot.servo_records}.values():
         if not facts.measures_current:

@@ -1,4 +1,4 @@
-"""Fingerprint: EEPROM settings of a servo that determine zero, direction, limits and protection."""
+"""Fingerprint: EEPROM settings of a servo for zero, direction, limits and protection."""
 
 from collections.abc import Mapping
 
@@ -22,12 +22,12 @@ Fingerprint = Mapping[str, int]
 
 
 def fingerprint_of(registers: Mapping[str, int]) -> dict[str, int]:
-    """The fingerprint in the registers that were read of a servo."""
+    """The fingerprint among registers of a servo."""
     return {name: registers[name] for name in FINGERPRINT if name in registers}
 
 
 def register_change(name: str, before: int, now: int, rad_per_position: float) -> str:
-    """A change of one register in words, with its effect on the joint."""
+    """Text about a register change and its effect on the joint."""
     text = f"{name} is {now}, was {before}"
     if name == "Homing Offset":
         moved_rad = (now - before) * abs(rad_per_position)
@@ -40,7 +40,7 @@ def register_change(name: str, before: int, now: int, rad_per_position: float) -
 def fingerprint_faults(
     robot: RobotConfig, joint: int, before: Fingerprint, now: Fingerprint, rad_per_position: float
 ) -> list[str]:
-    """Lines on the registers of a joint's servo that have changed."""
+    """Lines on the changed registers of a joint's servo."""
     name = robot.joint_label(joint)
     return [
         f"{name}: {register_change(register, value, now[register], rad_per_position)}"

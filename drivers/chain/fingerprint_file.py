@@ -32,7 +32,7 @@ def fingerprint_path(robot_file: Path) -> Path:
 
 
 def own_file(name_or_path: str) -> Path | None:
-    """File of a robot that is not shipped, if it exists in this folder or by its path."""
+    """File of a robot that is not shipped, if it exists."""
     path = Path(name_or_path)
     return path if name_or_path.endswith(".toml") and path.is_file() else None
 
@@ -86,13 +86,13 @@ class FingerprintFile:
     ) -> list[str]:
         """Compare servos with the file; create it if it is missing.
 
-        Registers that the chain sets from the robot's file are not compared, only stored.
+        Registers that the chain sets itself are stored, not compared.
 
         Returns:
             Lines to report.
 
         Raises:
-            ChainError: a servo differs, one line for each register.
+            ChainError: a servo differs, one line per register.
             ConfigError: the file is broken.
 
         """
@@ -125,7 +125,7 @@ def changes(
     now: Mapping[int, Fingerprint],
     rad_per_position: float,
 ) -> list[str]:
-    """Lines on the registers that differ and that the chain does not set, by joint."""
+    """Lines, by joint, on the differing registers that the chain does not set."""
     lines = []
     for joint, servo_id in enumerate(robot.servo_ids):
         old, new = before.get(servo_id, {}), now.get(servo_id, {})
@@ -142,7 +142,7 @@ def changes(
 def missing_registers(
     known: Mapping[int, Fingerprint], found: Mapping[int, Fingerprint]
 ) -> list[str]:
-    """Registers of the servos in a file that it lacks, as an older version wrote it."""
+    """Registers that the file lacks for its servos."""
     missing = {
         name
         for servo_id, values in found.items()

@@ -1,4 +1,4 @@
-"""Goal check: whether each servo holds the goal that was sent to it.
+"""Goal check: whether each servo has the goal that was sent to it.
 
 Servos do not reply to a sync write, so Goal Position(116; 30 on Protocol 1.0) is read back. A
 difference counts again only after another goal was sent.
@@ -27,7 +27,7 @@ _REMEMBERED = 256
 
 @dataclass(slots=True)
 class _Difference:
-    """A joint whose servo holds another goal than the one sent to it."""
+    """A joint whose servo has another goal than the one sent."""
 
     count: int
     """Reads in a row."""
@@ -46,10 +46,7 @@ class GoalCheck:
     """Reads the goals of all joints back."""
 
     def __init__(self, labels: Sequence[str], cycle: GroupCycle, kind: str = "<i4") -> None:
-        """Prepare the read.
-
-        ``kind`` is the type of the register's numbers, ``<u2`` on Protocol 1.0.
-        """
+        """Prepare the read; ``kind`` is the register's type, ``<u2`` on Protocol 1.0."""
         self._labels, self._kind = labels, kind
         self.cycle = cycle
         self._sent: deque[NDArray[np.integer[Any]]] = deque(maxlen=_REMEMBERED)
@@ -58,13 +55,13 @@ class GoalCheck:
         self._is_incomplete = False
 
     def note_write(self, goals: Int32s) -> None:
-        """Note raw goals (J,) that have just been sent."""
+        """Store raw goals (J,) that were just sent."""
         self._sent.append(goals.astype(self._kind, copy=False))
         self._writes += 1
 
     @property
     def is_due(self) -> bool:
-        """Whether the check should be made again as soon as there is time."""
+        """Whether the check should be repeated as soon as there is time."""
         return self._is_incomplete or any(
             each.write < self._writes for each in self._differences.values()
         )
@@ -72,12 +69,11 @@ class GoalCheck:
     def check(self, explain: Callable[[int], str | None]) -> None:
         """Read the goals back and compare them.
 
-        Args:
-            explain: returns another reason why the servo of a joint does not accept goals, or None.
+        ``explain`` returns another reason why the servo of a joint rejects goals, or None.
 
         Raises:
-            BusError: a servo holds another goal in ``FOREIGN_READS`` or ``OWN_READS`` reads in a
-                row, each after another goal was sent.
+            BusError: a servo has another goal in ``FOREIGN_READS`` or ``OWN_READS`` reads in a row,
+                each after another goal was sent.
             PortError: the port is gone.
 
         """
@@ -99,7 +95,7 @@ class GoalCheck:
             raise BusError(self._fault(sorted(over), sent, explain))
 
     def explain(self, joint: int) -> str | None:
-        """Read the goals once; returns the fault of a joint's goal, or None.
+        """Read the goals once; return the fault of a joint's goal, or None.
 
         Raises:
             PortError: the port is gone.

@@ -1,6 +1,6 @@
-"""Positions that are known to be a joint's: read in one reply together with the joint's number.
+"""Positions that are certainly a joint's: read in one reply with the joint's number.
 
-Two servos with one ID reply in turn, and IDs may be exchanged: such a reading is another joint's.
+Servos with one ID reply in turn, and IDs may be exchanged; such a reading is another joint's.
 """
 
 from collections.abc import Mapping
@@ -35,16 +35,16 @@ class IdentifiedRead:
         self._cycle = bus.block(ids, names[0], names[-1], fast=False)
 
     def positions_rad(self, reads: int, *, ask_again: bool = False) -> Floats:
-        """(J,) angles; arguments and errors as of ``positions_and_goals``."""
+        """(J,) angles; arguments and errors as ``positions_and_goals``."""
         return self.positions_and_goals(reads, ask_again=ask_again)[0]
 
     def positions_and_goals(self, reads: int, *, ask_again: bool = False) -> tuple[Floats, Floats]:
-        """(J,) angles, rad, and (J,) raw goals; NaN for a joint whose servo does not identify.
+        """(J,) angles, rad, and (J,) raw goals; NaN for joints that are not identified.
 
-        With ``ask_again`` it asks the remaining servos one by one.
+        ``ask_again`` asks the remaining servos one by one.
 
         Raises:
-            BusError: a servo that is asked alone does not reply.
+            BusError: a servo asked alone does not reply.
             PortError: the port is gone.
 
         """
@@ -72,10 +72,10 @@ class IdentifiedRead:
 def check_stillness(
     robot: RobotConfig, position_rad: Floats, found_rad: Floats, most_rad: float
 ) -> None:
-    """Compare the joints' angles (J,) with those that were found just before.
+    """Compare the joints' angles (J,) with earlier ones.
 
     Raises:
-        ChainError: a joint is farther than ``most_rad`` from its angle, or is not identified.
+        ChainError: a joint moved by more than ``most_rad``, or is not identified.
 
     """
     moved_rad = np.abs(position_rad - found_rad)

@@ -1,4 +1,4 @@
-"""The IMU of a robot on its bus: bytes to the attitude of the link that it sits in."""
+"""The IMU of a robot on its bus: bytes to the attitude of its link."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ SILENT_S = 1.0
 
 
 class ImuReader:
-    """Reads the IMU of ``config`` on ``bus``, once a call."""
+    """Reads the IMU of ``config`` on ``bus``."""
 
     def __init__(self, bus: ChainBus, config: ImuConfig) -> None:
         self._bus, self._config, self._port = bus, config, bus.port_of(config.id)
@@ -31,10 +31,10 @@ class ImuReader:
         self._state: ImuState | None = None
 
     def find(self) -> None:
-        """Ask whether it is there.
+        """Check its presence.
 
         Raises:
-            ChainError: it does not answer, or another device does.
+            ChainError: it does not reply, or is another device.
             PortError: the port is gone.
 
         """
@@ -53,7 +53,7 @@ class ImuReader:
             )
 
     def read(self, on_event: Callable[[str], None]) -> ImuState | None:
-        """Read once; None until the device has shown an attitude, and the old one if it is silent.
+        """Read once; None before the first attitude, the old state if the IMU is silent.
 
         Raises:
             PortError: the port is gone.

@@ -1,7 +1,7 @@
 """Joint goals (rad) to raw goal positions, and raw state blocks to a ``JointState`` (SI units).
 
-Here, and nowhere else, joints become servos: ``JointUnits`` has each servo's scales, the sign of
-its mounting and the place of its zero. The layers above know joints only.
+Only this file maps joints to servos: ``JointUnits`` has each servo's scales, the sign of its
+mounting and its zero.
 """
 
 import math
@@ -29,7 +29,7 @@ _GOALS = readonly_array()
 
 @dataclass(frozen=True, slots=True)
 class JointUnits:
-    """Between J joints and their servos; a scale is negative where the servo counts backwards."""
+    """Conversions between J joints and their servos; a negative scale reverses the direction."""
 
     zero_position: Int32s
     """(J,) raw position of a straight joint."""
@@ -58,11 +58,8 @@ class JointUnits:
     ) -> "JointUnits":
         """Units of a robot's joints, with the scales of their servos (J).
 
-        Args:
-            robot: whose joints.
-            servos: their servos' scales.
-            can_hold: a soft hold may follow, so every joint has a limit of its current; otherwise
-                only pitch joints have.
+        ``can_hold``: a soft hold may follow, so every joint has a current limit; otherwise only
+        pitch joints do.
 
         Raises:
             ControlTableError: the output of a pitch joint cannot be limited.
@@ -105,7 +102,7 @@ class JointUnits:
         return float((raw - self.zero_position[joint]) * self.rad_per_position[joint])
 
     def current_raw(self, joint: int, current_a: float) -> int:
-        """Nearest raw value of a limit of one joint's current."""
+        """Nearest raw value of a joint's current limit."""
         return round(current_a / abs(float(self.a_per_current[joint])))
 
     def pwm_raw(self, joint: int, current_a: float, most: int) -> int:
@@ -117,7 +114,7 @@ class JointUnits:
 
 
 class GoalEncoder:
-    """Nearest raw goal positions of J goals, clamped to the joint limits."""
+    """Converts J goals to raw positions within the joint limits."""
 
     def __init__(self, units: JointUnits) -> None:
         self._low, self._high = np.ascontiguousarray(units.limits_raw.T, np.int32)
@@ -127,7 +124,7 @@ class GoalEncoder:
         """(J,) raw goals, a new array.
 
         Raises:
-            ValueError: a goal is not finite, or there are not J of them.
+            ValueError: a goal is not finite, or the shape is wrong.
 
         """
         if goal_rad.shape != self._low.shape:
@@ -145,7 +142,7 @@ def encode_goals(goal_rad: Floats, scale: Floats, low: Int32s, high: Int32s, raw
     """Nearest positions of goals (J,) within ``low`` to ``high``; False if a goal is not finite.
 
     ``scale`` (2, J) is rad per position and the position of 0 rad. The position is rounded before
-    the zero is added, so that a servo that counts backwards gets the mirror image to the bit.
+    the zero is added, so that a reversed servo gets the exact mirror image.
     """
     for joint in range(len(goal_rad)):
         if not np.isfinite(goal_rad[joint]):
@@ -156,13 +153,13 @@ def encode_goals(goal_rad: Floats, scale: Floats, low: Int32s, high: Int32s, raw
 
 
 class StateDecoder:
-    """Present Current, Velocity and Position of all servos at once, from their state blocks."""
+    """Decodes Present Current, Velocity and Position of all servos."""
 
     def __init__(self, tables: Iterable[ControlTable], units: JointUnits) -> None:
-        """Check the layout of the registers in the servos' tables.
+        """Check the layout of the registers.
 
         Raises:
-            ControlTableError: the registers do not lie as in every model of Protocol 2.0.
+            ControlTableError: it is not the layout of Protocol 2.0.
 
         """
         for table in tables:
@@ -180,7 +177,7 @@ class StateDecoder:
         )
 
     def decode(self, data: Bytes, out: Floats) -> None:
-        """Current, A, velocity, rad/s, and position, rad, of blocks (J, 10) into ``out`` (3, J)."""
+        """Write current, A, velocity, rad/s, and position, rad, of (J, 10) to ``out`` (3, J)."""
         decode_state(data, self._zero, self._scale, out)
 
 
@@ -195,9 +192,9 @@ def _signed(data: Bytes, row: int, at: int, size: int) -> int:
 
 @compiled(f"void({_BLOCKS}, float64[::1], float64[:, ::1], float64[:, ::1])", makes_arrays=False)
 def decode_state(data: Bytes, zero: Floats, scale: Floats, out: Floats) -> None:
-    """Current, velocity and position of blocks (J, 10) into ``out`` (3, J).
+    """Write current, velocity and position of blocks (J, 10) to ``out`` (3, J).
 
-    ``scale`` (3, J) is of one unit each; ``zero`` (J,) the position of 0 rad.
+    ``scale`` (3, J) is per raw unit; ``zero`` (J,) is the position of 0 rad.
     """
     for row in range(len(data)):
         # 0 times a negative scale is -0; adding 0 makes it 0
@@ -235,9 +232,9 @@ class Readings:
     def update(
         self, reply: GroupReadReply, measured_at_s: float, *, again: bool = False
     ) -> Sequence[int]:
-        """Decode new state blocks; returns the joints whose alarm (register 70) must be read.
+        """Decode new state blocks; return the joints whose alarm (register 70) must be read.
 
-        If it is read ``again`` in a cycle, the first values are of this cycle as well.
+        ``again``: a second read in this cycle; the first values stay current.
         """
         ok = reply.valid
         if reply.flawless and not self._alarmed:  # the regular case
@@ -267,14 +264,14 @@ class Readings:
         self._flags = self._frozen_flags()
 
     def dismiss_alert(self, joint: int) -> None:
-        """Clear the alert bit of one joint's newest reply: its register 70 shows no alarm."""
+        """Clear the alert bit of one joint's newest reply: register 70 shows no alarm."""
         self._error[joint] &= 0xFF ^ ALERT
         self.alert = bool((self._error & ALERT).any())
         self._flags = self._frozen_flags()
 
     def update_slow(self, reply: GroupReadReply, measured_at_s: float) -> None:
         """Decode the slow blocks: Present Input Voltage (2 bytes), Present Temperature (1)."""
-        ok = slice(None) if reply.flawless else reply.valid  # picking rows needs 30 us
+        ok = slice(None) if reply.flawless else reply.valid  # indexing rows needs 30 us
         self._voltage[ok] = voltages_v(reply.data[ok])
         self._temperature[ok] = reply.data[ok, 2]
         self._slow_measured_at_s[ok] = measured_at_s
@@ -296,13 +293,13 @@ class Readings:
         return np.asarray(self._motion[0])
 
     def state(self, now_s: float) -> JointState:
-        """Read-only copies of everything."""
+        """Read-only copies of all values."""
         numbers = np.empty_like(self._numbers)
         _copy(self._numbers, now_s, numbers)
         numbers.setflags(write=False)
         current, velocity, position, temperature, voltage, age_s, slow_age_s = numbers
         hardware_error, error, valid = self._flags
-        return JointState(  # by place: by name it needs three times as long
+        return JointState(  # positional: keywords need three times as long
             now_s,
             position,
             velocity,
@@ -323,7 +320,7 @@ class Readings:
 
 @compiled("void(float64[:, ::1], float64, float64[:, ::1])", makes_arrays=False)
 def _copy(numbers: Floats, now_s: float, copy: Floats) -> None:
-    """Copy (7, J), with ages in place of the measuring times in the last two rows."""
+    """Copy (7, J); the last two rows become ages."""
     for joint in range(numbers.shape[1]):
         for row in range(5):
             copy[row, joint] = numbers[row, joint]

@@ -1,7 +1,7 @@
-"""Liveness: whether servos have torque, watchdog, settings and goals as they were written.
+"""Liveness: whether torque, watchdog, settings and goals of the servos are as written.
 
-A servo may have rebooted, or another program may have written to it. Registers are therefore read
-again, one at a time.
+A servo may have rebooted, or another program may have written to it. So registers are read again,
+one at a time.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -35,9 +35,9 @@ _CHECKED_AT = frozenset(
 
 
 class LivenessCheck:
-    """Reads one register of all servos at a time, and compares it.
+    """Reads and compares one register of all servos at a time.
 
-    A check is repeated in the next cycle with time for it if servos did not reply.
+    An incomplete check is repeated in the next cycle with time for it.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class LivenessCheck:
         """Prepare the reads.
 
         ``configured`` has RAM registers, ``fingerprints`` EEPROM registers, by joint.
-        ``watchdog_ticks`` is None if the servos have no watchdog.
+        ``watchdog_ticks`` is None without a watchdog.
         """
         self._bus, self._robot, self._goals = bus, robot, goals
         self._rad_per_position = rad_per_position
@@ -83,12 +83,12 @@ class LivenessCheck:
         """Not all servos replied to these; the oldest first."""
 
     def check_goals(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
-        """Read the goals back, once in a round and if they differed; the group read, if made.
+        """Read the goals back, once per round and after a difference; return the group read.
 
         Call it before the goals of the cycle are sent.
 
         Raises:
-            BusError: a servo holds another goal.
+            BusError: a servo has another goal.
             PortError: the port is gone.
 
         """
@@ -101,14 +101,14 @@ class LivenessCheck:
         return self._goals.cycle
 
     def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
-        """Make the check whose turn it is in a cycle; the group read, if it asked all servos.
+        """Make the check of this cycle; return the group read if it asked all servos.
 
-        A round of ``SLOW_EVERY`` cycles has torque, watchdog, identity, one setting, two that shape
-        the motion, and four of the fingerprint. If a cycle ``has_time``, it repeats an incomplete
-        check.
+        A round of ``SLOW_EVERY`` cycles has torque, watchdog, identity, one setting, two registers
+        that shape the motion, and four of the fingerprint. If ``has_time``, an incomplete check is
+        repeated.
 
         Raises:
-            BusError: a servo is not as it was set.
+            BusError: a servo differs from its settings.
             PortError: the port is gone.
 
         """
@@ -150,7 +150,7 @@ class LivenessCheck:
         raise BusError(f"{names}: {self._difference(check, joint, value)}")
 
     def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
-        """Meaning of an unexpected value of a register."""
+        """Meaning of an unexpected register value."""
         name, expected = check.register.name, check.expected[joint]
         if check is self._torque:
             return "torque is off: has it rebooted?"
@@ -165,7 +165,7 @@ class LivenessCheck:
         )
 
     def _explain(self, joint: int) -> str | None:
-        """Why a joint's servo may refuse goals: a register that is not as expected, or None.
+        """Reason why a joint's servo may reject goals: an unexpected register, or None.
 
         Raises:
             PortError: the port is gone.
@@ -192,7 +192,7 @@ class LivenessCheck:
 def _in_turn(
     checks: Sequence["RegisterCheck"], rounds: int, places: tuple[int, ...], place: int
 ) -> "RegisterCheck | None":
-    """The check whose turn it is, if one of them is made at each of the places of a round."""
+    """The check of this cycle, if ``place`` is one of their places in a round."""
     if not checks:
         return None
     return checks[(len(places) * rounds + places.index(place)) % len(checks)]
@@ -200,7 +200,7 @@ def _in_turn(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegisterCheck:
-    """Group read of one register, and what it must return."""
+    """Group read of one register, and its expected values."""
 
     register: Register
     cycle: GroupCycle
@@ -228,14 +228,12 @@ class RegisterCheck:
         return cls(register, cycle, ids, dict(expected), raw)
 
     def compare(self, ask_again: ChainBus | None = None) -> tuple[dict[int, int], bool]:
-        """Read the register; the values that are not as expected, by joint, and if all are known.
+        """Read the register; return unexpected values by joint, and whether all are known.
 
-        Args:
-            ask_again: asks those that are not in the reply one by one; without it they are not
-                judged.
+        ``ask_again`` asks servos without a reply one by one; None ignores them.
 
         Raises:
-            BusError: one that is asked again does not reply.
+            BusError: a servo that is asked again does not reply.
             PortError: the port is gone.
 
         """

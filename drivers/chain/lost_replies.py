@@ -12,7 +12,7 @@ LATE_READS = 3
 
 
 class LostReplies:
-    """Counts losses; reports a bad line once in a run."""
+    """Counts losses; reports a bad line once per run."""
 
     def __init__(self) -> None:
         self._began: deque[int] = deque()
@@ -24,13 +24,9 @@ class LostReplies:
         self._late_bytes = 0
 
     def update(self, read: int, joints: int, late_bytes: int = 0) -> str | None:
-        """Count a read; returns a line for the user the first time that there is a reason.
+        """Count a read of ``read`` of all ``joints``; return a line for the user at a first fault.
 
-        Args:
-            read: number of joints that were read.
-            joints: number of all joints.
-            late_bytes: number of bytes so far that arrived after the time-out of their read.
-
+        ``late_bytes`` is the total that arrived after the time-out of their read.
         """
         self._reads += 1
         if late_bytes > self._late_bytes:

@@ -1,8 +1,7 @@
 """Motion sensors: whether current, velocity and position of a joint contradict each other.
 
-A sensor that always reports the same value hides what it should measure: a current above its limit,
-a dead output stage, a joint that stands. While a joint moves, its other readings show that. The run
-reports it.
+A constant sensor hides a current above its limit, a dead output stage, or a stalled joint. While a
+joint moves, its other readings reveal it, and the run reports it.
 """
 
 import math
@@ -34,7 +33,6 @@ class MotionSensors:
     """Compares the readings of J joints; reports each sensor once."""
 
     def __init__(self, robot: RobotConfig) -> None:
-        """Start without a reading of the joints of ``robot``."""
         joints = robot.joint_count
         self._names = [robot.joint_label(joint) for joint in range(joints)]
         self._limits_a = np.array(robot.current_limits_a)
@@ -45,13 +43,9 @@ class MotionSensors:
         self._time_s = -math.inf
 
     def update(self, motion: Floats, valid: Bools, time_s: float) -> list[str]:
-        """Evaluate currents, velocities and positions (3, J); returns lines to report.
+        """Evaluate currents, velocities and positions (3, J); return lines to report.
 
-        Args:
-            motion: newest readings, A, rad/s and rad; NaN where unknown.
-            valid: (J,) whether a joint was read.
-            time_s: time of the readings.
-
+        Units are A, rad/s and rad; NaN is unknown. ``valid`` (J,) marks joints read at ``time_s``.
         """
         step_s, self._time_s = time_s - self._time_s, time_s
         if not 0.0 < step_s <= LONGEST_STEP_S:
@@ -94,7 +88,7 @@ def _compare(
     since: Floats,
     is_dead: Bools,
 ) -> bool:
-    """Note for how long each reading stays the same, and how far its joint moves meanwhile.
+    """Note how long each reading stays constant, and how far its joint moves meanwhile.
 
     Args:
         motion: (3, J) currents, velocities, positions.
@@ -102,9 +96,9 @@ def _compare(
         step_s: time since the previous readings.
         limits_a: (J,) limits of the current; infinite without one.
         last: (3, J) previous readings; NaN: begin again.
-        since: (3, 4, J) since each reading changed: reads, time, and for the current the travel and
-            the displacement, for the others displacement and integral of the velocity.
-        is_dead: (3, J) sensors that contradict the others; added to.
+        since: (3, 4, J) since each reading changed: reads, time, and for the current travel and
+            displacement, for the others displacement and integral of the velocity.
+        is_dead: (3, J) sensors that contradict the others; extended.
 
     Returns:
         Whether a sensor was added.
@@ -141,7 +135,7 @@ def _compare(
                 else:
                     limit = MISMATCH_RAD + MISMATCH_RAD_S * since[n, 1, k]
                     is_dead[n, k] = reads >= SPEED_READS and abs(first - second) >= limit
-                    if n == 1 and first == 0.0:  # both stay the same: the position is reported
+                    if n == 1 and first == 0.0:  # both constant: the position is reported
                         is_dead[n, k] = False
                 found |= is_dead[n, k]
             last[n, k] = motion[n, k]

@@ -1,4 +1,4 @@
-"""Recheck after an interruption: whether this is the same chain, in the same pose."""
+"""Recheck after an interruption: whether chain and pose are the same."""
 
 import math
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ MOVED_RAD = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Recheck:
-    """The chain as found, and every fault that forbids going on."""
+    """The chain as found, and every fault that forbids a continuation."""
 
     faults: tuple[ChainFault, ...]
     reset: tuple[int, ...]
@@ -37,7 +37,7 @@ class Recheck:
 
     @property
     def doubt(self) -> str | None:
-        """Why only a person can say that this is the same robot; None if its servos show it."""
+        """Reason why only a person can confirm the same robot; None if its servos confirm it."""
         if not self.unidentified:
             return None
         return (
@@ -67,10 +67,10 @@ def recheck(
     """Compare model, firmware, alarm, torque, settings and position with their earlier values.
 
     ``before`` and ``fingerprints`` are from the start; ``configured`` has RAM registers by joint.
-    ``believed_rad`` (J,) are the last believed angles.
+    ``believed_rad`` (J,) are the last credible angles.
 
     Raises:
-        BusError: a servo stops answering meanwhile.
+        BusError: a servo stops replying meanwhile.
         PortError: the port is gone.
 
     """

@@ -57,7 +57,7 @@ STILL_RAD = 0.1
 class ServoChain:
     """Joints of ``robot`` on ``bus``; implements ``JointLink``.
 
-    Hand out a ``SafeLink`` around it, never itself.
+    Pass on a ``SafeLink`` around it, never the chain itself.
     """
 
     def __init__(
@@ -75,14 +75,13 @@ class ServoChain:
         Args:
             bus: servos of the robot's models.
             robot: IDs, limits, gains.
-            watchdog_s: after this time without an instruction the servos stop by themselves.
-            rate_hz: control cycles a second, checked against what the wire allows; None: unchecked.
+            watchdog_s: the servos stop after this time without an instruction.
+            rate_hz: control cycles per second, checked against the wire; None: unchecked.
             fingerprint_file: compared with the servos at each ``enable``; None: not compared.
-            can_hold: ``hold_softly`` may be called, so every joint has a limit of its current.
+            can_hold: ``hold_softly`` may be called, so every joint has a current limit.
 
         Raises:
-            ControlTableError: a model lacks a register or a unit that the cycle needs, or has it
-                elsewhere than the others.
+            ControlTableError: a model lacks a register or unit of the cycle, or has it elsewhere.
 
         """
         self.robot = robot
@@ -98,7 +97,7 @@ class ServoChain:
         tables = [bus.table_of(servo_id) for servo_id in robot.servo_ids]
         scales = [ServoUnits.of(table.facts) for table in tables]
         self._units = JointUnits.of(robot, scales, can_hold=can_hold)
-        # rounded up: at least the time that was asked for
+        # rounded up: at least the requested time
         self._has_watchdog = all(WATCHDOG in table for table in tables)
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
@@ -148,11 +147,11 @@ class ServoChain:
         """Check and set up all servos, goal = present, torque on, watchdog armed.
 
         Raises:
-            ChainError: the servos are not the robot's, have an alarm, stand beyond a limit, or
-                are not as in the fingerprint file.
+            ChainError: the servos are not the robot's, have an alarm, are beyond a limit, or differ
+                from the fingerprint file.
             ConfigError: the fingerprint file is broken.
-            BudgetError: the wire cannot carry the rate with the reads that the firmwares have.
-            BusError: a servo does not do what an instruction asks; torque is off again then.
+            BudgetError: the wire cannot carry the rate with the reads of these firmwares.
+            BusError: a servo does not follow an instruction; torque is off again.
             PortError: the port is gone.
 
         """
@@ -178,8 +177,7 @@ class ServoChain:
     def recheck(self, believed_rad: Floats) -> Recheck:
         """Compare the chain after an interruption with its earlier state; moves nothing.
 
-        Args:
-            believed_rad: (J,) where its joints were when their readings could last be believed.
+        ``believed_rad`` (J,) are the last credible angles.
 
         Raises:
             BusError: a servo does not reply.
@@ -192,15 +190,15 @@ class ServoChain:
         )
 
     def resume(self, found: Recheck) -> JointState:
-        """Go on after an interruption: torque that is on stays on, nothing moves.
+        """Continue after an interruption: torque that is on stays on, nothing moves.
 
         Servos that lost torque or settings are set up again. For the others the watchdog is
         cleared, and the goal becomes the present position.
 
         Raises:
-            ChainError: ``found`` has a fault, a joint has moved since, or a servo does not
-                identify itself.
-            BusError: a servo does not do what an instruction asks; torque is off again then.
+            ChainError: ``found`` has a fault, a joint has moved since, or a servo does not identify
+                itself.
+            BusError: a servo does not follow an instruction; torque is off again.
             PortError: the port is gone.
 
         """
@@ -210,7 +208,6 @@ class ServoChain:
         return self._begin(found.position_rad)
 
     def _note(self, settings: Mapping[int, ServoSettings]) -> None:
-        """Keep the settings of servos that have just been set up."""
         self._configured |= {joint: each.ram for joint, each in settings.items()}
         self._fingerprints |= {joint: each.fingerprint for joint, each in settings.items()}
 
@@ -229,26 +226,26 @@ class ServoChain:
             raise
 
     def reboot(self, joint: int) -> None:
-        """Restart a joint's servo, which ends its alarm; it is limp until ``resume`` sets it up.
+        """Restart a joint's servo, which clears its alarm; it is limp until ``resume``.
 
         Raises:
-            BusError: it does not answer, or refuses.
+            BusError: it does not reply, or refuses.
             PortError: the port is gone.
 
         """
         self._bus.reboot(self.robot.servo_ids[joint])
 
     def reopen(self) -> None:
-        """Close and open the port again; of several, those that are gone.
+        """Close and open the lost ports.
 
         Raises:
-            PortError: it is still not there.
+            PortError: one is still missing.
 
         """
         self._bus.reopen()
 
     def hold(self) -> None:
-        """Set the goals to where the joints are.
+        """Set the goals to the present positions.
 
         A joint keeps its goal if its servo does not report position and identity in one reply.
 
@@ -260,7 +257,7 @@ class ServoChain:
         self._send_goals(np.where(np.isfinite(here_rad), here_rad, self._goal_rad))
 
     def _hold_and_arm(self, here_rad: Floats) -> JointState:
-        """Goal = present, torque on, watchdog armed; every step read back; the state then."""
+        """Goal = present, torque on, watchdog armed, each read back; return the state."""
         bus, ids = self._bus, self.robot.servo_ids
         if self._has_watchdog:
             bus.sync_write(ids, WATCHDOG, 0)  # goals follow at once, else an old goal counts
@@ -294,9 +291,9 @@ class ServoChain:
         )
 
     def hold_softly(self, current_a: Floats) -> None:
-        """Hold where the joints are, with currents of at most ``current_a`` (J,).
+        """Hold the present positions with currents of at most ``current_a`` (J,).
 
-        Reads keep the watchdogs fed, and still compare the servos with their settings.
+        Reads still feed the watchdogs and compare settings.
 
         Raises:
             BusError: a servo cannot limit its current, or does not confirm it.
@@ -311,11 +308,11 @@ class ServoChain:
         self._sent_at_s = self._clock.now_s()
 
     def disable(self) -> None:
-        """Torque off, then the watchdog, on every servo, also where others fail.
+        """Switch off torque, then the watchdog, on every servo, even if others fail.
 
         Raises:
             BusError: servos did not confirm; their watchdog stays armed and stops them.
-            PortError: a port is gone and does not come back; the watchdog stops its servos.
+            PortError: a port does not come back; the watchdog stops its servos.
 
         """
         self._armed = False
@@ -325,11 +322,10 @@ class ServoChain:
         """Read all joints once; voltages and temperatures in every 16th call and when overdue.
 
         If no joint was read, the other requests wait for the next call. Calls ``check_servos`` if
-        it was not called since the last read.
+        the caller has not done so since the last read.
 
         Raises:
-            BusError: a servo holds another goal than the one sent to it; raised by
-                ``check_servos``.
+            BusError: a servo has another goal than the one sent to it; raised by ``check_servos``.
             PortError: the port is gone.
 
         """
@@ -343,7 +339,7 @@ class ServoChain:
             self.on_event(losses)
         measured_at_s = self._take(reply)
         imu = None
-        if read > 0:  # else the additional reads wait, too, and the state grows stale
+        if read > 0:  # else the additional reads wait, and the state grows stale
             self._reads += 1
             has_time = not self._read_slow(measured_at_s) and reply.complete
             if self._liveness is not None and self._check(self._liveness.check_goals, has_time):
@@ -359,7 +355,7 @@ class ServoChain:
         return state
 
     def _read_slow(self, measured_at_s: float) -> bool:
-        """Read voltages and temperatures, if it is their turn or they are overdue; if they were."""
+        """Read voltages and temperatures if due; return whether they were."""
         its_turn = (self._reads - 1) % SLOW_EVERY == 0
         if not its_turn and measured_at_s - self._readings.slow_at_s <= _SLOW_S:
             return False
@@ -372,7 +368,7 @@ class ServoChain:
         return True
 
     def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
-        """Decode a group read of the state, or one more in this cycle; returns its time, s."""
+        """Decode a group read of the state; return its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
         lines = self._motion_sensors.update(self._readings.motion, reply.valid, measured_at_s)
@@ -381,13 +377,13 @@ class ServoChain:
         return measured_at_s
 
     def check_servos(self) -> None:
-        """Check torque, watchdogs and settings of the servos, one register in a cycle.
+        """Check torque, watchdogs and settings of the servos, one register per cycle.
 
-        Call it once the goals of a cycle are sent. A read without a reply skips the check.
+        Call it after the goals of a cycle. A read without a reply skips the check.
 
         Raises:
-            BusError: a servo has lost its torque or a setting (it has rebooted, or another program
-                has written to it), or its watchdog has stopped it or is not armed.
+            BusError: a servo has lost torque or a setting (reboot, or another program), or its
+                watchdog has stopped it or is not armed.
             PortError: the port is gone.
 
         """
@@ -402,7 +398,7 @@ class ServoChain:
     def _check(self, check: Callable[..., GroupCycle | None], has_time: bool) -> bool:
         """Make a check; return whether all servos were read.
 
-        If an alarm switched a servo off between group read and check, the error states the alarm.
+        If an alarm switched a servo off since the group read, the error states the alarm.
         """
         if not self._armed or self._readings.alert:
             return False
@@ -418,7 +414,7 @@ class ServoChain:
         return asked is not None
 
     def write(self, command: JointCommand) -> None:
-        """Send goal positions, kept inside the joint limits.
+        """Send goal positions within the joint limits.
 
         Raises:
             ValueError: a goal is not finite.
@@ -436,7 +432,7 @@ class ServoChain:
         self._sent_at_s = self._clock.now_s()
 
     def explain(self, joint: int) -> str | None:
-        """Return what is wrong with the goal that a joint's servo holds; None: nothing."""
+        """Return the fault of the goal in a joint's servo, or None."""
         try:
             return self._goal_check.explain(joint)
         except DriverError:
@@ -473,7 +469,7 @@ class ServoChain:
         """Compare a register of all servos with the values written to it.
 
         Raises:
-            BusError: a servo holds something else, or does not reply.
+            BusError: a servo differs, or does not reply.
 
         """
         expected = dict(enumerate(values))
@@ -490,6 +486,6 @@ class ServoChain:
             state = self.read()
             if state.valid.all() and state.slow_age_s.max() <= _SLOW_S:
                 return state
-            self._reads = 0  # so that the slow state is read again, too
+            self._reads = 0  # so that the slow state is read again
         silent = ", ".join(map(self.robot.joint_label, np.flatnonzero(~state.valid).tolist()))
         raise BusError(f"{silent or 'all servos'}: group read fails, pings do not")

@@ -1,4 +1,4 @@
-"""Soft hold: the joints hold where they are, with a low Goal Current(102)."""
+"""Soft hold: the joints hold their positions with a low Goal Current(102)."""
 
 from collections.abc import Mapping
 
@@ -21,9 +21,9 @@ def limit_currents(
     configured: Mapping[int, Mapping[str, int]],
     current_a: Floats,
 ) -> dict[int, Mapping[str, int]]:
-    """Lower Goal Current of all joints, and read it back.
+    """Lower Goal Current of all joints to ``current_a`` (J,), and read it back.
 
-    ``current_a`` is (J,); a joint with a lower limit keeps it.
+    A joint with a lower limit keeps it.
 
     Returns:
         ``configured`` with the new currents.

@@ -1,6 +1,6 @@
 """Start-up: checks and settings of servos before torque.
 
-It covers goals that differ from positions, return delays of 500 us, old alarms and lost turn
+It handles goals that differ from positions, return delays of 500 us, old alarms and lost turn
 counts.
 """
 
@@ -63,7 +63,7 @@ ALL_REPLY = 2
 
 @dataclass(frozen=True, slots=True)
 class ServoReport:
-    """Registers of one servo before anything is changed."""
+    """Registers of one servo before any change."""
 
     servo_id: int
     model: str
@@ -90,7 +90,7 @@ class Inspection:
 
     @property
     def fast_reads(self) -> bool:
-        """Whether every firmware knows fast sync read."""
+        """Whether every firmware has fast sync read."""
         return all(servo.fast_reads for servo in self.servos)
 
 
@@ -100,12 +100,12 @@ def inspect(
     servo_ids: Collection[int] | None = None,
     replies: Mapping[int, PingReply] | None = None,
 ) -> Inspection:
-    """Read identity and state of every servo of the robot, or of some; changes nothing.
+    """Read identity and state of the robot's servos; changes nothing.
 
-    ``servo_ids`` None: all. ``replies`` are those to pings that were just sent; None: ping.
+    ``servo_ids`` None: all. ``replies`` are those to recent pings; None: ping.
 
     Raises:
-        BusError: one that replied to its ping does not reply to the rest, or refuses.
+        BusError: a servo that replied to its ping does not reply later, or refuses.
 
     """
     asked = robot.servo_ids if servo_ids is None else servo_ids
@@ -144,10 +144,10 @@ def inspect(
 
 
 def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
-    """Read a servo's description of itself; changes nothing.
+    """Read the registers of a report; changes nothing.
 
     Raises:
-        BusError: it does not answer, or refuses.
+        BusError: it does not reply, or refuses.
 
     """
     table = bus.table_of(servo_id)
@@ -170,7 +170,7 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
 
 @dataclass(frozen=True, slots=True)
 class ServoSettings:
-    """Registers of one servo as a chain has set it up."""
+    """Registers of one servo after its set-up."""
 
     ram: Mapping[str, int]
     """Registers that a reboot or another program would change."""
@@ -187,15 +187,15 @@ def configure(
 ) -> dict[int, ServoSettings]:
     """Torque off, then every setting that the chain relies on, each read back.
 
-    ``joints`` None: all. ``on_event`` gets a line for each setting that another program has left
-    behind, and for each unusual setting that stays.
+    ``joints`` None: all. ``on_event`` gets a line for each changed setting of another program, and
+    for each unusual setting that stays.
 
     Returns:
         The settings of each joint's servo.
 
     Raises:
-        ChainError: a setting of the robot is beyond what a servo allows.
-        BusError: a servo does not do what an instruction asks.
+        ChainError: a setting of the robot exceeds a servo's range.
+        BusError: a servo does not follow an instruction.
 
     """
     which = tuple(range(robot.joint_count) if joints is None else joints)
@@ -208,7 +208,7 @@ def configure(
         found[joint] = _read_settings(bus, servo_id)
         if found[joint]["Torque Enable"]:  # the packet was lost
             bus.write_verified(servo_id, "Torque Enable", 0)
-        # in its error state goals are refused; if cleared with torque on, an old goal would count
+        # in its error state it rejects goals; clearing it with torque on would apply an old goal
         if found[joint].get(WATCHDOG):
             bus.write(servo_id, WATCHDOG, 0)
     none = ChainSetting("Secondary(Shadow) ID", NO_SECONDARY_ID, usual=False)
@@ -262,7 +262,7 @@ def identity(joint: int) -> int:
 
 
 def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
-    """Return the fault if the register of a joint's servo names another joint; else None."""
+    """Fault of a servo whose register names another joint, or None."""
     if value == identity(joint) or not 1 <= value <= robot.joint_count:
         return None
     return (
@@ -272,7 +272,7 @@ def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
 
 
 def _read_settings(bus: ChainBus, servo_id: int) -> dict[str, int]:
-    """Values of all that ``configure`` looks at, as far as the model has it."""
+    """Values of the registers of ``configure`` that the model has."""
     table = bus.table_of(servo_id)
     names: tuple[str, ...] = _SETTINGS
     if table.facts.protocol == "feetech":
@@ -294,7 +294,7 @@ def _apply(
         Present values of the registers.
 
     Raises:
-        BusError: one does not hold what it should; or the servo does not answer, or refuses.
+        BusError: a register differs; or the servo does not reply, or refuses.
 
     """
     servo_id, name = robot.servo_ids[joint], robot.joint_label(joint)
@@ -324,7 +324,7 @@ def _apply(
 def _current_setting(
     robot: RobotConfig, units: JointUnits, joint: int, limit_raw: int
 ) -> ChainSetting:
-    """Goal Current of a joint; the servo's Current Limit if the robot has no limit for it.
+    """Goal Current of a joint; the servo's Current Limit if the robot has no limit.
 
     Raises:
         ChainError: it is above the servo's Current Limit.
@@ -345,9 +345,7 @@ def _current_setting(
 
 
 def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
-    """Let servos reply to every instruction, whose Status Return Level(68) forbids it.
-
-    Returns the replies to pings of the robot's servos.
+    """Let servos reply to every instruction (Status Return Level(68)); return ping replies.
 
     At level 0 a servo replies to pings only, at level 1 to pings and reads. Only servos of the
     robot's model are written to.
@@ -367,10 +365,10 @@ def _ids_in_words(ids: Sequence[int]) -> str:
 
 
 def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
-    """Refuse to start from a pose that the robot cannot have.
+    """Reject an impossible start pose.
 
     Raises:
-        ChainError: a joint stands well beyond its limit.
+        ChainError: a joint is well beyond its limit.
 
     """
     faults = pose_faults(robot, position_rad)
@@ -379,7 +377,7 @@ def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
 
 
 def pose_faults(robot: RobotConfig, position_rad: NDArray[np.float64]) -> list[str]:
-    """Joints that stand well beyond their limits, one line each."""
+    """Joints well beyond their limits, one line each."""
     return [
         f"{robot.joint_label(joint)}: stands at {angle:.2f} rad, beyond its "
         f"limit of {limit:g}: bend it back by hand; if it is straight, its turn count or zero "

@@ -1,6 +1,6 @@
 """Temperature sensors: whether their readings follow the heat of the motors.
 
-A dead sensor reads 0, never changes, or jumps. The motor then gets hot without a warning, so the
+A dead sensor reads 0, never changes, or jumps. The motor then overheats without a warning, so the
 run reports it.
 """
 
@@ -35,10 +35,7 @@ class TemperatureSensors:
     """Compares J temperatures with the heat of the currents; reports each joint once."""
 
     def __init__(self, joint_names: Sequence[str], stall_current_a: Floats) -> None:
-        """Start without a reading.
-
-        ``stall_current_a`` (J,) is the current at full output and at rest; infinite if unknown.
-        """
+        """``stall_current_a`` (J,) is the current at full output and rest; infinite if unknown."""
         self._names, self._stall_a = joint_names, stall_current_a
         joints = len(joint_names)
         self._first_c = np.full(joints, np.nan)
@@ -51,12 +48,12 @@ class TemperatureSensors:
 
     @classmethod
     def of(cls, robot: RobotConfig) -> "TemperatureSensors":
-        """Start without a reading of the servos of ``robot``."""
+        """Sensors of the servos of ``robot``."""
         stall_a = [facts.stall_current_a or math.inf for facts in robot.servo_records]
         return cls([robot.joint_label(k) for k in range(robot.joint_count)], np.array(stall_a))
 
     def update(self, temperature_c: Floats, current_a: Floats, time_s: float) -> list[str]:
-        """Evaluate a reading of all joints (J,), NaN where unknown; returns lines to report."""
+        """Evaluate a reading of all joints (J,), NaN if unknown; return lines to report."""
         since_s = max(time_s - self._time_s, 0.0)
         step_s = min(since_s, _LONGEST_STEP_S)
         before_c, self._last_c, self._time_s = self._last_c, temperature_c.copy(), time_s
@@ -94,6 +91,6 @@ class TemperatureSensors:
         return lines
 
     def _others_warm_up(self, change_k: Floats) -> bool:
-        """Whether half of the readings that change show that the chain warms up or cools down."""
+        """Whether half of the changing readings show a warming or cooling chain."""
         others = change_k[~self._is_constant]
         return 0 < len(others) <= 2 * int(np.count_nonzero(others >= CHANGED_K))

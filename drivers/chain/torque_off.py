@@ -1,4 +1,4 @@
-"""Torque off on every servo of a chain, asked for until each servo confirms it."""
+"""Torque off on every servo of a chain, repeated until each servo confirms it."""
 
 from collections.abc import Iterable, Sequence
 
@@ -21,20 +21,18 @@ class TorqueOff:
     """Switches torque off, then the watchdogs."""
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, clock: Clock, watchdog_s: float) -> None:
-        """Prepare; nothing is sent."""
         self._bus, self._robot, self._clock = bus, robot, clock
         self._watchdog_s = watchdog_s
 
     def send(self) -> None:
-        """Switch torque off on every servo, also where others fail, and then the watchdogs.
+        """Switch torque off on every servo, even if others fail, then the watchdogs.
 
-        Servos that do not confirm it in a group read are asked one by one for a limited time. If
-        one of several ports is gone, the servos on the others are off before the wait for it
-        begins.
+        Servos that do not confirm in a group read are asked one by one for a limited time. If one
+        port is gone, the servos on the others are switched off before the wait for it.
 
         Raises:
             BusError: servos did not confirm; their watchdog stays armed and stops them.
-            PortError: a port is gone and does not come back; the watchdog stops its servos.
+            PortError: a port does not come back; the watchdog stops its servos.
 
         """
         give_up_s = self._clock.now_s() + _PORT_PATIENCE_S
@@ -78,7 +76,6 @@ class TorqueOff:
             )
 
     def _joints_on(self, part: DynamixelBus) -> list[int]:
-        """Joints whose servos are on one of the ports."""
         ids = self._robot.servo_ids
         return [joint for joint, i in enumerate(ids) if self._bus.port_of(i) is part.port]
 
@@ -86,7 +83,7 @@ class TorqueOff:
         return [self._robot.servo_ids[joint] for joint in joints]
 
     def _wait_to_send(self, part: DynamixelBus, joints: Sequence[int], give_up_s: float) -> None:
-        """Send torque off, unconfirmed, to a port that is gone and may come back soon."""
+        """Send torque off, unconfirmed, to a lost port that may come back soon."""
         while True:
             is_late = self._clock.now_s() >= give_up_s
             try:
@@ -100,7 +97,7 @@ class TorqueOff:
                 return
 
     def _unconfirmed(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
-        """Joints that do not confirm that their torque is off; the others' watchdogs are off."""
+        """Joints that do not confirm torque off; the others' watchdogs are off."""
         ids, joints = self._robot.servo_ids, list(on_it)
         for _ in range(_GROUP_ROUNDS):
             asked = self._ids_of(joints)
@@ -111,18 +108,18 @@ class TorqueOff:
                 break
             bus.sync_write(self._ids_of(joints), "Torque Enable", 0)
         give_up_s = self._clock.now_s() + _ASK_S
-        silent = joints  # servos behind a silent one stay silent in a group read
+        silent = joints  # servos after a silent one stay silent in a group read
         while silent and self._clock.now_s() < give_up_s:
             silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
         confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
         if confirmed and all(WATCHDOG in bus.table_of(each) for each in confirmed):
             bus.sync_write(confirmed, WATCHDOG, 0)
-            # the port may be closed directly afterwards: a reply shows that the packet has arrived
+            # the port may be closed next: a reply shows that the packet has arrived
             bus.block(confirmed, WATCHDOG, WATCHDOG, fast=False).read()
         return silent
 
     def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
-        """Ask one servo to switch its torque off; whether it confirms that, in time."""
+        """Ask one servo to switch torque off; return whether it confirms in time."""
         if self._clock.now_s() >= give_up_s:
             return False
         try:

@@ -1,7 +1,7 @@
-"""The byte port: the interface of a serial device, and of a simulated line.
+"""The byte port: interface of a serial device and of a simulated line.
 
-It has the methods that the DYNAMIXEL SDK's packet handlers call (SDK names, milliseconds), and
-those of the control cycle (seconds, deadlines).
+It has the methods of the DYNAMIXEL SDK's packet handlers (SDK names, milliseconds), and those of
+the control cycle (seconds, deadlines).
 """
 
 # ruff: noqa: N802 - the SDK chose the names
@@ -30,23 +30,23 @@ class SdkPort(Protocol):
         ...
 
     def clearPort(self) -> None:
-        """Throw away what has arrived and was not read."""
+        """Discard unread bytes."""
         ...
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Change the speed of the host's side; False if the port cannot."""
+        """Change the host's baud rate; False if the port cannot."""
         ...
 
     def getBaudRate(self) -> int:
-        """Speed of the host's side, bit/s."""
+        """Baud rate of the host, bit/s."""
         ...
 
     def getBytesAvailable(self) -> int:
-        """Bytes that have arrived and were not read."""
+        """Number of unread bytes."""
         ...
 
     def readPort(self, length: int) -> bytes:
-        """Up to ``length`` bytes that have arrived by now; never waits for more to come.
+        """Up to ``length`` bytes that have arrived; never waits.
 
         The SDK repeats this until ``isPacketTimeout``. On a simulated line, a call that returns
         nothing moves the clock to the next byte, or to the time-out.
@@ -54,7 +54,7 @@ class SdkPort(Protocol):
         ...
 
     def writePort(self, packet: bytes | list[int]) -> int:
-        """Send; the number of bytes taken."""
+        """Send; return the number of bytes accepted."""
         ...
 
     def setPacketTimeout(self, packet_length: int) -> None:
@@ -79,7 +79,7 @@ class BytePort(SdkPort, Protocol):
 
     @property
     def clock(self) -> Clock:
-        """The time that the deadlines below are in; a simulated line owns a simulated one."""
+        """Clock of the deadlines; a simulated line has a simulated one."""
         ...
 
     @property
@@ -89,37 +89,34 @@ class BytePort(SdkPort, Protocol):
 
     @property
     def paced(self) -> bool:
-        """Whether on the clock bytes need the time of the baud rate.
+        """Whether bytes need the time of the baud rate on the clock.
 
         False on a pseudo-terminal, and on a network.
         """
         ...
 
     def write(self, data: bytes) -> None:
-        """Send all of ``data`` without waiting until it is on the wire.
-
-        Consecutive writes go out back to back, in order.
-        """
+        """Send all of ``data`` without waiting for the wire; writes go out back to back."""
         ...
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``clock.now_s() >= deadline_s``.
 
-        Returns fewer bytes if the deadline has passed; at once with a deadline in the past.
+        Returns fewer bytes after the deadline; at once if it is past.
         """
         ...
 
     def drain_until_quiet(self, quiet_s: float) -> int:
-        """Throw bytes away until none has come for ``quiet_s``; the number thrown away.
+        """Discard bytes until none has come for ``quiet_s``; return their number.
 
-        Waits at least ``quiet_s``, and at most ``quiet_s + DRAIN_LIMIT_S``.
+        Waits between ``quiet_s`` and ``quiet_s + DRAIN_LIMIT_S``.
         """
         ...
 
 
 @runtime_checkable
 class DescriptorPort(Protocol):
-    """A byte port whose file descriptor compiled code may write and read directly."""
+    """A byte port whose file descriptor compiled code may use directly."""
 
     descriptor: int | None
     """Non-blocking; None: the port is closed, or only its methods may be used."""
@@ -134,15 +131,15 @@ class DescriptorPort(Protocol):
 
 
 def is_url(device: str) -> bool:
-    """Whether a port's name is that of a line behind a network, and no path."""
+    """Whether a port's name is a URL, not a path."""
     return "://" in device
 
 
 def reopen(port: BytePort) -> None:
-    """Close and open again, after the port was gone.
+    """Close and open a lost port.
 
     Raises:
-        PortError: it is still not there.
+        PortError: it is still missing.
 
     """
     port.closePort()

@@ -1,4 +1,4 @@
-"""Base of the byte ports on a line that pyserial opens: the SDK's calls, and the drain."""
+"""Base of the byte ports that pyserial opens: the SDK's calls, and the drain."""
 
 # ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port.byte_port` describes them
 
@@ -20,7 +20,7 @@ _SDK_WAIT_S = 0.01
 
 
 class LinePort(ABC):
-    """Implements ``BytePort``, but for how its line is opened, read and written.
+    """Implements ``BytePort`` except for opening, reading and writing the line.
 
     Raises:
         PortError: (when opened) it cannot be; (later) it is gone.
@@ -69,12 +69,12 @@ class LinePort(ABC):
     @property
     @abstractmethod
     def latency_s(self) -> float:
-        """How long bytes may be held back on the way, the ``latency_s`` of ``DynamixelBus``."""
+        """Largest delay of bytes, for ``latency_s`` of ``DynamixelBus``."""
 
     @property
     @abstractmethod
     def latency_timer_ms(self) -> int | None:
-        """How long the USB adapter's driver may hold bytes back; None where it does not say."""
+        """Largest delay by the USB adapter's driver; None if unknown."""
 
     @abstractmethod
     def write(self, data: bytes) -> None:
@@ -85,7 +85,7 @@ class LinePort(ABC):
         """Wait for ``count`` bytes, at most until ``deadline_s``."""
 
     def drain_until_quiet(self, quiet_s: float) -> int:
-        """Throw bytes away until none has come for ``quiet_s``, for a limited time."""
+        """Discard bytes until none has come for ``quiet_s``, for a limited time."""
         drained = 0
         quiet_at_s = self._clock.now_s() + quiet_s
         limit_s = quiet_at_s + DRAIN_LIMIT_S
@@ -106,7 +106,7 @@ class LinePort(ABC):
     def closePort(self) -> None:
         if self._serial is not None:
             line, self._serial = self._serial, None
-            with suppress(*self.line_errors):  # a line that is gone is closed as far as it can be
+            with suppress(*self.line_errors):  # a lost line is closed as far as possible
                 line.close()
         self.is_using = False
 

@@ -30,12 +30,12 @@ _TO_A_HOST: Final = ("socket", "rfc2217")
 def open_port(
     device: str, baud: int = 1_000_000, clock: Clock | None = None
 ) -> SerialPort | NetworkPort:
-    """Open a serial device, or a line behind a network where ``device`` is a URL.
+    """Open a serial device, or the line behind a URL.
 
-    Ports of one chain share a ``clock``; None: one of its own.
+    Ports of one chain share a ``clock``; None: its own.
 
     Raises:
-        PortError: it is not there, or cannot be opened.
+        PortError: it is missing, or cannot be opened.
 
     """
     kind = NetworkPort if is_url(device) else SerialPort
@@ -43,10 +43,10 @@ def open_port(
 
 
 class NetworkPort(LinePort):
-    """A line that pyserial's URL handlers reach; implements ``BytePort``.
+    """A line behind pyserial's URL handlers; implements ``BytePort``.
 
     Raises:
-        PortError: (when opened) nobody listens, an unknown kind of URL; (later) the line is gone.
+        PortError: (when opened) no server, or an unknown kind of URL; (later) the line is gone.
 
     """
 
@@ -57,12 +57,12 @@ class NetworkPort(LinePort):
 
     @property
     def latency_s(self) -> float:
-        """How long bytes may be held back on the way, the ``latency_s`` of ``DynamixelBus``."""
+        """Largest delay of bytes, for ``latency_s`` of ``DynamixelBus``."""
         return NETWORK_LATENCY_S
 
     @property
     def latency_timer_ms(self) -> int | None:
-        """None: the adapter is another computer's, and does not say."""
+        """None: another computer has the adapter."""
         return None
 
     def write(self, data: bytes) -> None:
@@ -97,7 +97,7 @@ class NetworkPort(LinePort):
             self._serial = serial.serial_for_url(self._name, self._baud, timeout=_POLL_S)
         except self._refusals as error:
             raise PortError(f"{self._name}: cannot be opened: {error}") from error
-        # two small packets in a row must not wait for the first one's acknowledgement
+        # the second of two small packets must not wait for an acknowledgement
         with (
             suppress(AttributeError, ValueError, *self.line_errors),
             socket.socket(fileno=os.dup(self._serial.fileno())) as line,

@@ -1,4 +1,4 @@
-"""Which port each servo of a chain is on: ``[[ports]]`` of a robot's file, ``--port`` of a run."""
+"""Ports of the servos of a chain: ``[[ports]]`` of a robot's file, ``--port`` of a run."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -12,15 +12,15 @@ _EXAMPLE: Final = "write 1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1"
 
 
 def is_port_map(text: str) -> bool:
-    """Whether ``--port`` names a port for each segment, ``1-8=PORT,9-16=PORT``."""
+    """Whether ``--port`` names a port per segment, ``1-8=PORT,9-16=PORT``."""
     return _SEGMENT.match(text) is not None
 
 
 def parse_port_map(text: str) -> list[tuple[str, tuple[int, ...]]]:
-    """Read ``IDS=PORT,IDS=PORT``, IDs as ``1-8`` or ``1,2,5-8``; ports and the IDs on each.
+    """Read ``IDS=PORT,IDS=PORT``, IDs as ``1-8`` or ``1,2,5-8``; return ports and their IDs.
 
     Raises:
-        InputError: unreadable text, an ID out of 0 to 252, or a range that runs backwards.
+        InputError: unreadable text, an ID outside 0 to 252, or a reversed range.
 
     """
     found, at = [], 0
@@ -36,7 +36,7 @@ def parse_port_map(text: str) -> list[tuple[str, tuple[int, ...]]]:
 
 
 def ports_in(text: str) -> list[str]:
-    """Return the ports that ``--port`` names, one or several.
+    """Return the ports that ``--port`` names.
 
     Raises:
         InputError: as ``parse_port_map``.
@@ -46,7 +46,7 @@ def ports_in(text: str) -> list[str]:
 
 
 def port_map_text(ports: Iterable[tuple[str, Sequence[int]]]) -> str:
-    """Write ports as ``parse_port_map`` reads them."""
+    """Inverse of ``parse_port_map``."""
     return ",".join(f"{_ids_text(ids)}={port}" for port, ids in ports)
 
 
@@ -54,7 +54,7 @@ def id_range(piece: str, source: str, example: str) -> range:
     """Read ``7`` or ``1-8``; faults begin with ``source`` and end with ``example``.
 
     Raises:
-        InputError: no numbers, an ID out of 0 to 252, or a range that runs backwards.
+        InputError: no numbers, an ID outside 0 to 252, or a reversed range.
 
     """
     first, dash, last = piece.partition("-")

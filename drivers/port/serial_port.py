@@ -33,14 +33,14 @@ _OWN = "snakewalk"
 
 
 class SerialPort(LinePort):
-    """A serial device, opened for this program alone; implements ``BytePort``.
+    """A serial device, opened exclusively; implements ``BytePort``.
 
     Raises:
-        PortError: (when opened) missing, denied, busy, or a baud rate that it cannot; (later) gone.
+        PortError: (when opened) missing, denied, busy, or an impossible baud rate; (later) gone.
 
     """
 
-    line_errors = (  # termios' is no OSError
+    line_errors = (  # termios' error is not an OSError
         *LinePort.line_errors,
         *(() if termios is None else (termios.error,)),
     )
@@ -59,17 +59,17 @@ class SerialPort(LinePort):
 
     @property
     def latency_timer_ms(self) -> int | None:
-        """How long the USB adapter's driver may hold bytes back; None where it does not say."""
+        """Largest delay by the USB adapter's driver; None if unknown."""
         tty = os.path.basename(os.path.realpath(self._name))
         try:
             with open(f"/sys/bus/usb-serial/devices/{tty}/latency_timer", encoding="ascii") as file:
                 return int(file.read())
         except (OSError, ValueError):
-            return None  # not a USB adapter, or one without the setting: nothing to report
+            return None  # not a USB adapter, or one without the setting
 
     @property
     def latency_s(self) -> float:
-        """How long bytes may be held back on this side, the ``latency_s`` of ``DynamixelBus``."""
+        """Largest delay of bytes on the host, for ``latency_s`` of ``DynamixelBus``."""
         if self._is_pseudo_terminal():
             return _PROGRAM_S
         timer_ms = self.latency_timer_ms
@@ -77,7 +77,7 @@ class SerialPort(LinePort):
 
     @property
     def paced(self) -> bool:
-        """True of a device; a pseudo-terminal has no wire."""
+        """True for a device; a pseudo-terminal has no wire."""
         return not self._is_pseudo_terminal()
 
     def write(self, data: bytes) -> None:
@@ -86,7 +86,7 @@ class SerialPort(LinePort):
         try:
             sent = 0
             while True:
-                # a device that polls as writable may still accept nothing when it is full
+                # a device that polls as writable may accept nothing when it is full
                 with suppress(BlockingIOError):
                     sent += os.write(fd, data[sent:])
                 if sent == len(data):
@@ -108,7 +108,7 @@ class SerialPort(LinePort):
                 try:
                     more = os.read(fd, count - len(got))
                 except BlockingIOError:
-                    continue  # another program reads here, too, and was quicker
+                    continue  # another program reads this port too
                 if not more:
                     raise OSError(errno.EIO, "ready to be read, but empty")
                 got += more
@@ -142,15 +142,15 @@ class SerialPort(LinePort):
         except self._refusals as error:
             raise self._open_error(error) from error
         self.descriptor = int(self._serial.fileno())
-        # Programs that ask for no lock can open a locked device all the same. Not on a
-        # pseudo-terminal: its other end keeps it open, and with it the flag, after we are killed.
+        # Programs that request no lock could open a locked device. Not on a pseudo-terminal: its
+        # other end keeps the flag after this program is killed.
         if not self._is_pseudo_terminal():
             with suppress(*self.line_errors):
                 fcntl.ioctl(self.descriptor, termios.TIOCEXCL)
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(self._serial.fileno(), select.POLLIN)
         self._writable.register(self._serial.fileno(), select.POLLOUT)
-        # asks an FTDI driver for a latency timer of 1 ms instead of 16; others have none to set
+        # sets the latency timer of an FTDI driver to 1 ms instead of 16; others have none
         with suppress(ValueError, NotImplementedError, *self.line_errors):
             self._serial.set_low_latency_mode(True)
 
@@ -162,7 +162,7 @@ class SerialPort(LinePort):
 
 
 def open_fault(name: str, baud: int, error: Exception) -> str:
-    """Say why a device could not be opened, and what would be right."""
+    """Reason why a device could not be opened, and the remedy."""
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:
         there = ", ".join(sorted(port.device for port in list_ports.comports()))
@@ -183,7 +183,7 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
 
 
 def _is_no_terminal(device: str) -> bool:
-    """Whether there is a file, a folder or a device that has no baud rate."""
+    """Whether this is a file, a folder or a device without a baud rate."""
     with suppress(OSError):
         descriptor = os.open(device, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         try:
@@ -194,14 +194,11 @@ def _is_no_terminal(device: str) -> bool:
 
 
 def _holders(device: str) -> list[str]:
-    """Programs that have a device open, ``name (process 123)``; those of other users are hidden.
-
-    A process of snakewalk is named with its command and run, and Python with its script or module.
-    """
+    """Programs that have a device open, ``name (process 123)``; those of other users are hidden."""
     path = os.path.realpath(device)
     found = []
     for process in sorted(filter(str.isdigit, os.listdir("/proc")), key=int):
-        with suppress(OSError):  # another user's, or ended just now
+        with suppress(OSError):  # another user's, or just ended
             descriptors = os.listdir(f"/proc/{process}/fd")
             if any(_leads_to(f"/proc/{process}/fd/{each}", path) for each in descriptors):
                 found.append(f"{_program(process)} (process {process})")
@@ -209,7 +206,7 @@ def _holders(device: str) -> list[str]:
 
 
 def _program(process: str) -> str:
-    """Name of a process, with the script of an interpreter; a command of snakewalk as typed."""
+    """Name of a process: snakewalk with its command line, Python with its script or module."""
     with open(f"/proc/{process}/cmdline", encoding="utf-8", errors="replace") as file:
         words = file.read().rstrip("\0").split("\0")
     names = [os.path.basename(word) for word in words[:2]]
@@ -221,7 +218,7 @@ def _program(process: str) -> str:
 
 
 def _script(words: list[str]) -> list[str]:
-    """Script or module among the words after an interpreter; empty if it has neither."""
+    """Script or module in the words after an interpreter, or nothing."""
     rest = iter(words)
     for word in rest:
         if word == "-m":
@@ -236,6 +233,6 @@ def _script(words: list[str]) -> list[str]:
 
 
 def _leads_to(link: str, path: str) -> bool:
-    with suppress(OSError):  # closed just now, as the one of the listing itself is
+    with suppress(OSError):  # closed just now, like the listing's own
         return os.readlink(link) == path
     return False

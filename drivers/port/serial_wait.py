@@ -1,13 +1,10 @@
-"""Send a request on a serial device, sleep, and receive its reply, without Python in between.
+"""Send a request on a serial device, sleep, and receive its reply, in compiled code.
 
-The loops are compiled when this module is imported, never in a cycle, and use the C library of
-Linux. They handle the regular case only. After a signal, an error or the deadline they return
-early, and the methods of ``SerialPort`` continue from there and find the cause.
-
-The time at which a reply is complete is known from its length, to within what the driver and the
-operating system add. So the host sleeps while the reply arrives and wakes shortly before its end:
-once, instead of once for each piece. Then it polls, or sleeps until the last bytes have arrived.
-How late (or early) replies really are is estimated from cycle to cycle if it polls.
+The loops are compiled at import and use the C library of Linux. They handle the regular case. After
+a signal, an error or the deadline they return early, and the methods of ``SerialPort`` continue.
+The length of a reply gives its end, except for delays of driver and operating system. So the host
+wakes once, shortly before the end, instead of once per piece. Then it polls, or sleeps until the
+last bytes. If it polls, it estimates the delay of replies from cycle to cycle.
 """
 
 import numpy as np
@@ -60,8 +57,8 @@ def now_ns() -> int:
 def update(latency_estimate: NDArray[np.int64], late_ns: int, least_ns: int, spin_ns: int) -> int:
     """Update the estimate: a reply was complete ``late_ns`` after its earliest possible time.
 
-    A reply that was complete before the first poll (``late_ns`` = -``least_ns``) may have been
-    complete for long: each one in a row shortens the next sleep by twice as much, down to none.
+    If a reply was complete before the first poll (``late_ns`` = -``least_ns``), its real time is
+    unknown: each such reply in a row doubles the reduction of the next sleep.
     """
     if late_ns <= -least_ns:
         earlier = spin_ns << latency_estimate[STREAK]
@@ -76,7 +73,7 @@ def update(latency_estimate: NDArray[np.int64], late_ns: int, least_ns: int, spi
 
 @compiled(int64(int32, _RAW))
 def send(fd: int, request: Bytes) -> int:
-    """Discard the input buffer and send ``request``; returns how many bytes were taken."""
+    """Discard the input and send ``request``; return the number of bytes sent."""
     _tcflush(fd, _TCIFLUSH)
     return max(0, int(_write(fd, request.ctypes.data, len(request))))
 
@@ -91,19 +88,18 @@ def receive(
     spin_ns: int,
     latency_estimate: NDArray[np.int64],
 ) -> int:
-    """Receive until a reply is complete or the deadline has passed; returns the byte count.
+    """Receive until a reply is complete or the deadline has passed; return the byte count.
 
-    It is one more than the reply has where more is on the line.
+    It is one more than the reply if more bytes are on the line.
 
     Args:
         fd: descriptor, non-blocking.
         reply: (n + 1,) filled; n is the length of the reply, at least 1 byte.
-        begun_ns: when the request was sent.
-        least_ns: from then until the last byte can have arrived at the earliest.
-        wait_ns: from then until the deadline.
-        spin_ns: for this duration before and after the expected end, poll without sleeping; 0:
-            sleep until the earliest possible end, then until bytes arrive, until the reply is
-            complete.
+        begun_ns: time of the request.
+        least_ns: from then to the earliest possible end of the reply.
+        wait_ns: from then to the deadline.
+        spin_ns: poll for this duration before and after the expected end; 0: sleep until the
+            earliest possible end, then until bytes arrive.
         latency_estimate: (2,) from ``new_latency_estimate``; updated.
 
     """

@@ -1,4 +1,4 @@
-"""Control tables of the servo models, from their files in `config/servos`."""
+"""Control tables of the servo models (files in `config/servos`)."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class ControlTable:
 
     @property
     def zero_position(self) -> int:
-        """Raw position of 0 rad: straight."""
+        """Raw position of 0 rad (straight)."""
         return self.facts.units.zero_position
 
     @property
@@ -78,10 +78,10 @@ class ControlTable:
         return self.facts.rad_per_position
 
     def register(self, name: str) -> Register:
-        """Look up a register by its name in the e-manual, ``Present Position``.
+        """Look up a register by its e-manual name, ``Present Position``.
 
         Raises:
-            ControlTableError: this model has no register of that name.
+            ControlTableError: this model lacks it.
 
         """
         try:
@@ -96,7 +96,7 @@ class ControlTable:
 
     @property
     def state_names(self) -> tuple[str, str, str]:
-        """Registers of the state block: Present Current, or Load without a sensor, and two more."""
+        """Registers of the state block; Present Load replaces a missing Present Current."""
         first = "Present Current" if "Present Current" in self.registers else "Present Load"
         return (first, "Present Velocity", "Present Position")
 
@@ -110,7 +110,7 @@ class ControlTable:
 def model_numbers(protocol: int | str = 2) -> Mapping[int, str]:
     """Names of the known servos of a protocol by model number.
 
-    They include those of the files in the folder ``servos`` of the working directory.
+    Includes the files in the folder ``servos`` of the working directory.
     """
     return models_by_number(Path(), protocol)
 
@@ -134,12 +134,11 @@ def model_of(model_number: int) -> str:
 def load_control_table(model: Model) -> ControlTable:
     """Control table of a model.
 
-    Args:
-        model: ``XM430-W350``, in any case and with ``_`` or ``-``; a path of its file; or its
-            record.
+    ``model`` is a name such as ``XM430-W350`` (any case, ``_`` or ``-``), the path of a file, or a
+    record.
 
     Raises:
-        ControlTableError: the model does not exist, or it has another protocol.
+        ControlTableError: the model does not exist, or has another protocol.
 
     """
     return _named(model) if isinstance(model, str) else _table(model)

@@ -22,7 +22,7 @@ TABLE = np.array(_TABLE, dtype=np.uint16)
 
 
 def crc16(data: bytes | bytearray, start: int = 0) -> int:
-    """CRC of ``data``, continued from ``start``, the CRC of the bytes before it."""
+    """CRC of ``data``, continued from the CRC ``start`` of the bytes before it."""
     crc = start
     for byte in data:
         crc = ((crc << 8) & 0xFFFF) ^ _TABLE[(crc >> 8) ^ byte]

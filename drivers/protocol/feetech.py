@@ -1,9 +1,8 @@
 """Feetech's serial protocol (FT-SCS): instructions, alarms and the format of words.
 
-A packet is one of DYNAMIXEL Protocol 1.0 (``drivers.protocol.protocol1``). The words differ: STS
-and HLS servos are little-endian, SCS servos big-endian, and a signed word is a magnitude with a
-bit for its sign. The tables of the models state both (``config/servos``).
-
+A packet is one of DYNAMIXEL Protocol 1.0 (``drivers.protocol.protocol1``). Words differ: STS and
+HLS servos are little-endian, SCS servos big-endian, and a signed word is a magnitude with a sign
+bit. The tables of the models state both (``config/servos``).
 Source: Feetech, "Servo SCS Communication Protocol", and the memory tables of STS, SCSCL and HLS.
 """
 
@@ -75,7 +74,7 @@ ALARM_BITS: Final = sum(_ALARMS)
 
 
 def alarm_of(status: int) -> int:
-    """Bits of ``registers.Alarm`` for a servo status."""
+    """``registers.Alarm`` bits of a servo status."""
     return sum(bit for own, bit in _ALARMS.items() if status & own)
 
 
@@ -86,7 +85,7 @@ def shutdown_alarms(facts: ServoModel) -> int:
 
 
 def decode_word(data: bytes, row: RegisterRow, facts: ServoModel) -> int:
-    """Value of a register's bytes on the wire."""
+    """Value of a register's wire bytes."""
     value = int.from_bytes(data[: row.size], facts.byte_order, signed=row.signed)
     if row.sign_bit is None or row.size == 1:
         return value
@@ -95,7 +94,7 @@ def decode_word(data: bytes, row: RegisterRow, facts: ServoModel) -> int:
 
 
 def encode_word(value: int, row: RegisterRow, facts: ServoModel, name: str) -> bytes:
-    """Bytes of a register's value on the wire.
+    """Wire bytes of a register's value.
 
     Raises:
         ControlTableError: it does not fit.
@@ -112,7 +111,7 @@ def encode_word(value: int, row: RegisterRow, facts: ServoModel, name: str) -> b
 
 
 def wire_bytes(facts: ServoModel, servos: int, length: int) -> tuple[int, int]:
-    """Bytes of the requests and replies of a read of ``length`` bytes from each servo."""
+    """Bytes of the requests and replies of a read of ``length`` bytes per servo."""
     requests = GROUP_BYTES + servos if facts.sync_read else GROUP_BYTES * servos
     return requests, servos * (STATUS_BYTES + length)
 
@@ -121,7 +120,7 @@ class BlockFormat:
     """Converts blocks of registers from the wire to little-endian two's complement."""
 
     def __init__(self, facts: ServoModel, address: int, length: int) -> None:
-        """Collect the registers that lie in the block of ``length`` bytes at ``address``."""
+        """Collect the registers in the block of ``length`` bytes at ``address``."""
         inside = [
             row
             for row in facts.registers.values()
@@ -154,7 +153,7 @@ class BlockFormat:
 
 
 class FeetechParser:
-    """Cuts a byte stream into status packets; noise and damaged packets are counted and skipped."""
+    """Cuts a byte stream into status packets; skips and counts other bytes."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -163,7 +162,7 @@ class FeetechParser:
 
     @property
     def pending(self) -> int:
-        """Bytes that may be the beginning of a packet."""
+        """Bytes that may begin a packet."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[StatusPacket]:

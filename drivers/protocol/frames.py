@@ -1,7 +1,7 @@
 """Frames of a control cycle: goals to bytes, and the bytes of regular replies to values.
 
-Loops over bytes, compiled when this module is imported, never in a cycle. A reply that is not
-exactly as expected is refused here and left to ``drivers.bus.group_read``.
+The loops are compiled at import, never in a cycle. Irregular replies are left to
+``drivers.bus.group_read``.
 """
 
 import numpy as np
@@ -35,7 +35,7 @@ def crc_of(data: Bytes, start: int, stop: int, crc: int) -> int:
 
 @compiled(f"boolean({_RAW}, int64, int64)", makes_arrays=False)
 def header_in(data: Bytes, start: int, stop: int) -> bool:
-    """Whether ``FF FF FD`` lies within ``start`` to ``stop``."""
+    """Whether ``FF FF FD`` is within ``start`` to ``stop``."""
     for k in range(start + 2, stop):
         if data[k] == 0xFD and data[k - 1] == 0xFF and data[k - 2] == 0xFF:
             return True
@@ -44,7 +44,7 @@ def header_in(data: Bytes, start: int, stop: int) -> bool:
 
 @compiled(f"int64({_RAW}, {_ROWS}, {_ROWS}, {_ROW})", makes_arrays=False)
 def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
-    """Decode N status packets, none of them stuffed.
+    """Decode N unstuffed status packets.
 
     Args:
         raw: bytes received.
@@ -103,7 +103,7 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
 
 @compiled(f"boolean({_ROW}, int32[::1])", makes_arrays=False)
 def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
-    """Write ``values`` (N,) and the CRC into a sync write; False if it must be stuffed first."""
+    """Write ``values`` (N,) and the CRC into a sync write; False if it needs stuffing."""
     for servo in range(len(values)):
         value = int(values[servo])
         for k in range(4):

@@ -1,12 +1,12 @@
-"""The two public tables of IMUs that answer on a DYNAMIXEL bus, and what their bytes mean.
+"""The two public register tables of IMUs on a DYNAMIXEL bus.
 
 - ``FFW-G40-IMU``, model number 537: ``param/dxl_model/ffw_g40_imu.model`` and ``dynamixel.model``
-  of ROBOTIS' ``dynamixel_hardware_interface``. It shows raw counts. The values of its registers of
-  scales (32 and 34) are not published, so the user states the ranges.
+  of ROBOTIS' ``dynamixel_hardware_interface``. It returns raw counts. The values of its scale
+  registers (32 and 34) are not published, so the user states the ranges.
 - ``imu_to_dxl``, version 2, on an LSM6DSV16X: ``duck-control/src/imu.rs`` of Pollen Robotics'
-  ``microduck``, the host's side. ID 200, 12 bytes at 124: rates of 17.5 mdps a count, and the
-  vector of a unit quaternion as three IEEE half floats, all zero until the chip's filter runs.
-  Other registers are not published.
+  ``microduck``. ID 200, 12 bytes at 124: rates of 17.5 mdps per count, and the vector of a unit
+  quaternion as three IEEE half floats, all zero until the chip's filter runs. Other registers are
+  not published.
 """
 
 from collections.abc import Mapping
@@ -105,7 +105,7 @@ BLOCK_BYTES = 12
 
 
 def imu_model(model_number: int) -> ImuModel | None:
-    """Name of the IMU with a published model number; None for any other."""
+    """Name of the IMU with a published model number, or None."""
     return next((m for m, table in IMU_TABLES.items() if table.model_number == model_number), None)
 
 
@@ -119,26 +119,24 @@ def decode(imu: ImuConfig, block: bytes) -> ImuSample:
 
 
 def _rotation(halves: bytes) -> Floats | None:
-    """Axes of a quaternion whose vector is in three half floats; None without one."""
+    """Axes from a quaternion vector of three half floats; None without one."""
     vector = np.frombuffer(halves, "<f2").astype(float)
     square = float(vector @ vector)
-    if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN does not count, either
+    if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN is rejected too
         return None
     whole = [*vector, np.sqrt(max(0.0, 1.0 - square))]
     return np.asarray(rotations().from_quat(whole).as_matrix())
 
 
 def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Floats) -> bytes:
-    """The same block as the device shows it; values beyond its range are cut off.
+    """Inverse of ``decode``; values beyond the range are clipped.
 
     ``rate_rad_s`` (3,) and ``force_m_s2`` (3,) are in the device's axes; ``rotation`` (3, 3) are
     these axes in the world.
     """
     if imu.gyro_range_dps is None or imu.acceleration_range_g is None:
         vector = rotations().from_matrix(rotation).as_quat(canonical=True)[:3].astype("<f2")
-        vector[
-            vector == 0.0
-        ] = -0.0  # not all bytes 0: those mean that the quaternion is still missing
+        vector[vector == 0.0] = -0.0  # all bytes 0 mean a missing quaternion
         return _counts(rate_rad_s / GYRO_RAD_S) + bytes(vector.tobytes())
     force = force_m_s2 * (COUNTS / (imu.acceleration_range_g * GRAVITY_M_S2))
     return _counts(force) + _counts(rate_rad_s * (COUNTS / np.deg2rad(imu.gyro_range_dps)))

@@ -1,7 +1,7 @@
-"""Protocol 2.0 packets, both ways, shared by host and servo side.
+"""Protocol 2.0 packets, both directions, shared by host and servo.
 
 ``FF FF FD 00 | id | length (2) | instruction | [error] parameters, stuffed | CRC (2)``; the length
-counts all behind itself. Source: e-manual, DYNAMIXEL Protocol 2.0.
+counts the bytes after it. Source: e-manual, DYNAMIXEL Protocol 2.0.
 """
 
 from collections.abc import Iterable
@@ -68,10 +68,10 @@ class InstructionPacket:
 
 @dataclass(frozen=True, slots=True)
 class StatusPacket:
-    """Servo to host; from ID 0xFE it is the common reply to a fast read.
+    """Servo to host; ID 0xFE marks the common reply to a fast read.
 
-    In the reply to a fast read, ``error`` is the first servo's, and ``params`` is everything behind
-    it except the last CRC.
+    There, ``error`` is the first servo's, and ``params`` has all following bytes except the last
+    CRC.
     """
 
     servo_id: int
@@ -81,7 +81,7 @@ class StatusPacket:
 
     @property
     def result(self) -> int:
-        """Error code without the alert bit; a ``ResultError`` according to the e-manual."""
+        """Error code without the alert bit; a ``ResultError`` by the e-manual."""
         return self.error & ~ALERT
 
     @property
@@ -97,17 +97,17 @@ def encode_instruction(packet: InstructionPacket) -> bytes:
     """Bytes of an instruction packet, stuffed.
 
     Raises:
-        ProtocolError: an id or a length that the protocol does not have.
+        ProtocolError: invalid ID or length.
 
     """
     return _frame(packet.servo_id, packet.instruction, stuff(packet.params))
 
 
 def encode_status(packet: StatusPacket) -> bytes:
-    """Bytes of a status packet; stuffed unless it is the reply to a fast read (ID 0xFE).
+    """Bytes of a status packet, stuffed unless it replies to a fast read (ID 0xFE).
 
     Raises:
-        ProtocolError: an id or a length that the protocol does not have.
+        ProtocolError: invalid ID or length.
 
     """
     payload = bytes([packet.error]) + packet.params
@@ -133,7 +133,7 @@ _STUFFED = b"\xff\xff\xfd\xfd"
 
 
 def stuff(params: bytes) -> bytes:
-    """Add ``FD`` behind every ``FF FF FD``; ``params``: everything from instruction to CRC."""
+    """Add ``FD`` after every ``FF FF FD`` in ``params``, all bytes from instruction to CRC."""
     return params.replace(_HEADER, _STUFFED)
 
 
@@ -141,7 +141,7 @@ def unstuff(params: bytes) -> bytes:
     """Exact inverse of ``stuff``.
 
     Raises:
-        StuffingError: ``params`` holds a bare ``FF FF FD``, so no sender stuffed it.
+        StuffingError: ``params`` has a bare ``FF FF FD``.
 
     """
     plain = params.replace(_STUFFED, _HEADER)
@@ -159,9 +159,8 @@ def fast_head(parts_bytes: int) -> bytes:
 def encode_fast(parts: Iterable[tuple[int, int, bytes]], parts_bytes: int | None = None) -> bytes:
     """Common reply of servos to a fast sync or bulk read, from ``parts`` (error, ID, data).
 
-    The servos write one status packet in turn: each adds error, ID, data, and the CRC of all bytes
-    so far, earlier CRCs included. It is not stuffed. ``parts_bytes`` is the announced length if
-    servos are missing at the end.
+    The servos write one unstuffed status packet in turn: each adds error, ID, data, and the CRC of
+    all bytes so far. ``parts_bytes`` is the announced length if servos at the end are missing.
     """
     bodies = [bytes((error, servo_id)) + data for error, servo_id, data in parts]
     announced = sum(len(body) + 2 for body in bodies) if parts_bytes is None else parts_bytes

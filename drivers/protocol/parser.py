@@ -13,13 +13,13 @@ from snakewalk.drivers.protocol.packet import (
     unstuff,
 )
 
-_FIXED = 7  # header, id and length field, in front of the bytes that the length counts
+_FIXED = 7  # header, id and length field, before the counted bytes
 
 
 class PacketParser:
-    """Cuts a byte stream into packets; other bytes are skipped and counted.
+    """Cuts a byte stream into packets; skips and counts other bytes.
 
-    After a wrong length or CRC the search continues one byte behind the header, so a damaged packet
+    After a wrong length or CRC the search continues one byte after the header, so a damaged packet
     does not hide the next one. Memory is bounded by the longest packet plus the bytes fed at once.
     """
 
@@ -36,7 +36,7 @@ class PacketParser:
 
     @property
     def pending(self) -> int:
-        """Bytes of a packet that is not yet complete."""
+        """Bytes of an incomplete packet."""
         return len(self._buffer)
 
     def reset(self) -> None:
@@ -45,7 +45,7 @@ class PacketParser:
         self._buffer.clear()
 
     def feed(self, data: bytes) -> list[Packet]:
-        """Append bytes; returns the packets that they complete, in order."""
+        """Append bytes; return the packets that they complete, in order."""
         buffer = self._buffer
         buffer += data
         packets: list[Packet] = []
@@ -84,7 +84,7 @@ class PacketParser:
         return at + 1
 
     def _next_header(self, at: int) -> int:
-        """Index of the next header at or behind ``at``, or of a header cut off at the end."""
+        """Index of the next header from ``at``, or of a header cut off at the end."""
         found = self._buffer.find(HEADER, at)
         if found >= 0:
             return found
@@ -95,7 +95,7 @@ class PacketParser:
 
     @staticmethod
     def _decode(servo_id: int, instruction: int, payload: bytes) -> Packet | None:
-        """Packet of a frame with a right CRC; None if its stuffing is malformed."""
+        """Packet of a frame with a correct CRC; None if its stuffing is malformed."""
         if servo_id == BROADCAST_ID and instruction == STATUS:
             return StatusPacket(servo_id, payload[0], payload[1:])  # fast reads are not stuffed
         try:

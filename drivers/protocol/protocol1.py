@@ -1,7 +1,7 @@
 """Protocol 1.0 packets; e-manual, DYNAMIXEL Protocol 1.0.
 
-``FF FF | id | length | instruction or error | parameters | checksum``; the length counts all behind
-itself, the checksum is the complement of the sum from the id on.
+``FF FF | id | length | instruction or error | parameters | checksum``; the length counts the bytes
+after it, the checksum is the complement of the sum from the id.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ class Error1(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Packet1:
-    """Host to servo; ``intact`` False: the checksum does not fit."""
+    """Host to servo; ``intact`` False: wrong checksum."""
 
     servo_id: int
     instruction: int
@@ -50,24 +50,24 @@ class Packet1:
 
 
 def checksum(body: bytes) -> int:
-    """Complement of the sum of all between header and checksum."""
+    """Complement of the sum of the bytes between header and checksum."""
     return ~sum(body) & 0xFF
 
 
 def frame(servo_id: int, code: int, params: bytes = b"") -> bytes:
-    """An instruction packet, or with an error byte for ``code`` a status packet."""
+    """An instruction packet; with an error byte as ``code`` a status packet."""
     body = bytes((servo_id, len(params) + 2, code)) + params
     return HEADER + body + bytes((checksum(body),))
 
 
 class Reader1:
-    """Cuts a byte stream into instruction packets; noise in front of a header is skipped."""
+    """Cuts a byte stream into instruction packets; skips noise before a header."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     def reset(self) -> None:
-        """Forget a partial packet."""
+        """Drop a partial packet."""
         self._buffer.clear()
 
     def feed(self, data: bytes) -> Iterator[Packet1]:

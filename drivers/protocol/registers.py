@@ -1,8 +1,8 @@
-"""Meaning of register values in all series of Protocol 2.0: modes, alarm bits, common units.
+"""Register values common to all series of Protocol 2.0: modes, alarm bits, units.
 
-Differences between models are in their files (``config/servos``). A model without a current sensor
-has Present Load, the share of full output, in place of Present Current. The host rejects a model
-with an unknown unit of current.
+Model files (``config/servos``) have the differences. A model without a current sensor has Present
+Load, the share of full output, in place of Present Current. The host rejects a model with an
+unknown unit of current.
 """
 
 import math
@@ -57,7 +57,7 @@ class Alarm(IntFlag):
 
 
 def alarm_names(hardware_error: int) -> str:
-    """Bits of register 70 in words; empty without an alarm."""
+    """Alarms of register 70 in words; empty without one."""
     names = {alarm.value: (alarm.name or "").lower().replace("_", " ") for alarm in Alarm}
     bits = (bit for bit in range(8) if hardware_error >> bit & 1)
     return ", ".join(names.get(1 << bit, f"bit {bit}") for bit in bits)
@@ -65,7 +65,7 @@ def alarm_names(hardware_error: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ServoUnits:
-    """Scales of one model; arrays in, arrays of the same shape out."""
+    """Scales of one model; arrays keep their shape."""
 
     zero_position: int
     """Raw position of a straight joint."""
@@ -87,7 +87,7 @@ class ServoUnits:
         """Scales of a model.
 
         Raises:
-            ControlTableError: the file of the model lacks what a run needs.
+            ControlTableError: the model's file lacks values for a run.
 
         """
         missing = facts.missing_for_a_run()
@@ -143,7 +143,7 @@ def bauds_of(facts: ServoModel) -> tuple[int, ...]:
     """Baud rates of a model, by code.
 
     Raises:
-        ControlTableError: its file does not give them.
+        ControlTableError: its file lacks them.
 
     """
     if not facts.bauds:
@@ -155,7 +155,7 @@ def baud_code(facts: ServoModel, baud: int) -> int:
     """Value of the register Baud Rate.
 
     Raises:
-        ControlTableError: the model does not have that rate.
+        ControlTableError: the model lacks that rate.
 
     """
     rates = bauds_of(facts)

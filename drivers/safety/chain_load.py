@@ -1,9 +1,9 @@
-"""Chain load: estimates of the current that the chain draws, and of the motors' windings.
+"""Chain load: estimates of the chain's current, and of the motors' winding temperatures.
 
-Servos report the current of their motors. A bridge draws less from the supply, by its duty: at the
-voltage V a motor at the current I and the speed w has the duty (R I + K w) / V. The windings are
-hotter than the housings, whose sensors react in minutes: the difference follows the loss R I^2 with
-a time constant of seconds.
+Servos report motor currents. A bridge draws less from the supply, by its duty: at the voltage V a
+motor at the current I and the speed w has the duty (R I + K w) / V. The windings are hotter than
+the housings, whose sensors react in minutes: the difference follows the loss R I^2 with a time
+constant of seconds.
 """
 
 import math
@@ -30,12 +30,10 @@ class ChainLoad:
     """Total current, charge and winding temperatures of J servos; ``update`` with every state."""
 
     def __init__(self, motor: Floats) -> None:
-        """Start cold.
+        """Start cold, with ``motor_columns`` (5, J).
 
-        Args:
-            motor: (5, J) resistance, ohm; back-EMF, V s/rad; current at rest, A; heating of the
-                housing, K/W; nominal voltage, V. ``motor_columns`` returns it.
-
+        Rows: resistance, ohm; back-EMF, V s/rad; current at rest, A; heating of the housing, K/W;
+        nominal voltage, V.
         """
         self._motor = motor
         self.winding_k = np.zeros(motor.shape[1])
@@ -60,12 +58,12 @@ class ChainLoad:
         self.charge_ah += self.current_a * step_s / 3600.0
 
     def winding_c(self, state: JointState) -> Floats:
-        """(J,) temperatures of the windings; NaN where the housing's is not known."""
+        """(J,) winding temperatures; NaN if the housing's is unknown."""
         return np.asarray(state.temperature_c + self.winding_k)
 
 
 def motor_columns(robot: RobotConfig) -> Floats:
-    """(5, J) motors of a robot, as ``ChainLoad`` needs them; zeros for a model without a record."""
+    """(5, J) motors of a robot for ``ChainLoad``; zeros for a model without a record."""
     columns = []
     for facts in robot.servo_records:
         motor = facts.motor
@@ -100,10 +98,10 @@ def _draw(
     time_share: float,
     winding_k: Floats,
 ) -> tuple[float, float]:
-    """Current that all bridges draw, A, and temperature of the hottest winding.
+    """Supply current of all bridges, A, and temperature of the hottest winding.
 
-    ``winding_k`` (J,) moves towards its equilibrium. A current or speed that was not read (NaN)
-    counts as zero, a voltage as the nominal one; a winding without a temperature does not count.
+    ``winding_k`` (J,) moves towards its equilibrium. An unread current or speed (NaN) counts as
+    zero, a voltage as nominal; a winding without a temperature is ignored.
     """
     total_a, hottest_c = 0.0, -np.inf
     for k in range(len(current_a)):
@@ -115,6 +113,6 @@ def _draw(
         total_a += standby_a + duty * abs(amps)
         target_k = winding_share * motor[3, k] * resistance_ohm * amps * amps
         winding_k[k] += time_share * (target_k - winding_k[k])
-        if temperature_c[k] + winding_k[k] > hottest_c:  # noqa: PLR1730  a NaN stays out
+        if temperature_c[k] + winding_k[k] > hottest_c:  # noqa: PLR1730  skips NaN
             hottest_c = temperature_c[k] + winding_k[k]
     return total_a, hottest_c

@@ -1,19 +1,16 @@
-"""Following error: a joint that does not go to its goal, though its servo could.
+"""Following error: a joint that does not reach its goal, though its servo could.
 
-A joint lags behind its goal as long as it moves, by the error that its P gain needs for the speed
-and the load. That lag is bounded by the error at which the output is full. A larger error that
-lasts means that the joint is blocked, has no power, obeys another program, or is another joint. The
-ground may hold a current-limited joint off its goal for long, but then its servo pushes with all
-the current that it is allowed.
-
-The current is evidence at small errors, too: a motor whose output stage works draws current as soon
-as its joint is off the goal and slow. If it draws next to none, the output stage is dead. A
-velocity sensor may be dead as well, so a joint is also slow if its positions are.
-
-A current sensor that always reads the same value hides a dead output stage. The current of a motor
-at rest is proportional to its output, and the output follows the error. If the joint stands and its
-error changes while its current does not, the output stage or the sensor is dead. A constant error
-shows nothing: an obstacle also causes a constant current.
+A moving joint lags by the error that its P gain needs for speed and load, at most the error at
+which the output is full. A larger lasting error means that the joint is blocked, has no power,
+obeys another program, or is another joint. The ground may hold off a current-limited joint for
+long, but then its servo pushes with all of its permitted current.
+At small errors the current is evidence too: a working motor draws current if its joint is off the
+goal and slow. Without current, the output stage is dead. A velocity sensor may be dead, so constant
+positions also count as slow.
+A constant current reading may hide a dead output stage. The current at rest is proportional to the
+output, which follows the error. If the joint is at rest and its error changes while its current
+does not, output stage or sensor is dead. A constant error shows nothing: an obstacle also causes a
+constant current.
 """
 
 import math
@@ -76,7 +73,7 @@ class FollowingError:
         self._time_s = math.inf
 
     def update(self, state: JointState, goal_rad: Floats) -> str | None:
-        """Evaluate a state and the goals (J,) sent before it; returns a reason to stop, or None."""
+        """Evaluate a state and the goals (J,) sent before it; return a reason to stop, or None."""
         last_s, self._time_s = self._time_s, state.time_s
         joint = _judge(
             *(goal_rad, state.position_rad, state.velocity_rad_s, state.current_a, state.valid),
@@ -143,19 +140,19 @@ def _judge(
     rules: Floats,
     memory: Floats,
 ) -> int:
-    """Note for how long each joint does not follow, and for how long each motor draws no current.
+    """Note how long each joint does not follow, and how long each motor draws no current.
 
-    A joint that was not read keeps its times. An error or a speed that shows nothing keeps the
-    time without current; a current ends it.
+    An unread joint keeps its times. An inconclusive error or speed keeps the time without current;
+    a current ends it.
 
     Args:
-        goal_rad: (J,) goals that were sent before the state.
+        goal_rad: (J,) goals sent before the state.
         position_rad: (J,)
         velocity_rad_s: (J,)
         current_a: (J,)
         valid: (J,) whether the joint was read.
         time_s: time of the state.
-        last_s: time of the previous state; infinite for the first state.
+        last_s: time of the previous state; first infinite.
         rules: (5, J) limit of the error, rad; current towards the goal that excuses it, A; and
             ``SafetyLimits.output``.
         memory: (3, J) time since which a joint does not follow, or NaN; time without current, s;
@@ -185,7 +182,7 @@ def _judge(
                 if towards_a >= IDLE_SHARE * expected_a:
                     memory[1, k] = 0.0
                 elif share >= IDLE_OUTPUT:
-                    # a velocity sensor may be dead, too, so the positions count as well
+                    # the velocity sensor may be dead, so positions count too
                     moved_rad = sign * (position_rad[k] - memory[2, k])
                     is_slow = sign * velocity_rad_s[k] < SLOW_RAD_S
                     if is_slow or moved_rad < SLOW_RAD_S * since_s:
@@ -213,20 +210,11 @@ def _steady_joint(
     rules: Floats,
     steady: Floats,
 ) -> int:
-    """Note for how long each joint stands with the same current, and the currents to expect.
+    """Note how long each joint rests with a constant current, and the expected currents.
 
-    A joint that was not read keeps its notes; a pause ends them.
-
-    Args:
-        goal_rad: (J,) goals that were sent before the state.
-        position_rad: (J,)
-        current_a: (J,)
-        valid: (J,) whether the joint was read.
-        time_s: time of the state.
-        last_s: time of the previous state; infinite for the first state.
-        rules: (5, J) as of ``_judge``.
-        steady: (5, J) time since which position and current are the same, or NaN; that position;
-            that current; least and greatest expected current since then, A.
+    An unread joint keeps its notes; a pause clears them. Arguments are those of ``_judge``, and
+    ``steady`` (5, J): time since which position and current are constant, or NaN; that position;
+    that current; least and greatest expected current since then, A.
 
     Returns:
         The first joint whose current did not change though its error did, else -1.

@@ -1,4 +1,4 @@
-"""Limits of commands to the servos, of one robot in one run."""
+"""Limits of commands to the servos of one robot in one run."""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ EFFORT_SHARE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class SafetyLimits:
-    """Limits of one robot; a value at its limit is allowed."""
+    """Limits of one robot, inclusive."""
 
     joint_names: tuple[str, ...]
     """J names for messages: ``joint yaw_05 (ID 5)``."""
@@ -100,7 +100,7 @@ def _fuse_a(robot: RobotConfig) -> float:
 
 
 def _output(robot: RobotConfig) -> Floats:
-    """(3, J) as ``SafetyLimits.output``; the first row is 0 for a joint that cannot be judged."""
+    """``SafetyLimits.output``; the first row is 0 for a joint that cannot be judged."""
     rows = []
     joints = zip(robot.servo_records, robot.position_p_gains, robot.current_limits_a, strict=True)
     for facts, gain, limit_a in joints:

@@ -19,7 +19,7 @@ class LoadLimits:
         self._over_since_s = math.nan
 
     def update(self, state: JointState) -> str | None:
-        """Evaluate a state; returns a reason to stop, or None."""
+        """Evaluate a state; return a reason to stop, or None."""
         load, limits = self.load, self._limits
         if load is None:
             return None

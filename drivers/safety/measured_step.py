@@ -1,9 +1,9 @@
-"""Measured steps: a joint cannot be somewhere else from one reading to the next.
+"""Measured steps: a joint cannot jump from one reading to the next.
 
-An answer with a right checksum may all the same be another servo's (two with one ID, exchanged IDs)
-or made up. A joint that is measured farther from its last believed angle than any servo turns in
-the time between is not believed: it counts as not read, keeps its old values, and grows older. If
-it does not come back the state is stale, and the run stops.
+A reply with a correct checksum may be another servo's (two with one ID, exchanged IDs) or invented.
+A joint that is measured farther from its last credible angle than any servo turns in that time
+counts as not read: it keeps its old values, which age. If it stays away, the state becomes stale
+and the run stops.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ _FLOATS = readonly_array()
 
 
 class MeasuredSteps:
-    """Which angles are believed; ``update`` with every state."""
+    """Selects credible angles; ``update`` with every state."""
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
@@ -29,18 +29,14 @@ class MeasuredSteps:
         self._doubted_rad = None
 
     def update(self, state: JointState, believed: JointState) -> tuple[JointState, str | None]:
-        """The part of a state that can be believed, and what cannot, as one line.
+        """The credible part of a state, and a line about the rest.
 
-        A joint that is read again where it was not believed to be stays in doubt, however much time
-        goes by: nobody has seen it on its way there.
-
-        Args:
-            state: as read.
-            believed: the last state that was believed.
+        A joint that is read again at a doubted angle stays in doubt, whatever the time: nothing was
+        read in between.
 
         Returns:
-            The state, with old values and ages where a joint was not read or is not believed; and a
-            description of the values that are not believed, or None.
+            The state, with old values and ages for unread and doubted joints; and a description of
+            the doubted values, or None.
 
         """
         limits, doubted_rad = self._limits, self._doubted_rad
@@ -54,7 +50,7 @@ class MeasuredSteps:
         step_rad = np.abs(position_rad - believed.position_rad)
         measured_s = believed.time_s - believed.age_s
         between_s = np.maximum(state.time_s - state.age_s - measured_s, 0.0)
-        # the vetting judges values that are not numbers
+        # the vetting rejects values that are not numbers
         doubted = step_rad > slack_rad + limits.step_rate_rad_s * between_s
         if doubted_rad is not None:
             doubted |= (np.abs(position_rad - doubted_rad) <= slack_rad) & (step_rad > slack_rad)
@@ -94,7 +90,7 @@ def _is_all_believable(
     slack_rad: float,
     rate_rad_s: float,
 ) -> bool:
-    """Whether every joint was read and is where it can have come to: the regular case, quickly."""
+    """Fast check of the regular case: every joint was read at a reachable angle."""
     for k in range(len(position_rad)):
         between_s = max(0.0, (time_s - age_s[k]) - (believed_time_s - believed_age_s[k]))
         step_rad = abs(position_rad[k] - believed_rad[k])
@@ -104,7 +100,7 @@ def _is_all_believable(
 
 
 def _held(state: JointState, believed: JointState, held: np.ndarray) -> JointState:
-    """State with the believed values of the joints in ``held`` (J,)."""
+    """State with the credible values of the joints in ``held`` (J,)."""
     age_s = believed.age_s + (state.time_s - believed.time_s)
     arrays = {
         "position_rad": np.where(held, believed.position_rad, state.position_rad),

@@ -1,8 +1,8 @@
-"""Recovery: the reaction to a line or a servo that goes away during a run.
+"""Recovery: the reaction to a lost line or servo during a run.
 
-The watchdogs hold the servos meanwhile. The recovery opens the port again, compares the chain with
-its earlier state, and continues from the present pose if the policy or an operator permits it. A
-servo that an overload has shut down is rebooted first, if the run permits it.
+The watchdogs hold the servos meanwhile. The recovery reopens the port, compares the chain with its
+earlier state, and continues from the present pose if the policy or an operator permits it. A servo
+that an overload has shut down is rebooted first, if the run permits it.
 """
 
 import math
@@ -19,16 +19,16 @@ _RETRY_S = 0.1
 
 
 class ChainComparison(Protocol):
-    """The chain as found after an interruption; as a string, one line for the operator."""
+    """The chain after an interruption; as a string, one line for the operator."""
 
     @property
     def faults(self) -> Sequence[ChainFault]:
-        """Everything that forbids going on."""
+        """Faults that forbid a continuation."""
         ...
 
     @property
     def doubt(self) -> str | None:
-        """Why only a person can say that this is the same chain; None if it shows that itself."""
+        """Reason why only a person can confirm the same chain, or None."""
         ...
 
 
@@ -36,7 +36,7 @@ C = TypeVar("C", bound=ChainComparison)
 
 
 class RecoverableLink(Protocol[C]):
-    """The methods of a chain that a recovery needs."""
+    """Methods of a chain for a recovery."""
 
     @property
     def clock(self) -> Clock:
@@ -44,11 +44,11 @@ class RecoverableLink(Protocol[C]):
         ...
 
     def reopen(self) -> None:
-        """Open the port again; raises ``PortError`` while it is not there."""
+        """Open the port again; raises ``PortError`` while it is missing."""
         ...
 
     def hold(self) -> None:
-        """Set the goals to where the joints are, as far as that is known."""
+        """Set the goals to the present positions, as far as known."""
         ...
 
     def reboot(self, joint: int) -> None:
@@ -56,16 +56,16 @@ class RecoverableLink(Protocol[C]):
         ...
 
     def recheck(self, believed_rad: Floats) -> C:
-        """Compare the chain with its earlier state and its joints with believed positions."""
+        """Compare the chain with its earlier state and its joints with credible positions."""
         ...
 
     def resume(self, found: C) -> JointState:
-        """Go on from where the joints are."""
+        """Continue from the present positions."""
         ...
 
 
 class Recovery(Generic[C]):
-    """Brings an interrupted chain back, a few times; hand it to ``SafeLink(recovery=...)``."""
+    """Recovers an interrupted chain a few times; pass it to ``SafeLink(recovery=...)``."""
 
     def __init__(
         self,
@@ -81,14 +81,15 @@ class Recovery(Generic[C]):
         """Prepare.
 
         Args:
-            chain: to be brought back.
-            policy: ``stop``: never go on; ``confirm``: ask; ``resume``: go on if nothing changed.
-            patience_s: how long to wait for port and servos.
-            limit: interruptions in one run after which no further one is recovered.
-            overload_reboots: how often a servo that an overload has shut down is rebooted, whatever
-                the policy; with ``confirm`` an operator is asked as well.
-            confirm: asks an operator; gets what was found. It is also asked, whatever the policy,
-                if no servo shows that this is the same robot. None: the answer is no.
+            chain: the chain to recover.
+            policy: ``stop``: never continue; ``confirm``: ask; ``resume``: continue if nothing
+                changed.
+            patience_s: wait for port and servos.
+            limit: number of recoveries in a run.
+            overload_reboots: number of reboots after overloads, whatever the policy; ``confirm``
+                asks an operator as well.
+            confirm: asks an operator about a finding. Whatever the policy, it is also asked if no
+                servo confirms the same robot. None: the answer is no.
             on_event: gets every step as one line, for the log.
 
         """
@@ -103,14 +104,14 @@ class Recovery(Generic[C]):
     def recover(
         self, reason: str, believed_rad: Floats, stopped: Callable[[], str | None]
     ) -> JointState | None:
-        """Hold, wait, compare, ask, go on; None if it must not or cannot go on.
+        """Hold, wait, compare, ask, continue; None if a continuation is forbidden or impossible.
 
-        ``believed_rad`` (J,) are the last believed angles. ``stopped`` is called while waiting; it
+        ``believed_rad`` (J,) are the last credible angles. ``stopped`` is called while waiting; it
         returns a reason to give up, or None.
 
         Raises:
-            ChainError: no servo shows that this is the same robot, and nobody can be asked.
-            DriverError: it broke again while going on.
+            ChainError: no servo confirms the same robot, and there is nobody to ask.
+            DriverError: another fault during the continuation.
 
         """
         self.refusal = None
@@ -130,13 +131,12 @@ class Recovery(Generic[C]):
         believed_rad: Floats,
         stopped: Callable[[], str | None],
     ) -> JointState | None:
-        """Hold, reboot the servo of a joint, compare, go on; None if it must not or cannot go on.
+        """Hold, reboot a joint's servo, compare, continue; None as in ``recover``.
 
-        An overload must be the only fault of ``joint``. The other arguments are those of
-        ``recover``.
+        An overload must be the only fault of ``joint``.
 
         Raises:
-            DriverError: it broke again while going on.
+            DriverError: another fault during the continuation.
 
         """
         self.refusal = None
@@ -159,7 +159,7 @@ class Recovery(Generic[C]):
         if found is None:
             return None
         self._on_event(f"verified: {found}")
-        doubt = found.doubt if joint is None else None  # a servo that was rebooted is known to be
+        doubt = found.doubt if joint is None else None  # a rebooted servo is known
         if doubt is not None and self._confirm is None:
             raise ChainError(f"{doubt}; check that it is the same robot, then start again")
         is_asked = self._policy == "confirm" or doubt is not None
@@ -177,9 +177,9 @@ class Recovery(Generic[C]):
     def _wait(
         self, believed_rad: Floats, stopped: Callable[[], str | None], joint: int | None
     ) -> C | None:
-        """A chain that may go on; None if it does not come back in time.
+        """A chain that may continue; None after ``patience_s``.
 
-        The servo of ``joint`` is rebooted; an alarm after that is not waited for.
+        The servo of ``joint`` is rebooted; a later alarm ends the wait.
         """
         give_up_s = self._clock.now_s() + self._patience_s
         held, to_reboot = False, joint
@@ -208,12 +208,11 @@ class Recovery(Generic[C]):
             self._clock.sleep_until_s(self._clock.now_s() + _RETRY_S)
 
     def _give_up(self, event: str, refusal: str | None = None) -> None:
-        """Report an end of the recovery, and keep its reason."""
         self.refusal = refusal or event
         self._on_event(event)
 
     def _try_reopen(self) -> str | None:
-        """Open what is gone; why it cannot be, which ``patience_s`` waits for to change."""
+        """Open lost ports; return the reason of a failure."""
         try:
             self._chain.reopen()
         except PortError as error:

@@ -1,4 +1,4 @@
-"""The safe link: a joint link that vets every command and switches torque off in every case."""
+"""The safe link: a joint link that vets every command and always switches torque off."""
 
 import math
 import signal
@@ -44,7 +44,7 @@ the watchdogs would leave the servos holding with torque on."""
 
 
 class SafeLink:
-    """A ``JointLink`` around another; use as a context manager, which switches torque off at exit.
+    """A ``JointLink`` around another; as a context manager it switches torque off at exit.
 
     It latches on a veto, on an error of the link below, on ``request_stop``, or when
     ``stop_requested`` (called at each read and write) returns a reason. Then torque goes off,
@@ -52,8 +52,7 @@ class SafeLink:
     unconfirmed torque off a few times. Only ``reset`` by an operator and a new ``enable`` permit
     motion. Inside the context SIGTERM, SIGINT, SIGHUP (unless ignored), SIGQUIT and SIGTSTP leave
     the program through the exit.
-
-    With a ``recovery`` the chain holds when the line or a servo goes away, and continues if the
+    With a ``recovery`` the chain holds when the line or a servo is lost, and continues if the
     policy permits it. With a ``hold``, a joint that does not follow and ``request_stop(...,
     may_hold=True)`` (the first Ctrl-C) hold with low currents before torque goes off;
     ``is_holding`` is then true. A ``stop_output`` is activated if torque off is not confirmed.
@@ -80,7 +79,7 @@ class SafeLink:
         self._link = link
         self._check_servos: Callable[[], None] = lambda: None
         if isinstance(link, CheckingLink):
-            # after the goals, so that the time from a state to its goals is the same in all cycles
+            # after the goals: the time from a state to its goals is then constant
             self._check_servos = link.check_servos
         self._recovery = recovery
         self._limits = limits
@@ -108,8 +107,7 @@ class SafeLink:
     def __enter__(self) -> "SafeLink":
         if threading.current_thread() is threading.main_thread():
             for number in _SIGNALS:
-                # programs that a shell starts in the background ignore SIGINT: they have to stop
-                # all the same
+                # background programs of a shell ignore SIGINT, but must stop too
                 ignored = number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN
                 if not ignored:
                     softly = number == signal.SIGINT and self._hold is not None
@@ -124,7 +122,7 @@ class SafeLink:
         trace: TracebackType | None,
     ) -> None:
         for number in self._handlers:
-            signal.signal(number, signal.SIG_IGN)  # switching torque off must not be interrupted
+            signal.signal(number, signal.SIG_IGN)  # torque off must not be interrupted
         try:
             if self._touched:
                 self.disable()
@@ -146,12 +144,12 @@ class SafeLink:
 
     @property
     def was_enabled(self) -> bool:
-        """Whether ``enable`` has been called, so that torque may have been on."""
+        """Whether ``enable`` was called, so torque may have been on."""
         return self._touched
 
     @property
     def load(self) -> ChainLoad | None:
-        """Estimates of current, charge and windings; None without records of the motors."""
+        """Estimates of current, charge and windings; None without motor records."""
         return self._loads.load
 
     @property
@@ -163,8 +161,8 @@ class SafeLink:
         """Check and set up the servos, torque on.
 
         Raises:
-            SafetyTrippedError: latched, or the state found is a reason to latch. DriverError:
-            errors of the link below.
+            SafetyTrippedError: latched, or the state found is a reason to latch.
+            DriverError: errors of the link below.
 
         """
         self._refuse_to_start()
@@ -178,7 +176,7 @@ class SafeLink:
         return state
 
     def disable(self) -> None:
-        """Torque off; safe to call at any time, more than once.
+        """Torque off; safe to call at any time, repeatedly.
 
         The stop output is activated if torque off is not confirmed.
 
@@ -195,10 +193,10 @@ class SafeLink:
         self._off_tries = 0
 
     def read(self) -> JointState:
-        """Read all joints; latches if the state is a reason to, and returns it all the same.
+        """Read all joints; returns the state even if it latches because of it.
 
         Raises:
-            SafetyTrippedError: the link below failed just now, and was not brought back.
+            SafetyTrippedError: the link below failed and was not recovered.
 
         """
         if self._off_tries > 0:
@@ -225,7 +223,7 @@ class SafeLink:
             stale = stale_fault(state, self._limits, self._clock.now_s())
             if stale is not None and doubt is None:
                 return self._recover(stale, None)
-            if stale is not None:  # not to be recovered from: nobody knows which joint is which
+            if stale is not None:  # not recoverable: servos and joints may be exchanged
                 self._state = state
                 self._trip(f"{stale}: {doubt}")
                 return state
@@ -238,7 +236,7 @@ class SafeLink:
         return state
 
     def write(self, command: JointCommand) -> None:
-        """Vet a command against the newest state and send what passes.
+        """Vet a command against the newest state and send the result.
 
         After a recovery in this call nothing is sent: the joints hold.
 
@@ -254,7 +252,7 @@ class SafeLink:
             self._trip(stop, may_hold=self._stops_softly())
             self._refuse_if_tripped()
         if self._recovery is not None:
-            # the program, or the machine, stood still between the read and here
+            # program or machine paused since the read
             stale = stale_fault(self._state, self._limits, self._clock.now_s())
             if stale is not None:
                 self._recover(stale, None)
@@ -267,7 +265,7 @@ class SafeLink:
             self._refuse_if_tripped()
         try:
             self._link.write(JointCommand(command.time_s, verdict.goal_rad))
-            # if the program stood still in between, the next step counts from here
+            # after a pause the next step counts from here
             sent_s = self._clock.now_s()
             if sent_s != now_s:
                 self._memory = verdict.memory._replace(time_s=sent_s)
@@ -276,9 +274,9 @@ class SafeLink:
             self._recover(str(fault), fault)
 
     def request_stop(self, reason: str, *, may_hold: bool = False) -> None:
-        """Latch at the next read or write; may be called from another thread (a stop button).
+        """Latch at the next read or write; callable from another thread (a stop button).
 
-        With ``may_hold`` the body may hold first; a stop without it counts more, in any order.
+        With ``may_hold`` the body may hold first; a stop without it has priority.
         """
         if may_hold and self._stop_requested is not None:
             return
@@ -286,10 +284,10 @@ class SafeLink:
         self._stop_requested = reason
 
     def reset(self, operator: str) -> None:
-        """Unlatch, by a person who has looked at the robot; torque stays off until ``enable``.
+        """Unlatch, by a person who has checked the robot; torque stays off until ``enable``.
 
         Raises:
-            ValueError: nobody put a name to it.
+            ValueError: the name is empty.
 
         """
         if not operator.strip():
@@ -300,7 +298,7 @@ class SafeLink:
         self._stop_requested = None
 
     def _overloaded(self, state: JointState, memory: SafetyMemory) -> int | None:
-        """The joint whose servo may be rebooted: an overload has shut it down, all else is well."""
+        """The joint to reboot: an overload has shut it down, and all else is well."""
         if self._recovery is None or self.tripped is not None:
             return None
         joint = overloaded_joint(state) if self._recovery.overload_reboots > 0 else None
@@ -313,7 +311,7 @@ class SafeLink:
         return joint if fault is None else None
 
     def _limits_at(self, now_s: float) -> SafetyLimits:
-        """The limits; after a reboot the goals' rate begins at nothing and grows evenly."""
+        """The limits; after a reboot the goals' rate grows linearly from zero."""
         share = (now_s - self._restarted_at_s) / RESTART_S
         if share >= 1.0:
             return self._limits
@@ -349,7 +347,7 @@ class SafeLink:
         return state
 
     def _following_fault(self, state: JointState, memory: SafetyMemory) -> str | None:
-        """Why to stop because a joint does not follow, with the reason that its servo shows."""
+        """Fault of a joint that does not follow, with its servo's reason."""
         fault = self._following.update(state, memory.goal_rad)
         self._is_held_off = fault is not None and not self._following.is_idle
         if fault is None or not isinstance(self._link, ExplainingLink):
@@ -381,7 +379,6 @@ class SafeLink:
         self._switch_off()
 
     def _switch_off(self) -> None:
-        """Torque off after a trip."""
         try:
             self.disable()
         except DriverError as fault:
@@ -389,7 +386,7 @@ class SafeLink:
             self._off_tries = _OFF_TRIES
 
     def _activate_output(self, fault: DriverError) -> None:
-        """Stop the servos from outside, once, and report it."""
+        """Activate the stop output once, and report it."""
         output = self._stop_output
         if output is None or self._output_is_active or not self._touched:
             return
@@ -404,11 +401,11 @@ class SafeLink:
         self._on_event(line)
 
     def _stops_softly(self) -> bool:
-        """Whether the stop that was asked for may hold: an operator's, and no stop button's."""
+        """Whether the requested stop may hold: an operator's, not a stop button's."""
         return self._stop_may_hold and self._asked_to_stop() is None
 
     def _begin_hold(self) -> bool:
-        """Hold with low currents, if that is possible and the newest state is sound."""
+        """Hold with low currents, if possible and the newest state is sound."""
         hold, state, memory, now_s = self._hold, self._state, self._memory, self._clock.now_s()
         if hold is None or state is None or memory is None or not isinstance(self._link, SoftLink):
             return False
@@ -428,10 +425,10 @@ class SafeLink:
         return True
 
     def _read_held(self) -> JointState:
-        """Read while it holds; torque off at its end, or at any reason to stop."""
+        """Read while holding; torque off at its end, or at any reason to stop."""
         try:
             state = self._link.read()
-            self._check_servos()  # no goals follow, after which it is made otherwise
+            self._check_servos()  # no goals follow, after which the check is made otherwise
         except DriverError as fault:
             self._end_hold(str(fault))
             raise SafetyTrippedError(str(self.tripped)) from fault
@@ -447,30 +444,29 @@ class SafeLink:
         return state
 
     def _end_hold(self, reason: str | None) -> None:
-        """Torque off; a ``reason`` has ended the hold early."""
+        """Torque off; ``reason`` is that of an early end."""
         if reason is not None and self.tripped is not None:
             self.tripped += f" (the hold ended early: {reason})"
         self._switch_off()
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Hold after the first Ctrl-C; the second unwinds the program."""
+        """Hold after the first Ctrl-C; the second leaves the program."""
         if self._memory is None or self.tripped is not None or self._stop_requested is not None:
             _unwind(number, frame)
         self.request_stop(INTERRUPTED, may_hold=True)
 
     def _switch_off_again(self) -> None:
-        """Ask for the torque off that the trip could not confirm."""
+        """Repeat the unconfirmed torque off of a trip."""
         self._off_tries -= 1
         with suppress(DriverError):  # the trip has reported it
             self.disable()
             self._on_event("torque off is confirmed now")
 
     def _stop(self) -> str | None:
-        """Reason of a requested stop; None without a request."""
         return self._stop_requested or self._asked_to_stop()
 
     def _refuse_to_start(self) -> None:
-        """Latch before torque is on where a stop was asked for; torque off is sent all the same."""
+        """Latch before torque is on if a stop was requested; torque off is sent anyway."""
         stop = None if self.tripped is not None else self._stop()
         if stop is not None:
             self._trip(stop)
@@ -482,7 +478,7 @@ class SafeLink:
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:
-    """Turn a signal into an exception, so that every context ends properly."""
+    """Turn a signal into an exception, so that every context ends."""
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     raise SystemExit(128 + number)

@@ -1,13 +1,12 @@
 """The stop button: a small private file through which another program latches a run's safe link.
 
-A program that moves servos makes one, locks it and maps it into memory. An unlocked file is not a
-button. Pressing it cannot delay the run. A run whose file is deleted or truncated stops, because
-nobody could stop it otherwise. The run reads the file, not its map: a look into the map of a
-truncated file kills a program.
-
+A program that moves servos creates the file, locks it and maps it. An unlocked file is not a
+button. Pressing it cannot delay the run. A run stops if its file is deleted or truncated, because
+nobody could stop it otherwise. The run reads the file, not its map: reading the map of a truncated
+file kills a program.
 Layout: a byte that is 1 once pressed, and a byte that is 1 once the run has ended. Then come the
-name of the person who pressed it and the end of the run (length and text each), and a description
-of the run as JSON. A text is written before its byte.
+name of the operator and the end of the run (length and text each), and a description of the run as
+JSON. A text is written before its byte.
 """
 
 import getpass
@@ -29,7 +28,7 @@ from snakewalk.drivers.port.byte_port import is_url
 
 try:
     import fcntl
-except ImportError:  # Windows: a killed program leaves a button until its file is deleted
+except ImportError:  # Windows: a killed program leaves its button until the file is deleted
     fcntl = None  # type: ignore[assignment]
 
 _HAS_LOCKS: bool = fcntl is not None
@@ -58,11 +57,11 @@ class StoppableRun:
 
 
 class StopButton:
-    """The run's own button; a context manager, after which it does not exist any more.
+    """The run's own button; a context manager that removes it.
 
     Raises:
-        InputError: the folder of buttons is not this user's alone, a file cannot be made in it, or
-            another run of this user is on the same URL, which no system locks.
+        InputError: the folder of buttons is not private, a file cannot be made in it, or another
+            run of this user is on the same URL, which no system locks.
 
     """
 
@@ -78,11 +77,11 @@ class StopButton:
         self.run = StoppableRun(os.getpid(), name, devices, where)
         place = button_folder()
         _refuse_used_urls(devices)
-        # locked and filled before it gets a name that others look for; Windows renames no open file
+        # locked and filled before it gets its final name; Windows cannot rename an open file
         kind = "" if _HAS_LOCKS else _SUFFIX
         try:
             self._file, made = tempfile.mkstemp(kind, f"{os.getpid()}-", place)  # mode 0600
-            # written, not truncated to its size: on a full disk a map of holes kills the program
+            # written, not truncated to its size: on a full disk a sparse map kills the program
             os.write(self._file, bytes(_BYTES))
         except OSError as error:
             raise InputError(_cannot_be_made(place, error)) from None
@@ -110,7 +109,7 @@ class StopButton:
         self.end("; ".join([*told, *notes]) or (str(error) if error is not None else ""))
 
     def pressed(self) -> str | None:
-        """Why to stop, for ``SafeLink(stop_requested=...)``; None while it was not pressed."""
+        """Reason to stop, for ``SafeLink(stop_requested=...)``; None while not pressed."""
         if self._calls % _LOOK_EVERY == 0:
             fault = self._fault()
             if fault is not None:
@@ -121,12 +120,12 @@ class StopButton:
         return f"stop requested by {_read_text(self._map, _WHO) or 'an operator'}"
 
     def _is_pressed(self) -> bool:
-        if not _HAS_LOCKS:  # Windows truncates no file that is mapped
+        if not _HAS_LOCKS:  # Windows cannot truncate a mapped file
             return bool(self._map[_PRESSED])
         return os.pread(self._file, 1, _PRESSED) == b"\1"
 
     def _fault(self) -> str | None:
-        """Why the file is of no use any more; None if it is sound."""
+        """Fault of the file, or None."""
         info = os.fstat(self._file)
         if info.st_size < _BYTES:
             return f"{self.path}: the stop file was truncated: nobody could stop this run"
@@ -149,16 +148,16 @@ class StopButton:
             self._map[_ENDED] = 1
         self._map.close()
         os.close(self._file)
-        if not _HAS_LOCKS:  # Windows deletes no open file, also if another program has it open
+        if not _HAS_LOCKS:  # Windows cannot delete a file that any program has open
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
 
 
 class PressedButton:
-    """Another program's button, seen from outside; a context manager.
+    """Another program's button, as a context manager.
 
     Raises:
-        OSError: the file does not exist, or it is another user's.
+        OSError: the file does not exist, or belongs to another user.
 
     """
 
@@ -197,11 +196,11 @@ class PressedButton:
 
     @property
     def is_held(self) -> bool:
-        """Whether the program that made it still holds it."""
+        """Whether its program still holds it."""
         if not _HAS_LOCKS:
             return not self._map[_ENDED]
         try:
-            # shared: two readers at once do not look like the holder
+            # shared: a second reader does not look like the holder
             fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
@@ -210,22 +209,22 @@ class PressedButton:
 
     @property
     def end(self) -> str | None:
-        """How the run ended, as it says itself; None while it has not."""
+        """How the run ended; None before."""
         return _read_text(self._map, _END) if self._map[_ENDED] else None
 
     def press(self, who: str) -> None:
-        """Have the run's safe link switch torque off and latch, at its next read or write."""
+        """Make the run's safe link switch torque off and latch, at its next read or write."""
         _write_text(self._map, _WHO, who)
         self._map[_PRESSED] = 1
 
 
 def resolved(port: str) -> str:
-    """Name a port in one way: a device by its path, links resolved; a URL as it is."""
+    """Canonical name of a port: the real path of a device; a URL unchanged."""
     return port if is_url(port) else os.path.realpath(port)
 
 
 def button_folder() -> Path:
-    """Return the folder of this user's buttons, made if need be.
+    """Return the folder of this user's buttons; create it if necessary.
 
     Raises:
         InputError: it is another user's, others may write to it, or it cannot be made.
@@ -251,15 +250,13 @@ def button_folder() -> Path:
 
 
 def stoppable_runs() -> Iterator[PressedButton]:
-    """Yield the buttons of all programs of this user that run, the newest first; each is open.
+    """Yield the open buttons of this user's running programs, newest first.
 
-    Files that a killed program left are deleted.
+    Files of killed programs are deleted.
     """
     found = []
     for path in button_folder().glob(f"*{_SUFFIX}"):
-        with suppress(
-            OSError, ValueError, TypeError, KeyError
-        ):  # gone just now, or nothing of ours
+        with suppress(OSError, ValueError, TypeError, KeyError):  # just removed, or not a button
             button = PressedButton(path)
             if button.is_held:
                 found.append(button)
@@ -288,7 +285,7 @@ def _cannot_be_made(place: Path, error: OSError) -> str:
 
 
 def _is_mine(info: os.stat_result) -> bool:
-    """Whether a file is this user's; where files have no number of a user, its place says so."""
+    """Whether a file is this user's; on Windows its folder decides."""
     return not _HAS_LOCKS or info.st_uid == os.getuid()
 
 

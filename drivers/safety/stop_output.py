@@ -23,7 +23,7 @@ _LINES = ("rts", "dtr")
 
 
 class StopOutput(Protocol):
-    """Something that stops the servos without their bus; a context manager."""
+    """Stops the servos without their bus; a context manager."""
 
     @property
     def name(self) -> str:
@@ -34,7 +34,7 @@ class StopOutput(Protocol):
         """Stop the servos.
 
         Raises:
-            OSError: it has failed.
+            OSError: it failed.
 
         """
         ...
@@ -105,7 +105,7 @@ class StopCommand(_Plain):
         return self
 
     def activate(self) -> None:
-        """Run the program, in a session of its own: Ctrl-C in the terminal does not end it.
+        """Run the program in its own session: Ctrl-C in the terminal does not end it.
 
         Raises:
             OSError: it cannot be started, does not end within ``PATIENCE_S``, or fails.
@@ -137,7 +137,7 @@ class StopLine:
         """Open the port with the line inactive.
 
         Raises:
-            PortError: the port cannot be opened, or has no such line.
+            PortError: the port cannot be opened, or lacks the line.
 
         """
         port = serial.Serial()

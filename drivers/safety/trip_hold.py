@@ -1,7 +1,7 @@
-"""Hold on a trip: a lifted or climbing body holds with low currents before its torque goes off.
+"""Hold on a trip: a lifted or climbing body holds with low currents before torque goes off.
 
 It holds only after a joint that does not follow, or an operator's stop. All other reasons switch
-torque off at once, also while the body holds.
+torque off at once, also during a hold.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ INTERRUPTED = "operator: interrupted (Ctrl-C)"
 
 @dataclass(frozen=True, slots=True)
 class TripHold:
-    """How long a body holds after a trip that allows it, and how strongly."""
+    """Duration and strength of a hold after a trip that allows it."""
 
     seconds: float
     current_a: Floats
@@ -28,7 +28,7 @@ class TripHold:
 
     @staticmethod
     def from_config(robot: RobotConfig, safety: SafetyConfig) -> "TripHold | None":
-        """The hold of a run; None if its trips switch torque off at once."""
+        """The hold of a run; None if trips switch torque off at once."""
         if safety.on_trip == "off":
             return None
         if safety.hold_current_a is not None:

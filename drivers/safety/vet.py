@@ -1,9 +1,9 @@
 """Vetting: a pure function that decides which command passes, below every source of motion.
 
-Small excesses are clamped: joint limits, rate, and lead (goal minus measured, which makes the
-torque). States that no healthy run shows are vetoed. These are values that are not numbers, a
-joint forced beyond its limit, an alarm, lasting over-current, and heat. A supply that is too high
-or too low for a while and a state that is too old are vetoed as well.
+It clamps small excesses: joint limits, rate, and lead (goal minus measured, which makes the
+torque). It vetoes states that no healthy run has: values that are not numbers, a joint forced
+beyond its limit, an alarm, lasting over-current, and heat. A supply that is too high or too low for
+a while and a stale state are vetoed as well.
 """
 
 import math
@@ -24,7 +24,7 @@ _FLOATS, _BYTES = readonly_array(), readonly_array("uint8")
 
 
 class CheckedState(NamedTuple):
-    """A state that kept limits: checked again against the same limits it can only have aged."""
+    """A state that kept the limits: against the same limits it can only age."""
 
     state: JointState
     limits: SafetyLimits
@@ -33,7 +33,7 @@ class CheckedState(NamedTuple):
 
 
 class SafetyMemory(NamedTuple):
-    """Results of the last check that the next one needs."""
+    """Results of the last check for the next one."""
 
     time_s: float
     """When ``goal_rad`` was sent."""
@@ -75,8 +75,8 @@ def vet(
 ) -> Verdict:
     """Vet a command against the newest state.
 
-    Where clamps disagree the joint limit wins over the rate, and the rate over the lead: a goal
-    that jumps to where a joint is said to be would jump on a wrong answer, too.
+    The joint limit has priority over the rate, and the rate over the lead: a goal that follows a
+    measured angle would also follow a wrong reading.
     """
     veto, checked = check_state(state, last, limits, now_s)
     if veto is not None:
@@ -84,7 +84,7 @@ def vet(
     requested, joints = np.asarray(command.goal_rad, float), len(limits.limit_rad)
     if requested.shape != limits.limit_rad.shape:
         return _refused(f"command of shape {requested.shape} for {joints} joints", checked)
-    # After a pause the allowance does not pile up: never more than that of one stale limit
+    # after a pause the allowance is at most that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step, lead = limits.goal_rate_rad_s * dt_s, limits.goal_lead_rad
     goal, clamped = np.empty(joints), np.empty(joints, np.bool_)
@@ -100,16 +100,15 @@ def vet(
 
 
 def _refused(veto: str, checked: SafetyMemory) -> Verdict:
-    """Let nothing pass: the last goals again."""
     return Verdict(checked.goal_rad, veto, np.zeros(len(checked.goal_rad), np.bool_), checked)
 
 
 def check_state(
     state: JointState, last: SafetyMemory, limits: SafetyLimits, now_s: float
 ) -> tuple[str | None, SafetyMemory]:
-    """First reason to stop that the state gives, or None, and the new memory.
+    """First reason to stop in the state, or None, and the new memory.
 
-    The result for a state does not change when it is checked again, except for its age.
+    A repeated check of a state gives the same result, except for its age.
     """
     checked, aged_s = last.checked_state, now_s - state.time_s
     if checked is not None and checked.state is state and checked.limits is limits:
@@ -130,7 +129,7 @@ def check_state(
 
 
 def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
-    """(J,) since when each current is above the limit; a joint that was not read keeps its time."""
+    """(J,) time since which each current exceeds the limit; an unread joint keeps its time."""
     since = last.over_current_since_s
     over = np.abs(state.current_a) > limits.current_limit_a
     if not over.any() and not np.isfinite(since).any():
@@ -140,7 +139,7 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
 
 
 def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
-    """(J,) when each supply that is too low was first measured so; NaN for the others."""
+    """(J,) time of the first reading of each supply that is too low; else NaN."""
     since = last.under_voltage_since_s
     low = state.voltage_v < limits.voltage_min_v
     if not low.any():
@@ -150,9 +149,9 @@ def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyL
 
 
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:
-    """The first joint that was not read for too long, as one line; None if all were read."""
+    """The first joint that was not read for too long, as one line, or None."""
     since_s = now_s - state.time_s
-    # the greatest age stands for all, as rounding keeps the order; not so for a NaN
+    # rounding keeps the order, so the greatest age represents all; not so for a NaN
     if _oldest_s(state.age_s) + since_s <= limits.stale_limit_s:
         return None
     age_s = state.age_s + since_s
@@ -167,7 +166,7 @@ def state_fault(
     limits: SafetyLimits,
     now_s: float,
 ) -> str | None:
-    """First reason to stop that the state gives; None if all is well.
+    """First reason to stop in the state, or None.
 
     Temperature and voltage that were never read (NaN) are accepted: a link may lack them.
     """
@@ -178,7 +177,7 @@ def state_fault(
     under_s = state.time_s - state.slow_age_s - under_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
-    # not (a <= b) also stops at a NaN, which a > b would let pass
+    # not (a <= b) also stops at a NaN; a > b would not
     checks: tuple[tuple[Any, NDArray[Any], str], ...] = (
         (~np.isfinite(numbers).all(axis=0), numbers.sum(axis=0), "measured {}: not a number"),
         (alarm, state.hardware_error, "alarm"),
@@ -223,7 +222,7 @@ def state_fault(
 
 
 def overloaded_joint(state: JointState) -> int | None:
-    """The joint whose servo an overload has shut down; None if any other alarm is up."""
+    """The joint whose servo an overload has shut down; None if there is another alarm."""
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     joints = np.flatnonzero(alarm)
     if len(joints) != 1 or state.hardware_error[joints[0]] != Alarm.OVERLOAD:
@@ -232,7 +231,7 @@ def overloaded_joint(state: JointState) -> int | None:
 
 
 def without_alarm(state: JointState, joint: int) -> JointState:
-    """The state as if this joint had no alarm, so that other faults show."""
+    """The state without this joint's alarm, so that other faults show."""
     hardware_error, error = state.hardware_error.copy(), state.error.copy()
     hardware_error[joint] = 0
     error[joint] &= 0xFF ^ ALERT
@@ -240,10 +239,9 @@ def without_alarm(state: JointState, joint: int) -> JointState:
 
 
 def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> float:
-    """Greatest age of a state that passes the quick check; NaN if it does not.
+    """Greatest age of a state that passes the quick check, else NaN.
 
-    The quick check costs a tenth of ``state_fault`` and is stricter: a state that fails it goes to
-    that.
+    The quick check costs a tenth of ``state_fault`` and is stricter.
     """
     never = _never(len(last.over_current_since_s))
     if last.over_current_since_s is not never or last.under_voltage_since_s is not never:
@@ -284,10 +282,10 @@ def _quick_check(
     voltage_max_v: float,
     slow_age_max_s: float,
 ) -> float:
-    """Greatest age if every value is a number inside its limits and without an error; else NaN."""
+    """Greatest age if all values are numbers within their limits and without an error; else NaN."""
     age_max_s = -np.inf
     for k in range(len(position_rad)):
-        # a comparison with a NaN is false, so a value that was not read is not inside
+        # a comparison with NaN is false, so an unread value is not inside
         inside = (
             abs(position_rad[k]) <= limit_rad[k] + slack_rad
             and abs(velocity_rad_s[k]) < np.inf
@@ -305,7 +303,7 @@ def _quick_check(
 
 @compiled(f"float64({_FLOATS})", makes_arrays=False)
 def _oldest_s(age_s: Floats) -> float:
-    """Greatest of the ages; NaN if one is not a number."""
+    """Greatest age; NaN if one is NaN."""
     oldest_s = -np.inf
     for k in range(len(age_s)):
         if not age_s[k] <= oldest_s:
@@ -330,7 +328,7 @@ def _clamp(
     goal_rad: Floats,
     clamped: Bools,
 ) -> int:
-    """Clamp goals to lead, rate and limit, in this order; note which were changed.
+    """Clamp goals to lead, rate and limit, in this order; mark changed ones.
 
     Returns:
         The first joint whose goal is not a number, or -1.
@@ -349,7 +347,7 @@ def _clamp(
 
 @cache
 def _never(joints: int) -> Floats:
-    """(J,) NaN, read-only: no value is beyond its limit. One array per J, compared by identity."""
+    """(J,) NaN, read-only: no value exceeds its limit. One array per J, compared by identity."""
     since_s = np.full(joints, np.nan)
     since_s.setflags(write=False)
     return since_s

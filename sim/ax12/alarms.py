@@ -65,20 +65,20 @@ class Ax12Alarms:
         return self.known
 
     def supply(self, volts: float | None, rows: Indices | None = None) -> None:
-        """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
+        """Set the supply of all servos, or of ``rows``; None: the usual voltage."""
         self._supply.change(volts, rows)
 
     def heat(self, rows: Indices, celsius: float) -> None:
-        """Set housings to a temperature."""
+        """Set housing temperatures."""
         self.temperature_c[rows] = celsius
 
     def detect(self, rows: Indices, error: int) -> None:
-        """Raise an error of some servos; it stays until ``reset``."""
+        """Raise an error of some servos until ``reset``."""
         self._latched[rows] |= np.uint8(error)
         self._shut_down()
 
     def reset(self, rows: Indices | int) -> None:
-        """Drop latched alarms; a cause that lasts raises its alarm again."""
+        """Clear latched alarms; a lasting cause raises its alarm again."""
         self._latched[rows] = 0
         self._blocked_s[rows] = 0.0
         self.shown[rows] = 0
@@ -105,12 +105,11 @@ class Ax12Alarms:
         self._shut_down()
 
     def _full_output(self) -> Floats:
-        """(S,) output at which a motor that does not turn is overloaded, fraction of the supply."""
+        """(S,) output at which a motor at rest is overloaded, fraction of the supply."""
         limit = self._drive.pwm_limit
         return np.where(limit > 0.0, limit, 1.0)  # 0 of 0 means no effort
 
     def _overload_s(self) -> Floats | float:
-        """How long that may last."""
         return OVERLOAD_S
 
     def _shut_down(self) -> None:

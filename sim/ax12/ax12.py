@@ -24,7 +24,7 @@ class Ax12Servos(SimulatedServos):
     """S servos of one model on the shafts of ``plant``.
 
     Raises:
-        InputError: an ID is out of 0 to 253 or used twice, or the model cannot be simulated.
+        InputError: an ID is outside 0 to 253 or used twice, or the model cannot be simulated.
 
     """
 
@@ -58,13 +58,13 @@ class Ax12Servos(SimulatedServos):
             self["ID"][row] = servo_id
 
     def __getitem__(self, name: str) -> NDArray[np.unsignedinteger]:
-        """(S,) live view of a register of all servos."""
+        """(S,) live view of a register."""
         return self._views[name]
 
     # instructions
 
     def check(self, row: int, address: int, data: bytes) -> int:
-        """Error bits that a write of ``data`` would answer; nothing is written."""
+        """Error bits of the reply to a write of ``data``; writes nothing."""
         at = address
         while at < address + len(data):
             name = self._starts.get(at)
@@ -87,7 +87,7 @@ class Ax12Servos(SimulatedServos):
         return 0
 
     def write(self, row: int, address: int, data: bytes) -> int:
-        """Write whole registers or, with an error bit, nothing."""
+        """Write whole registers; with an error bit, nothing."""
         error = self.check(row, address, data)
         if error:
             return error
@@ -100,7 +100,7 @@ class Ax12Servos(SimulatedServos):
         return 0
 
     def register_write(self, row: int, address: int, data: bytes) -> int:
-        """Reg Write: check and keep for Action."""
+        """Reg Write: check and store for Action."""
         error = self.check(row, address, data)
         if not error:
             self._registered[row] = (address, data)
@@ -108,13 +108,13 @@ class Ax12Servos(SimulatedServos):
         return error
 
     def action(self, row: int) -> int:
-        """Carry out the registered write; without one it is an instruction error."""
+        """Execute the registered write; without one it is an instruction error."""
         kept = self._registered.pop(row, None)
         self["Registered"][row] = 0
         return self.write(row, *kept) if kept is not None else Error1.INSTRUCTION
 
     def reset(self, row: int) -> None:
-        """Set factory values, the ID too; then reboot."""
+        """Set factory values, including the ID, and reboot."""
         for name in self.facts.registers:
             self[name][row] = initial_value(self.facts, name)
         self.reboot(row)
@@ -156,7 +156,7 @@ class Ax12Servos(SimulatedServos):
         return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
 
     def _update_turns(self) -> None:
-        """Update the turn of each free shaft: the sensor counts none, so it may have changed."""
+        """Update the turn of each free shaft; the sensor does not count turns."""
         free = ~self._on() | self._wheel()
         turn_rad = TURN_RAD * np.rint(self.plant.position_rad / TURN_RAD)
         self._turn_rad = np.where(free, turn_rad, self._turn_rad)
@@ -196,6 +196,6 @@ class Ax12Servos(SimulatedServos):
 
 
 def _signed(values: Floats) -> NDArray[np.int_]:
-    """Magnitude up to 1023 and the direction in bit 10."""
+    """Magnitude up to 1023, direction in bit 10."""
     size = np.clip(np.rint(np.abs(values)), 0, 1023).astype(int)
     return np.where((values < 0.0) & (size > 0), size | CLOCKWISE, size)

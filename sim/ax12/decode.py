@@ -1,7 +1,7 @@
-"""Decoder of Protocol 1.0 into words, packet by packet, with the registers of one model.
+"""Decoder of Protocol 1.0 into text, packet by packet, with the registers of one model.
 
-A status packet looks like an instruction packet: a packet with the ID of the last instruction and
-the length of its reply is decoded as the reply.
+Status and instruction packets look alike. A packet with the ID of the last instruction and the
+length of its reply is decoded as the reply.
 """
 
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ REPLY_MAX_S = 0.1
 
 
 class Decoder1:
-    """Bytes of a bus in, lines out."""
+    """Converts bytes of a bus to decoded packets."""
 
     instructions: ClassVar[type[IntEnum]] = Instruction1
     errors: ClassVar[type[IntEnum] | type[IntFlag]] = Error1
@@ -42,7 +42,7 @@ class Decoder1:
         self._asked_s = self._last_s = 0.0
 
     def feed(self, time_s: float, data: bytes) -> Iterator[DecodedPacket]:
-        """Lines of the packets that ``data`` completes."""
+        """Packets that ``data`` completes."""
         if time_s > self._last_s + GAP_S:
             self._reader.reset()
         self._last_s = time_s
@@ -102,7 +102,7 @@ class Decoder1:
         return int.from_bytes(data[: cell.size], "little")
 
     def _values(self, address: int, data: bytes) -> dict[str, object]:
-        """Registers that lie in a block."""
+        """Registers in a block."""
         end = address + len(data)
         found: dict[str, object] = {
             name: self._decode(cell, data[cell.address - address :])

@@ -67,18 +67,18 @@ class Ax12Line(Wire):
         self.servos["ID"][row] = servo_id
 
     def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
-        """Type of a register's numbers; None where a servo lacks it."""
+        """Type of a register's numbers; None if a servo lacks it."""
         try:
             return self.servos[name].dtype
         except KeyError:
             return None
 
     def write_register(self, rows: NDArray[np.intp], name: str, value: int) -> None:
-        """Set a register of servos, as another program would."""
+        """Set a register of servos, like another program."""
         self.servos[name][rows] = value
 
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Stop servos from replying, or let them reply again; they still receive and obey."""
+        """Suppress or restore the replies of servos; they still obey."""
         self._muted[rows] = on
 
     def deafen(self, rows: NDArray[np.intp], on: bool) -> None:
@@ -86,13 +86,13 @@ class Ax12Line(Wire):
         self._deaf[rows] = on
 
     def set_alert(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Do nothing: replies of Protocol 1.0 name the error, and have no alert bit."""
+        """Do nothing: replies of Protocol 1.0 have no alert bit."""
 
     def refresh_ids(self) -> None:
-        """Do nothing: the IDs are looked up again for every packet."""
+        """Do nothing: every packet looks the IDs up."""
 
     def shown(self, register: str) -> NDArray[np.unsignedinteger]:
-        """(S,) values of a register as a read now would show them; a copy."""
+        """(S,) values of a register as a read would return them; a copy."""
         self.servos.refresh()
         return self.servos[register].copy()
 
@@ -105,7 +105,7 @@ class Ax12Line(Wire):
         self._reader.reset()
 
     def _on_baud_change(self, baud: int) -> None:
-        del baud  # looked up again for every packet
+        del baud  # every packet looks it up
 
     def _split(self, data: bytes) -> Sequence[bytes]:
         frames, at = [], 0
@@ -151,18 +151,17 @@ class Ax12Line(Wire):
             if replies_to and not self._muted[row]:
                 shown = error | int(self.servos.protection.shown[row])
                 replies.append((own, Reply(delay_s, frame(own, shown, data))))
-        replies.sort(key=lambda reply: reply[0])  # to a broadcast ping, IDs answer in turn
+        replies.sort(key=lambda reply: reply[0])  # IDs reply in turn to a broadcast ping
         return [
             self._respond([reply for _, reply in each])
             for _, each in groupby(replies, lambda reply: reply[0])
         ]
 
     def _delay_s(self, row: int) -> float:
-        """Silence before a reply of a servo."""
         return int(self.servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
 
     def _replies_to(self, row: int, code: int) -> bool:
-        """Whether the settings of a servo let it reply to an instruction."""
+        """Whether a servo's settings let it reply to an instruction."""
         return int(self.servos["Status Return Level"][row]) >= REPLY_LEVELS.get(code, 2)
 
     def _obeying(self, servo_id: int) -> list[int]:
@@ -170,7 +169,7 @@ class Ax12Line(Wire):
         return self._addressed(servo_id)
 
     def _respond(self, replies: list[Reply]) -> Reply:
-        """Bytes on the wire of the servos with one ID."""
+        """Bytes on the wire of servos with one ID."""
         reply, garbled = bus_contention(replies, BITS_PER_BYTE / self.getBaudRate())
         self.collisions += garbled
         return reply

@@ -9,7 +9,7 @@ MODEL = "AX-12A"
 
 
 def end_of(registers: Mapping[str, RegisterRow]) -> int:
-    """First address behind a control table."""
+    """First address after a control table."""
     return max(row.address + row.size for row in registers.values())
 
 

@@ -1,1 +1,1 @@
-"""Many robots of one kind at once, on MuJoCo-Warp, with the friction and motors of one robot."""
+"""Many robots of one kind at once, on MuJoCo-Warp."""

@@ -1,7 +1,7 @@
-"""BatchBodies of W robots of one kind on a level floor, that are advanced together.
+"""BatchBodies of W robots of one kind on a level floor.
 
-A body is placed by ``sim.physics``, so it starts as in a run. ``docs/decisions/0142-bodies.md``
-gives the reasons.
+``sim.physics`` places each body, so it starts as in a run. Reasons:
+``docs/decisions/0142-bodies.md``.
 """
 
 from abc import ABC, abstractmethod
@@ -20,7 +20,7 @@ from snakewalk.sim.servo.motor import Gearbox, MotorColumns, gears_of, motors_of
 
 
 def unsupported(robot: RobotConfig, world: WorldConfig) -> str | None:
-    """Return why bodies of a robot cannot be advanced together on a ground; None if they can."""
+    """Return why bodies of a robot cannot be advanced together on a ground, or None."""
     if world.ground.kind != "flat" or world.obstacle is not None:
         return f"world {world.name}: is not a level, open floor"
     gears = Gearbox.columns(gears_of(robot)).rows()
@@ -53,7 +53,7 @@ class BatchBodies(ABC):
         """One such body: it is placed here, and then copied to a world."""
         joints = robot.joint_count
         self.count, self.step_s = count, self.template.step_s
-        # the drive, as ``sim.plant.ServoDrive`` has it: (W, J)
+        # the drive as in ``sim.plant.ServoDrive``, (W, J)
         self.torque_on, self.goal_rad, self.p_gain_per_rad = np.zeros((3, count, joints))
         self.pwm_limit, self.supply_v = np.ones((2, count, joints))
         self.current_limit_a = np.full((count, joints), np.inf)
@@ -75,7 +75,7 @@ class BatchBodies(ABC):
     def place(
         self, row: int, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
     ) -> None:
-        """Put the body of a world on the floor, at rest, as ``MujocoPlant.reset``."""
+        """Place the body of a world at rest, like ``MujocoPlant.reset``."""
         self.template.reset(start_m, heading_rad, joint_rad)
         self._copy_template(row)
 
@@ -91,6 +91,6 @@ class BatchBodies(ABC):
         """Advance all worlds under the present drive.
 
         Raises:
-            PhysicsError: a state has diverged.
+            PhysicsError: a state diverged.
 
         """

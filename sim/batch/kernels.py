@@ -1,9 +1,9 @@
 # mypy: disable-error-code="valid-type, misc, no-untyped-call, untyped-decorator"
 """Warp kernels of a step: motors and ground friction before it, energies and loads after it.
 
-They compute what ``sim.physics.step_forces`` computes, in single precision and for many worlds at
-once. ``make warp`` compares both. W is the number of worlds, L of links, J of joints; the contacts
-of all worlds are in one list.
+They compute ``sim.physics.step_forces`` in single precision for many worlds; ``make warp`` compares
+both. W is the number of worlds, L of links, J of joints; the contacts of all worlds are in one
+list.
 """
 
 import warp as wp
@@ -73,7 +73,7 @@ def move_links(
     twist: wp.array2d[wp.vec3],
     still: wp.array[float],
 ) -> None:
-    """Rate at which the links of each world (W,) moved in the last step; clear its sums."""
+    """Rate of the links' motion in the last step of each world (W,); clears its sums."""
     w = wp.tid()
     turn = wp.vec3(qvel[w, 3], qvel[w, 4], qvel[w, 5])
     links = before.shape[1]
@@ -118,7 +118,7 @@ def add_depths(
     bodies: wp.array[int],
     depth: wp.array2d[float],
 ) -> None:
-    """Add the depth of each belly's contact with the ground to that of its link."""
+    """Add the depth of each belly's ground contact to that of its link."""
     c = wp.tid()
     if c >= contacts[0]:
         return
@@ -152,10 +152,10 @@ def rub(
     twist: wp.array2d[wp.vec3],
     totals: wp.array2d[wp.float64],
 ) -> None:
-    """Friction of each belly's contact with the ground: ``sim.physics.friction`` in single numbers.
+    """Friction of each belly's ground contact: ``sim.physics.friction`` in single precision.
 
-    ``mu`` (W, 3): friction forward, across, back. ``push`` and ``twist`` (W, L) are the sums of
-    forces, and of torques about the world's origin.
+    ``mu`` (W, 3): friction forward, across, back. ``push`` and ``twist`` (W, L) sum forces, and
+    torques about the world's origin.
     """
     c = wp.tid()
     if c >= contacts[0]:
@@ -240,7 +240,7 @@ def settle(
     step_s: float,
     energies: wp.array3d[wp.float64],
 ) -> None:
-    """Add a step's energies of each motor (W, J): drawn, returned, heat, work at the shaft."""
+    """Add a step's energies of each motor (W, J): drawn, returned, heat, work."""
     w, j = wp.tid()
     ampere = current[w, j]
     heat_w = motor[0, j] * ampere * ampere
@@ -264,7 +264,7 @@ def weigh(
     bodies: wp.array[int],
     load: wp.array2d[float],
 ) -> None:
-    """Add the ground's contact force to the load of its link; ``load`` (W, L) was cleared."""
+    """Add ground contact forces to the load of their links; ``load`` (W, L) was cleared."""
     c = wp.tid()
     if c >= contacts[0]:
         return

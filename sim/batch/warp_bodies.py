@@ -1,4 +1,4 @@
-"""``BatchBodies`` that MuJoCo-Warp advances, on a GPU or on the CPU, in single precision."""
+"""``BatchBodies`` on MuJoCo-Warp, on a GPU or the CPU, in single precision."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -31,7 +31,7 @@ _INPUTS: Final = (
 
 
 class WarpBodies(BatchBodies):
-    """Bodies on a Warp device; ``device`` is its name, None the first GPU, or the CPU without one.
+    """Bodies on a Warp device; ``device`` None is the first GPU, else the CPU.
 
     Raises:
         InputError: the robot's gears or the world are not supported, or the device does not exist.
@@ -55,7 +55,7 @@ class WarpBodies(BatchBodies):
         """Advance all worlds under the present drive, and read their state back.
 
         Raises:
-            PhysicsError: a state has diverged.
+            PhysicsError: a state diverged.
 
         """
         if self._state is None:
@@ -148,7 +148,7 @@ class _DeviceState:
         self.before.assign(before)
 
     def forget(self, rows: Bools, energies_j: Floats, totals: Floats) -> None:
-        """Set the energies, and forget the accelerations of some worlds (W,)."""
+        """Set the energies, and clear the warm start of some worlds (W,)."""
         self.energies.assign(energies_j)
         self.totals.assign(totals)
         start = self.data.qacc_warmstart.numpy()
@@ -156,18 +156,18 @@ class _DeviceState:
         self.data.qacc_warmstart.assign(start)
 
     def set_drive(self, bodies: WarpBodies) -> None:
-        """Copy the drive of all motors, and the friction, to the device."""
+        """Copy drive and friction to the device."""
         for name, values in self.drive.items():
             values.assign(np.minimum(getattr(bodies, name), _NO_LIMIT_A))
         self.mu.assign(bodies.friction)
 
     def step(self) -> None:
-        """Advance all worlds by a step; on a GPU by a graph that is captured once."""
+        """Advance all worlds by a step; on a GPU by a captured graph."""
         if not self.device.is_cuda:
             self._launch_step()
             return
         if self._graph is None:
-            self._launch_step()  # loads the kernels, which a capture cannot
+            self._launch_step()  # loads the kernels; a capture cannot
             with warp.ScopedCapture() as capture:
                 self._launch_step()
             self._graph = capture.graph
@@ -235,7 +235,7 @@ class _DeviceState:
         )
 
     def download(self, bodies: WarpBodies) -> None:
-        """Read states, motors and energies back."""
+        """Read states, motors and energies."""
         bodies.qpos[:], bodies.qvel[:] = self.data.qpos.numpy(), self.data.qvel.numpy()
         bodies.current_a[:], bodies.pwm[:] = self.current.numpy(), self.pwm.numpy()
         bodies.energies_j[:], bodies.totals[:] = self.energies.numpy(), self.totals.numpy()

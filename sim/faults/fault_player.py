@@ -1,4 +1,4 @@
-"""Plays a fault file on a simulated line: the same file and seed give the same bytes."""
+"""Plays a fault file on a simulated line; file and seed determine the bytes."""
 
 import math
 import random
@@ -29,11 +29,11 @@ class FaultyProtection(Protocol):
         ...
 
     def supply(self, volts: float | None, rows: Indices | None = None) -> None:
-        """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
+        """Set the supply of all servos, or of ``rows``; None: the usual voltage."""
         ...
 
     def heat(self, rows: Indices, celsius: float) -> None:
-        """Set housings to a temperature."""
+        """Set housing temperatures."""
         ...
 
     def detect(self, rows: Indices, error: int) -> None:
@@ -42,11 +42,11 @@ class FaultyProtection(Protocol):
 
 
 class FaultyServos(Protocol):
-    """The servos of a line; a row is a place along the chain."""
+    """The servos of a line; rows follow the chain."""
 
     @property
     def events(self) -> EventQueue:
-        """Events that happen to them at a time of their own."""
+        """Scheduled events."""
         ...
 
     @property
@@ -63,7 +63,7 @@ class FaultyServos(Protocol):
         ...
 
     def cut_output(self, rows: Indices, on: bool) -> None:
-        """Cut the output stages of servos off their motors, or connect them again."""
+        """Disconnect output stages from their motors, or reconnect them."""
         ...
 
     def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
@@ -79,7 +79,7 @@ class FaultyServos(Protocol):
         ...
 
     def restore_power(self, rows: Indices) -> None:
-        """Give it back; the servos restart."""
+        """Restore the supply; the servos restart."""
         ...
 
     def reboot(self, row: int) -> None:
@@ -88,7 +88,7 @@ class FaultyServos(Protocol):
 
 
 class FaultTarget(Protocol):
-    """A line and the servos on it, of either protocol."""
+    """A line of either protocol, and its servos."""
 
     clock: SimClock
     has_alert_bit: bool
@@ -112,15 +112,15 @@ class FaultTarget(Protocol):
         ...
 
     def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
-        """Type of a register's numbers; None where a servo lacks it."""
+        """Type of a register's numbers; None if a servo lacks it."""
         ...
 
     def write_register(self, rows: Indices, name: str, value: int) -> None:
-        """Set a register of servos, as another program would."""
+        """Set a register of servos, like another program."""
         ...
 
     def mute(self, rows: Indices, on: bool) -> None:
-        """Stop servos from replying, or let them reply again."""
+        """Suppress or restore the replies of servos."""
         ...
 
     def deafen(self, rows: Indices, on: bool) -> None:
@@ -128,11 +128,11 @@ class FaultTarget(Protocol):
         ...
 
     def set_alert(self, rows: Indices, on: bool) -> None:
-        """Let servos set the alert bit of their replies without an error, or no longer."""
+        """Set or clear a false alert bit in the replies of servos."""
         ...
 
     def refresh_ids(self) -> None:
-        """Look up again who has which ID, after IDs, power or muting have changed."""
+        """Look the IDs up again after a change of IDs, power or muting."""
         ...
 
     def disconnect(self) -> None:
@@ -140,20 +140,19 @@ class FaultTarget(Protocol):
         ...
 
     def reconnect(self) -> None:
-        """Give the port back."""
+        """Reconnect the port."""
         ...
 
     def attach(self, script: FaultScript) -> None:
-        """Let a script act on packets and host."""
+        """Let a script change packets and pause the host."""
         ...
 
 
 class FaultPlayer:
-    """Runs the faults of a plan on ``line``, from its present time on.
+    """Runs the faults of a plan on ``line``, from its present time.
 
     Raises:
-        ConfigError: the plan names an ID that no servo of the line has, or an error that its servos
-            cannot detect.
+        ConfigError: the plan has an unknown ID, or an error that its servos cannot detect.
 
     """
 
@@ -169,7 +168,7 @@ class FaultPlayer:
         line.attach(self)
 
     def add(self, faults: plan.FaultPlan, source: str = "faults") -> None:
-        """Let more faults happen, their times counted from now on; raises as the constructor."""
+        """Add faults with times from now; raises as the constructor."""
         since_s = self._line.clock.now_s() - self._start_s
         later = [each.model_copy(update={"at_s": each.at_s + since_s}) for each in faults.fault]
         self._add(faults.model_copy(update={"fault": tuple(later)}), source)
@@ -186,7 +185,7 @@ class FaultPlayer:
         self.stalls.sort()
 
     def host_resumes_s(self, now_s: float) -> float:
-        """Time at which a host that calls at ``now_s`` goes on."""
+        """Time at which a host that calls at ``now_s`` continues."""
         while self.stalls and self.stalls[0][0] <= now_s:
             begin_s, for_s = self.stalls.pop(0)
             now_s = max(now_s, begin_s + for_s)
@@ -216,7 +215,7 @@ class FaultPlayer:
             raise ConfigError(wrong)
 
     def _unwritable(self, fault: plan.WriteFault | plan.ReadingFault, where: str) -> list[str]:
-        """Messages about a register that a named servo lacks, or a value that does not fit."""
+        """Messages about a register that a servo lacks, or a value that does not fit."""
         wrong = []
         for each in self._rows.keys() & set(fault.ids):
             name, value = fault.register_name, fault.value
@@ -229,7 +228,7 @@ class FaultPlayer:
         return wrong
 
     def _undetectable(self, fault: plan.TripFault, where: str) -> list[str]:
-        """Messages about an error that a named servo cannot detect."""
+        """Messages about an error that a servo cannot detect."""
         known = {
             each: self._servos.protection.alarms(self._rows[each])
             for each in fault.ids
@@ -251,7 +250,7 @@ class FaultPlayer:
             )
 
     def _then_refresh_ids(self, action: Callable[[], None]) -> Callable[[], None]:
-        """Action after which the line looks up again who has which ID."""
+        """Action followed by a new look-up of the IDs."""
 
         def act() -> None:
             action()
@@ -260,7 +259,7 @@ class FaultPlayer:
         return act
 
     def _actions(self, fault: plan.ScheduledFault) -> _Actions:
-        """Actions at the beginning and at the end of a fault; mypy reports a missing kind."""
+        """Actions at the start and the end of a fault."""
         line, protection = self._line, self._servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
         match fault:
@@ -316,7 +315,7 @@ class FaultPlayer:
         return partial(self._servos.cut_power, rows), partial(self._servos.restore_power, rows)
 
     def _write_again(self, fault: plan.WriteFault, rows: Indices, count: int = 0) -> None:
-        """Write a register, and let the next write follow."""
+        """Write a register, and schedule the next write."""
         self._line.write_register(rows, fault.register_name, fault.value)
         since_s = (count + 1) * (fault.every_s or math.inf)
         if since_s < (fault.for_s or math.inf):

@@ -1,9 +1,9 @@
 """Alarms of a Feetech servo: load, heat, supply, encoder.
 
 An alarm is a bit of the servo status (register 65) and of the error byte of every reply while its
-cause lasts. Alarms in the mask of Shutdown(19) stay until the torque is switched on again: heat,
-supply and encoder switch it off, and an overload lowers the output to Protective Torque(34).
-(Memory tables of STS, SCSCL and HLS; the end of an alarm is ours.)
+cause lasts. Alarms in the mask of Shutdown(19) stay until torque is switched on again. Heat, supply
+and encoder switch it off; an overload lowers the output to Protective Torque(34). (Memory tables of
+STS, SCSCL and HLS; the end of an alarm is ours.)
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +40,7 @@ class FeetechAlarms(Ax12Alarms):
         blocked_shaft: BlockedShaft,
         supply_v: float,
     ) -> None:
-        """Set up servos without an alarm, which detect those of ``kinds``."""
+        """Set up servos without an alarm; they detect those of ``kinds``."""
         super().__init__(register, drive, motor, blocked_shaft, supply_v)  # type: ignore[arg-type]
         self.known = {kind: bit for kind, bit in ALARMS.items() if kind in kinds}
 

@@ -22,8 +22,8 @@ Tamper = Callable[[bytes], Sequence[bytes]]
 class FeetechLine(Ax12Line):
     """Feetech ``servos`` behind a serial line of ``baud``.
 
-    A packet with a wrong checksum, and an instruction that a servo does not have, get no reply
-    (ours). In a sync read servos reply in turn, and behind a silent one all are silent (ours).
+    A packet with a wrong checksum and an unknown instruction get no reply (ours). In a sync read
+    servos after a silent one stay silent (ours).
     """
 
     servos: FeetechServos  # type: ignore[assignment]
@@ -47,11 +47,11 @@ class FeetechLine(Ax12Line):
 
     @property
     def bank(self) -> FeetechServos:
-        """The servos, whose registers are looked up by name."""
+        """The servos; registers by name."""
         return self.servos
 
     def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
-        """Type of a register's numbers; None where a servo lacks it."""
+        """Type of a register's numbers; None if a servo lacks it."""
         del row
         each = self.servos.facts.registers.get(name)
         if each is None:
@@ -81,7 +81,7 @@ class FeetechLine(Ax12Line):
         ]
 
     def _also(self, servo_id: int) -> list[int]:
-        """Rows of the servos that obey an ID as their secondary one, without a reply."""
+        """Rows of the servos with this secondary ID; they obey without a reply."""
         if servo_id == BROADCAST_ID:
             return []
         ids = self.servos["ID"]

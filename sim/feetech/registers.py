@@ -1,4 +1,4 @@
-"""Registers of S Feetech servos: values in numbers, and their bytes in the model's format."""
+"""Registers of S Feetech servos: values, and their bytes in the model's format."""
 
 from collections.abc import Iterable
 
@@ -16,7 +16,7 @@ _COPIES = {"Kp": "Position P Gain", "Kd": "Position D Gain", "Ki": "Position I G
 
 
 class FeetechRegisters:
-    """Values (S,) by name; a write to the EEPROM area while Lock is 1 is not kept."""
+    """Values (S,) by name; EEPROM writes while Lock is 1 do not persist."""
 
     def __init__(self, facts: ServoModel, servos: int) -> None:
         self.facts = facts
@@ -34,7 +34,7 @@ class FeetechRegisters:
             self.reset(row, keep=())
 
     def __getitem__(self, name: str) -> NDArray[np.int64]:
-        """(S,) live view of a register of all servos."""
+        """(S,) live view of a register."""
         return self.values[name]
 
     def initial(self, name: str) -> int:
@@ -51,9 +51,9 @@ class FeetechRegisters:
         return bytes(data[address : address + length])
 
     def write(self, row: int, address: int, data: bytes) -> list[str]:
-        """Write the registers that lie in a block; names of those that were accepted.
+        """Write the registers in a block; return the names of the accepted ones.
 
-        Registers that are read-only, and values out of range, are left as they are (ours).
+        Read-only registers and values out of range are ignored (ours).
         """
         accepted = []
         for name, each in self._inside(address, address + len(data)):
@@ -66,7 +66,7 @@ class FeetechRegisters:
         return accepted
 
     def put(self, row: int, name: str, value: int) -> None:
-        """Set a register of one servo, as a write of its value does."""
+        """Set a register of one servo, like a write."""
         self.values[name][row] = value
         if name in self._kept and not self.values["Lock"][row]:
             self._kept[name][row] = value
@@ -74,11 +74,11 @@ class FeetechRegisters:
             self.put(row, "Secondary ID", value)
 
     def keep(self, row: int, name: str) -> None:
-        """Keep the present value of a register at power-off."""
+        """Make the present value of a register persistent."""
         self._kept[name][row] = self.values[name][row]
 
     def restart(self, row: int) -> None:
-        """Set the values after power-on: those kept in the EEPROM, and initial ones of the RAM."""
+        """Set the values after power-on: the persistent EEPROM, and initial RAM."""
         for name in self._rows:
             kept = self._kept.get(name)
             self.values[name][row] = self.initial(name) if kept is None else kept[row]
@@ -87,7 +87,7 @@ class FeetechRegisters:
                 self.values[name][row] = self.values[source][row]
 
     def reset(self, row: int, keep: Iterable[str] = ("ID",)) -> None:
-        """Restore all parameters but those of ``keep``: backed-up ones, else the factory's."""
+        """Restore all parameters except ``keep``: backed-up ones, else the factory's."""
         backup = self._backup.get(row, {})
         for name, kept in self._kept.items():
             if name not in keep:
@@ -95,7 +95,7 @@ class FeetechRegisters:
         self.restart(row)
 
     def back_up(self, row: int) -> None:
-        """Store the parameters in the EEPROM for ``reset``."""
+        """Store the EEPROM parameters for ``reset``."""
         self._backup[row] = {name: int(kept[row]) for name, kept in self._kept.items()}
 
     def _inside(self, start: int, end: int) -> Iterable[tuple[str, RegisterRow]]:

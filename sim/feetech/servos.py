@@ -44,7 +44,7 @@ class FeetechServos(SimulatedServos):
         """Set up new servos; by default at the recommended supply, each on its shaft's zero.
 
         Raises:
-            InputError: an ID is out of 0 to 253 or used twice.
+            InputError: an ID is outside 0 to 253 or used twice.
 
         """
         check_ids(ids, facts.model, MAX_ID)
@@ -70,13 +70,13 @@ class FeetechServos(SimulatedServos):
             self.reboot(row)
 
     def __getitem__(self, name: str) -> NDArray[np.int64]:
-        """(S,) live view of a register of all servos."""
+        """(S,) live view of a register."""
         return self.registers[name]
 
     # instructions
 
     def read(self, row: int, address: int, length: int) -> bytes:
-        """Bytes of a block; ``refresh`` comes before."""
+        """Bytes of a block; call ``refresh`` first."""
         return self.registers.read(row, address, length)
 
     def write(self, row: int, address: int, data: bytes) -> int:
@@ -95,19 +95,19 @@ class FeetechServos(SimulatedServos):
         return 0
 
     def register_write(self, row: int, address: int, data: bytes) -> int:
-        """Reg Write: keep for Action."""
+        """Reg Write: store for Action."""
         self._registered[row] = (address, data)
         self["Registered Instruction"][row] = 1
         return 0
 
     def action(self, row: int) -> int:
-        """Carry out the registered write, if there is one."""
+        """Execute the registered write, if any."""
         kept = self._registered.pop(row, None)
         self["Registered Instruction"][row] = 0
         return self.write(row, *kept) if kept is not None else 0
 
     def calibrate(self, row: int, position: int) -> None:
-        """Make the present position ``position`` by Homing Offset(31), which is kept."""
+        """Make the present position ``position`` by Homing Offset(31), persistently."""
         if "Homing Offset" not in self.facts.registers:
             return
         turn = round(self.facts.units.positions_per_turn)
@@ -117,7 +117,7 @@ class FeetechServos(SimulatedServos):
         self.reset_turns(row)
 
     def reset_turns(self, row: int) -> None:
-        """Count turns from the present one on."""
+        """Count turns from the present one."""
         free = np.arange(len(self)) == row
         self._turns = np.where(free, self._turn(), self._turns)
 
@@ -127,7 +127,7 @@ class FeetechServos(SimulatedServos):
         self.reboot(row)
 
     def reboot(self, row: int) -> None:
-        """Restart: RAM has its initial values, torque is off, goal = present position."""
+        """Restart: initial RAM, torque off, goal = present position."""
         self.registers.restart(row)
         self._registered.pop(row, None)
         self._was_on[row] = False
@@ -137,7 +137,7 @@ class FeetechServos(SimulatedServos):
         self["Goal Position"][row] = self["Present Position"][row]
 
     def hold_position(self) -> None:
-        """Give every servo its present position as goal, at rest: its shaft was put elsewhere."""
+        """Set every goal to the present position, at rest, after a shaft was moved."""
         self._turns = self._turn()
         self.refresh()
         self["Goal Position"][:] = self["Present Position"]
@@ -186,7 +186,7 @@ class FeetechServos(SimulatedServos):
         return np.where(endless, PUSH, POSITION)
 
     def _has_steps(self) -> bool:
-        """Whether mode 3 is that of steps."""
+        """Whether mode 3 is the step mode."""
         return "Open-loop PWM" in self.facts.registers
 
     def _offset(self) -> NDArray[np.int64]:
@@ -195,17 +195,16 @@ class FeetechServos(SimulatedServos):
         return np.zeros(len(self), np.int64)
 
     def _servo_rad(self) -> Floats:
-        """(S,) angles of the servos, from their middle."""
+        """(S,) servo angles from their middle."""
         mounting = self._mounting
         return np.asarray(mounting.sign * self.plant.position_rad + mounting.zero_rad)
 
     def _ticks(self) -> Floats:
-        """(S,) positions without offset, of all turns."""
+        """(S,) positions of all turns, without offset."""
         units = self.facts.units
         return np.asarray(self._servo_rad() * self.facts.positions_per_rad + units.zero_position)
 
     def _turn(self) -> Floats:
-        """(S,) turn in which each shaft is."""
         turn = self.facts.units.positions_per_turn
         return np.asarray(np.floor((np.rint(self._ticks()) - self._offset()) / turn))
 
@@ -236,7 +235,7 @@ class FeetechServos(SimulatedServos):
         self._was_on = on
 
     def _move(self, seconds: float, positions: Bools, wheels: Bools, shaft: Floats) -> None:
-        """Let the trajectories run to the goals, or at the goal velocities."""
+        """Advance the trajectories to the goals, or at the goal velocities."""
         facts, registers, path = self.facts, self.registers, self._trajectory
         path.restart(~(positions | wheels) | ((positions | wheels) & ~self._was_on), shaft)
         goal = registers["Goal Position"].astype(np.float64)
@@ -265,7 +264,7 @@ class FeetechServos(SimulatedServos):
         path.goal[wheels] = path.position[wheels]
 
     def _push(self, mode: NDArray[np.int64]) -> tuple[Floats, Floats]:
-        """(S,) open-loop output, and (S,) limits of the current, A."""
+        """(S,) open-loop output, and (S,) current limits, A."""
         registers, facts = self.registers, self.facts
         none = np.full(len(self), np.inf)
         if "Goal Current" in facts.registers:

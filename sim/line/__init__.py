@@ -1,4 +1,4 @@
-"""The simulated bus below the protocol: the bytes of instructions in, the bytes of replies out.
+"""The simulated bus below the protocol: instruction bytes in, reply bytes out.
 
 ``wire`` carries packets and owns simulated time; ``sim_line`` puts servos of Protocol 2.0 on it.
 ``instruction_handler`` answers any packet, ``group_fast_path`` those of a control cycle.

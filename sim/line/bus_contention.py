@@ -14,8 +14,8 @@ class Reply(NamedTuple):
 def bus_contention(replies: Sequence[Reply], byte_s: float) -> tuple[Reply, bool]:
     """Bytes on the wire when ``replies`` to one packet meet, and whether they are garbled.
 
-    Equal replies at the same time are one reply, as on metal. Otherwise bits are ANDed where they
-    overlap, in whole bytes of ``byte_s``.
+    Equal simultaneous replies are one reply, as on a real bus. Otherwise overlapping bits are
+    ANDed, in whole bytes of ``byte_s``.
     """
     first = min(replies)
     if all(reply == first for reply in replies):

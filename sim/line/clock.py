@@ -1,4 +1,4 @@
-"""Simulated time: it passes only while a caller waits for it, or as real time does."""
+"""Simulated time: it passes only while a caller waits, or as real time."""
 
 from snakewalk.drivers.clock import WallClock
 
@@ -14,11 +14,11 @@ class SimClock:
         return self._now_s
 
     def sleep_until_s(self, time_s: float) -> None:
-        """Jump to ``time_s``; nothing happens if that is past, so time never runs back."""
+        """Jump to ``time_s``, never back."""
         self._now_s = max(self._now_s, time_s)
 
     def advance(self, seconds: float) -> None:
-        """Let ``seconds`` pass.
+        """Advance by ``seconds``.
 
         Raises:
             ValueError: negative ``seconds``.
@@ -30,9 +30,9 @@ class SimClock:
 
 
 class RealTimeClock(SimClock):
-    """Simulated time that is real time, from 0 on: for servos that share a bus with real ones.
+    """Simulated time that equals real time from 0: for a bus shared with real servos.
 
-    A wait of the host is a real wait; physics catches up whenever the line is used.
+    The host really waits; physics catches up whenever the line is used.
     """
 
     def __init__(self) -> None:

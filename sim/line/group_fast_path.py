@@ -1,8 +1,7 @@
 """Group fast path: the two packets of a control cycle for all servos at once.
 
-A slice of the control tables and one CRC pass give the same bytes as
-``sim.line.instruction_handler``, which handles all special cases (stuffing, a missing ID, a silent
-servo).
+A slice of the control tables and one CRC pass give the bytes of ``sim.line.instruction_handler``.
+That handles all special cases (stuffing, a missing ID, a silent servo).
 """
 
 from abc import ABC, abstractmethod
@@ -25,9 +24,9 @@ MOTION = range(126, 136)
 
 
 class GroupRead(ABC):
-    """One kind of group read: a template of its reply, and how to fill in the rest.
+    """One kind of group read: a template of its reply, and how to fill it.
 
-    ``status`` is the address of Hardware Error Status, which the alert in the error byte follows.
+    ``status`` is the address of Hardware Error Status, which sets the alert bit.
     """
 
     def __init__(
@@ -58,7 +57,7 @@ class GroupRead(ABC):
         return self._cut(self._packet.tobytes(), whole)
 
     def decoded(self, table: Bytes, request: GroupReadRequest, data: Bytes, error: Bytes) -> int:
-        """Return the result of ``drivers.protocol.frames`` for these replies in one piece.
+        """Return the result of ``drivers.protocol.frames`` for these replies.
 
         Fills ``data`` (N, length) and ``error`` (N,), unless the replies are irregular.
         """
@@ -69,15 +68,15 @@ class GroupRead(ABC):
 
     @abstractmethod
     def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
-        """Cut the reply into its packets."""
+        """Cut the reply into packets."""
 
     @abstractmethod
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
-        """Head; shares (N, bytes); where in them the error byte stands, and where the data."""
+        """Head; shares (N, bytes); offsets of error byte and data in a share."""
 
 
 class PlainRead(GroupRead):
-    """Sync read: one status packet a servo."""
+    """Sync read: one status packet per servo."""
 
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
         head = HEADER + b"\x00" + (length + 4).to_bytes(2, "little") + bytes((STATUS, 0))
@@ -103,7 +102,7 @@ class PlainRead(GroupRead):
 
 
 class FastRead(GroupRead):
-    """Fast sync read: one packet that all write; each CRC goes over all before, CRCs included."""
+    """Fast sync read: one common packet; each CRC covers all bytes before it."""
 
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
         frames = np.zeros((len(ids), length + 4), np.uint8)
@@ -137,7 +136,7 @@ class GroupFastPath:
     def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Reply] | None:
         """Execute ``raw`` if it is plain, else return None and change nothing.
 
-        ``whole`` joins packets that follow each other without a gap into one piece.
+        ``whole`` joins packets without gaps.
         """
         if raw[7:12] == _GOALS:
             return self._write_goals(raw, now_s)
@@ -148,7 +147,7 @@ class GroupFastPath:
         return read.replies(self._bank.table, whole)
 
     def read_of(self, raw: bytes) -> GroupRead | None:
-        """The plain group read that ``raw`` is; None of any other packet."""
+        """The plain group read in ``raw``, or None."""
         self._forget_what_changed()
         read = self._reads.get(raw)
         if read is None:
@@ -164,7 +163,7 @@ class GroupFastPath:
             self._goals = None
 
     def measure(self, read: GroupRead, now_s: float) -> None:
-        """Have the servos show in their tables what ``read`` asks for."""
+        """Update the tables for ``read``."""
         self._firmware.on_instruction(now_s)
         if read.motion:
             self._firmware.refresh_motion()

@@ -1,4 +1,4 @@
-"""The ID directory: which servos an ID reaches, and which of them reply to it."""
+"""The ID directory: servos that an ID reaches, and those that reply to it."""
 
 from collections import defaultdict
 
@@ -14,7 +14,7 @@ _SECONDARY_OFF = 253
 
 
 class IdDirectory:
-    """The powered servos at the line's baud rate, by primary and by secondary ID."""
+    """The powered servos at the line's baud rate, by primary and secondary ID."""
 
     def __init__(self, bank: ServoBank) -> None:
         self._bank = bank
@@ -29,7 +29,7 @@ class IdDirectory:
         self._second: dict[int, list[int]] = {}
 
     def refresh(self, baud: int, powered: NDArray[np.bool_]) -> None:
-        """Look up the servos again, after IDs, baud rates or power have changed."""
+        """Look the servos up again after a change of IDs, baud rates or power."""
         bank = self._bank
         columns = (bank["ID"], bank["Secondary(Shadow) ID"], bank["Baud Rate"], powered, self.mute)
         now = baud.to_bytes(4, "little") + b"".join(column.tobytes() for column in columns)
@@ -53,7 +53,7 @@ class IdDirectory:
             self.rows[each] = SPECIAL
 
     def present(self) -> list[int]:
-        """Rows of all servos that receive."""
+        """Rows of all receiving servos."""
         return sorted(row for rows in self._first.values() for row in rows)
 
     def ids(self) -> list[int]:
@@ -61,11 +61,11 @@ class IdDirectory:
         return sorted(self._first)
 
     def primary(self, servo_id: int) -> list[int]:
-        """Rows of the servos with this ID; more than one where IDs clash."""
+        """Rows of the servos with this ID; several if IDs clash."""
         return self._first.get(servo_id, [])
 
     def secondary(self, servo_id: int) -> list[int]:
-        """Rows of the servos that share this secondary ID: they obey, and never reply."""
+        """Rows of the servos with this secondary ID: they obey, and never reply."""
         return self._second.get(servo_id, [])
 
     def replying(self, servo_id: int) -> list[int]:

@@ -1,6 +1,6 @@
 """The servos' replies to any instruction packet, one servo at a time.
 
-``sim.line.group_fast_path`` gives the same replies to the packets of a control cycle.
+``sim.line.group_fast_path`` gives the same replies in a control cycle.
 """
 
 from typing import NamedTuple
@@ -41,7 +41,7 @@ class _Block(NamedTuple):
 
 
 class InstructionHandler:
-    """Executes instruction packets on a firmware and composes the replies."""
+    """Executes instruction packets and composes the replies."""
 
     def __init__(self, firmware: Firmware, baud: int, imu: Imu | None = None) -> None:
         self.firmware = firmware
@@ -57,16 +57,16 @@ class InstructionHandler:
         self._instructions = Instructions(firmware)
 
     def refresh_ids(self) -> None:
-        """Look up again which servos the line's baud rate reaches, and by which ID."""
+        """Look up again which servos the line's baud rate reaches, by ID."""
         self.directory.refresh(self.baud, self.firmware.powered)
         self.version += 1
 
     def delay_s(self, row: int) -> float:
-        """Silence that a servo keeps before it replies."""
+        """Silence before a servo's reply."""
         return int(self.bank["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
 
     def execute(self, packet: InstructionPacket, now_s: float) -> list[Reply]:
-        """Execute a valid packet that ended at ``now_s``; the firmware is already there."""
+        """Execute a valid packet that ended at ``now_s``, the time of the firmware."""
         if not self.directory.present() and self._imu is None:
             return []
         self.firmware.on_instruction(now_s)
@@ -90,19 +90,18 @@ class InstructionHandler:
                 replies.append(Reply(delay_s, self._status(row, servo_id, error, b"")))
         for row in self.directory.secondary(servo_id):
             self._one(row, code, params, ram_only=True)
-        if self._imu_at(servo_id) is not None:  # nothing of it is known to be writable
+        if self._imu_at(servo_id) is not None:  # no register of it is known to be writable
             refused = StatusPacket(servo_id, ResultError.ACCESS, b"")
             replies.append(Reply(0.0, encode_status(refused)))
         return self._respond(replies)
 
     def _imu_at(self, servo_id: int) -> Imu | None:
-        """Return the IMU, if it has this ID and hears the line's baud rate."""
+        """The IMU, if it has this ID and the line's baud rate."""
         imu = self._imu
         heard = imu is not None and imu.config.id == servo_id and imu.baud == self.baud
         return imu if heard else None
 
     def _group(self, code: int, params: bytes) -> list[Reply]:
-        """Execute an instruction to a group; it returns nothing for a single servo."""
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
             return self._sync_read(params, fast=code == Instruction.FAST_SYNC_READ)
         if code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
@@ -186,7 +185,7 @@ class InstructionHandler:
     def _group_read(self, asked: list[tuple[int, int, int]], fast: bool) -> list[Reply]:
         """Servos reply in the order of the request; each waits for the one before.
 
-        So behind a silent one all are silent (ROBOTIS on the SDK's issue tracker).
+        So those after a silent one stay silent (ROBOTIS on the SDK's issue tracker).
         """
         if fast and sum(length + 4 for _, _, length in asked) + 1 > MAX_LENGTH:
             return []  # no length field could announce the common reply

@@ -19,7 +19,7 @@ RESET_KEEPS = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}
 
 
 class Instructions:
-    """Executes instructions whose reply is an error number and nothing else."""
+    """Executes instructions whose reply is only an error number."""
 
     def __init__(self, firmware: Firmware) -> None:
         self.firmware = firmware
@@ -35,7 +35,7 @@ class Instructions:
         }
 
     def execute(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
-        """Execute one; returns the reply's error number, an instruction error if it is unknown."""
+        """Execute one; return the reply's error number."""
         if code == Instruction.WRITE:
             if len(params) < 3:
                 return ResultError.DATA_LENGTH
@@ -50,7 +50,7 @@ class Instructions:
         return int(action(row, params) if action is not None else ResultError.INSTRUCTION)
 
     def write(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> int:
-        """Write, and switch on a servo whose torque a new goal enables."""
+        """Write; a new goal may enable torque."""
         error = self.bank.write(row, address, data, ram_only=ram_only)
         if not error and address + len(data) > self._goals.start and address < self._goals.stop:
             self.firmware.enable_by_goal(np.array([row]))

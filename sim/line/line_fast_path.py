@@ -1,7 +1,7 @@
 """The regular control cycle on a simulated line: a group read without queues and parsers.
 
-The bytes are those of the wire, which handles all special cases (faults, taps, stuffing, two
-packets under way).
+It gives the bytes of the wire, which handles all special cases (faults, taps, stuffing, two packets
+under way).
 """
 
 from typing import Protocol
@@ -19,7 +19,7 @@ from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 
 
 class ReadableLine(Protocol):
-    """A line that a group read begins on, and ends on; ``sim.line.sim_line`` describes it."""
+    """A line with begin and end of a group read; see ``sim.line.sim_line``."""
 
     @property
     def clock(self) -> Clock:
@@ -27,7 +27,7 @@ class ReadableLine(Protocol):
         ...
 
     def begin(self, packet: bytes) -> bool:
-        """Send a packet on a line that carries nothing else."""
+        """Send a packet on an idle line."""
         ...
 
     def finish(self, request: GroupReadRequest, data: Bytes, error: Bytes, limit_s: float) -> int:
@@ -40,7 +40,7 @@ class ReadableLine(Protocol):
 
 
 class LineFastPath:
-    """A ``drivers.bus.fast_path.FastPath`` of a simulated line."""
+    """``drivers.bus.fast_path.FastPath`` of a simulated line."""
 
     def __init__(
         self,
@@ -59,11 +59,11 @@ class LineFastPath:
 
     @property
     def remaining_s(self) -> float:
-        """How long the reply to the last request is awaited yet."""
+        """Remaining time of the last request's reply."""
         return self._limit_s - self._wire.clock.now_s()
 
     def write(self, goals: NDArray[np.int32]) -> int:
-        """Send goals (N,); how many bytes were taken, 0 where the port must send them."""
+        """Send goals (N,); return the number of bytes sent, 0 if the port must send them."""
         packet = self._goals.encode(goals)
         if not self._wire.begin(packet):
             return 0
@@ -71,7 +71,7 @@ class LineFastPath:
         return len(packet)
 
     def begin(self, goals: NDArray[np.int32] | None) -> bool:
-        """Send the request; False, and nothing sent, behind ``goals`` or where more is sent."""
+        """Send the request; False without sending after ``goals`` or on a busy line."""
         request, wire = self._request, self._wire
         if goals is not None or not wire.begin(request.packet):
             return False
@@ -81,7 +81,7 @@ class LineFastPath:
         return True
 
     def finish(self) -> GroupReadReply | bytes:
-        """Receive the reply to the request of ``begin``; empty where ``read_until`` has it."""
+        """Receive the reply to the request of ``begin``; empty if ``read_until`` must read it."""
         data = np.empty(self._shape, np.uint8)
         found = self._wire.finish(self._request, data, self._error, self._limit_s)
         return b"" if found == IRREGULAR else self._request.regular(found, data, self._error)

@@ -1,4 +1,4 @@
-"""Noise: packets that do not arrive as they were sent, by the script of a fault file."""
+"""Noise: packets that do not arrive as sent, by the script of a fault file."""
 
 import random
 from collections.abc import Callable, Collection
@@ -11,9 +11,9 @@ DELAY_S, LATE_S = 1e-3, 0.05
 
 
 class Noise:
-    """The noise faults of a plan; ``chance`` draws and wrong bits come from one seeded source.
+    """The noise faults of a plan, with one seeded source.
 
-    ``senders`` gives the IDs of the servos that sent a reply.
+    ``senders`` returns the IDs of the servos that sent a reply.
     """
 
     def __init__(
@@ -27,20 +27,20 @@ class Noise:
         """Packets changed so far, by kind."""
 
     def add(self, fault: plan.NoiseFault) -> None:
-        """Add a fault; those of a file act in its order."""
+        """Add a fault; faults act in this order."""
         self._faults.append(fault)
 
     @property
     def any(self) -> bool:
-        """Whether there is anything to do at all."""
+        """Whether there are faults."""
         return bool(self._faults)
 
     def reply(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
-        """Packets that arrive of one reply, each with the time by which it is late."""
+        """Packets that arrive from one reply, each with its delay."""
         return self._change(data, now_s, "answers")
 
     def instruction(self, data: bytes, now_s: float) -> list[bytes]:
-        """Packets that the servos receive of one instruction."""
+        """Packets that the servos receive from one instruction."""
         return [packet for _, packet in self._change(data, now_s, "questions")]
 
     def _change(self, data: bytes, now_s: float, of: str) -> list[tuple[float, bytes]]:
@@ -63,7 +63,7 @@ class Noise:
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
     def _one(self, fault: plan.NoiseFault, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
-        """Packets that arrive in place of one; mypy reports a missing kind."""
+        """Packets that replace one."""
         if not data:
             return []
         match fault.kind:
@@ -85,10 +85,10 @@ class Noise:
 
 
 class FaultScript(Protocol):
-    """The effect of a fault file on packets and on the host."""
+    """Effect of a fault file on packets and host."""
 
     noise: Noise
 
     def host_resumes_s(self, now_s: float) -> float:
-        """Time at which a host that calls at ``now_s`` goes on."""
+        """Time at which a host that calls at ``now_s`` continues."""
         ...

@@ -1,4 +1,4 @@
-"""Bytes on the way to the host, each with the time at which it will have arrived."""
+"""Bytes on the way to the host, with their arrival times."""
 
 from collections import deque
 
@@ -7,7 +7,7 @@ EARLY = 1e-6
 
 
 class RxQueue:
-    """Packets in the order in which they begin on the wire, taken out byte by byte."""
+    """Packets in the order of their start on the wire, read byte by byte."""
 
     def __init__(self) -> None:
         self.byte_s = 1e-5
@@ -16,24 +16,24 @@ class RxQueue:
         """Packets under way or not yet read, each with the time at which it begins."""
 
     def add(self, start_s: float, data: bytes) -> float:
-        """Put a packet on the wire at ``start_s``; returns when its last byte will have arrived."""
+        """Put a packet on the wire at ``start_s``; return the arrival time of its last byte."""
         packets = self.packets
         if not packets or packets[-1][0] <= start_s:
             packets.append((start_s, data))
-        else:  # there are some that are late
+        else:  # some are late
             place = sum(packet[0] <= start_s for packet in packets)
             packets.insert(place, (start_s, data))
         return start_s + len(data) * self.byte_s
 
     def count(self, now_s: float) -> int:
-        """Bytes that have arrived and were not taken."""
+        """Number of arrived, unread bytes."""
         return sum(self._arrived(packet, now_s) for packet in self.packets)
 
     def due_s(self, count: int) -> float | None:
-        """Time at which ``count`` bytes will have arrived; None if fewer are under way."""
+        """Arrival time of ``count`` bytes; None if fewer are under way."""
         due_s = 0.0
         for start_s, data in self.packets:
-            # bytes behind a slow packet cannot be read before it
+            # bytes after a slow packet cannot be read before it
             due_s = max(due_s, start_s + min(count, len(data)) * self.byte_s)
             if len(data) >= count:
                 return due_s
@@ -41,10 +41,10 @@ class RxQueue:
         return None
 
     def take(self, count: int, now_s: float) -> bytes:
-        """Up to ``count`` bytes of those that have arrived."""
+        """Up to ``count`` arrived bytes."""
         packets, taken = self.packets, bytearray()
         if packets and len(packets[0][1]) == count == self._arrived(packets[0], now_s):
-            return packets.popleft()[1]  # one packet, all of it, as nearly always
+            return packets.popleft()[1]  # the usual case: one packet, complete
         while packets and len(taken) < count:
             start_s, data = packets[0]
             ready = min(self._arrived(packets[0], now_s), count - len(taken))
@@ -56,11 +56,11 @@ class RxQueue:
         return bytes(taken)
 
     def clear(self) -> None:
-        """Lose everything."""
+        """Drop all bytes."""
         self.packets.clear()
 
     def cut(self, at_s: float) -> None:
-        """Lose what has not arrived by ``at_s``."""
+        """Drop bytes that arrive after ``at_s``."""
         kept = [(packet[0], packet[1][: self._arrived(packet, at_s)]) for packet in self.packets]
         self.packets = deque(packet for packet in kept if packet[1])
 

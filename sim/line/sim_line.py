@@ -65,7 +65,7 @@ class SimLine(Wire):
 
     @property
     def directory(self) -> IdDirectory:
-        """Which servos an ID reaches."""
+        """Servos by ID."""
         return self._handler.directory
 
     # for a fault file
@@ -82,7 +82,7 @@ class SimLine(Wire):
         return [int(each) for each in self.bank["ID"]]
 
     def senders(self, reply: bytes) -> Collection[int]:
-        """IDs of the servos that sent a reply: one, or all that a fast read has asked."""
+        """IDs of the servos that sent a reply: one, or all of a fast read."""
         if reply[_ID_AT] != BROADCAST_ID:
             return (reply[_ID_AT],)
         fast_bulk = self._asked[_CODE_AT] == Instruction.FAST_BULK_READ
@@ -93,16 +93,16 @@ class SimLine(Wire):
         self.bank["ID"][row] = servo_id
 
     def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
-        """Type of a register's numbers; None where a servo lacks it."""
+        """Type of a register's numbers; None if a servo lacks it."""
         bank = self.bank
         return bank[name].dtype if name in bank and bank.has(row, name) else None
 
     def write_register(self, rows: NDArray[np.intp], name: str, value: int) -> None:
-        """Set a register of servos, as another program would."""
+        """Set a register of servos, like another program."""
         self.bank[name][rows] = value
 
     def mute(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Stop servos from replying, or let them reply again; they still receive and obey."""
+        """Suppress or restore the replies of servos; they still obey."""
         self.directory.mute[rows] = on
 
     def deafen(self, rows: NDArray[np.intp], on: bool) -> None:
@@ -110,15 +110,15 @@ class SimLine(Wire):
         self.directory.deaf[rows] = on
 
     def set_alert(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Let servos set the alert bit of their replies without an error, or no longer."""
+        """Set or clear a false alert bit in the replies of servos."""
         self.bank.false_alert[rows] = on
 
     def refresh_ids(self) -> None:
-        """Look up the IDs again, after they, power or muting have changed without a packet."""
+        """Look the IDs up again after a change of IDs, power or muting."""
         self._handler.refresh_ids()
 
     def shown(self, register: str) -> NDArray[np.signedinteger]:
-        """(S,) values of a register as a read now would show them; a copy."""
+        """(S,) values of a register as a read would return them; a copy."""
         self.firmware.refresh()
         return self.bank[register].copy()
 
@@ -126,7 +126,7 @@ class SimLine(Wire):
 
     @property
     def is_plain(self) -> bool:
-        """As of a ``Wire``, and that no test changes the replies."""
+        """As in ``Wire``, and ``tamper`` is not set."""
         return self.tamper is None and super().is_plain
 
     def fast_path(
@@ -137,7 +137,7 @@ class SimLine(Wire):
         *,
         latency_s: float,
     ) -> LineFastPath | None:
-        """As ``drivers.bus.fast_path.FastPathPort``; None where a test has put calls in between."""
+        """``drivers.bus.fast_path.FastPathPort``; None if a test has replaced the port's calls."""
         own = self.write, self.read_until, self.clearPort
         if [getattr(each, "__func__", None) for each in own] != _CALLS:
             return None
@@ -150,8 +150,8 @@ class SimLine(Wire):
         ``limit_s``.
 
         Returns:
-            Result of ``drivers.protocol.frames``; ``IRREGULAR`` if ``read_until`` has to read the
-            bytes that arrive.
+            Result of ``drivers.protocol.frames``; ``IRREGULAR`` if ``read_until`` must read the
+            bytes.
 
         """
         sent, read = self._sent, self._group.read_of(request.packet)
@@ -165,7 +165,7 @@ class SimLine(Wire):
         sent.popleft()
         self._arrive(end_s, len(request.packet))
         found = IRREGULAR
-        if self._group.read_of(request.packet) is read:  # nothing has happened to the servos
+        if self._group.read_of(request.packet) is read:  # the servos have not changed
             self._group.measure(read, end_s)
             found = read.decoded(self.bank.table, request, data, error)
         if found == IRREGULAR:
@@ -189,7 +189,6 @@ class SimLine(Wire):
         self._handler.refresh_ids()
 
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
-        """Execute what the host has sent."""
         self._asked = data
         if self._script is None:
             apart = self.tamper is not None or bool(self.taps)

@@ -1,7 +1,7 @@
 """The wire: a half-duplex bus as a byte port that owns simulated time.
 
-A byte lasts ten bit times. An instruction is executed when its last byte has arrived, and replies
-come after the servos' return delays. Written bytes are executed when the host reads, waits, or
+A byte lasts ten bit times. An instruction is executed when its last byte has arrived; replies
+follow after the servos' return delays. Written bytes are executed when the host reads, waits, or
 writes again. Only reads and time-outs move the clock. Implements the SDK's ``PortHandler`` and
 ``drivers.port.byte_port.BytePort``.
 """
@@ -33,7 +33,7 @@ PacketTap = Callable[[float, bool, bytes], None]
 
 
 class Wire(ABC):
-    """A bus without servos: subclasses put servos on it, and reply for them.
+    """A bus without servos: subclasses add servos and their replies.
 
     Reading and writing a closed port raise ``PortError``.
     """
@@ -61,38 +61,38 @@ class Wire(ABC):
 
     @abstractmethod
     def _advance(self, until_s: float) -> None:
-        """Bring servos and physics to a time."""
+        """Advance servos and physics."""
 
     @abstractmethod
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
-        """Execute what the host has sent by ``end_s``; returns the servos' replies."""
+        """Execute the bytes sent by ``end_s``; return the servos' replies."""
 
     @abstractmethod
     def _reset_parser(self) -> None:
-        """Forget a partial packet: the line was quiet, so its rest will not come."""
+        """Drop a partial packet after a silence."""
 
     @abstractmethod
     def _on_baud_change(self, baud: int) -> None:
-        """Adapt to another baud rate of the host."""
+        """Adapt to a new baud rate of the host."""
 
     @abstractmethod
     def _split(self, data: bytes) -> Sequence[bytes]:
-        """Divide one write into packets; each is executed when its own end arrives."""
+        """Divide one write into packets; each is executed at its own end."""
 
     # faults
 
     def attach(self, script: FaultScript) -> None:
-        """Let a fault file act on this line from now on."""
+        """Apply a fault file to this line."""
         self._script = script
 
     def _instruction_with_faults(self, data: bytes, now_s: float) -> Sequence[bytes]:
-        """Packets that the servos receive of one instruction that ends at ``now_s``."""
+        """Packets that the servos receive from one instruction ending at ``now_s``."""
         if self._script is None or not self._script.noise.any:
             return (data,)
         return self._script.noise.instruction(data, now_s)
 
     def _reply_with_faults(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
-        """Packets that arrive of a reply that begins at ``now_s``, and by how much each is late."""
+        """Packets that arrive from a reply beginning at ``now_s``, and their delays."""
         if self._script is None or not self._script.noise.any:
             return ((0.0, data),)
         return self._script.noise.reply(data, now_s)
@@ -108,7 +108,7 @@ class Wire(ABC):
         self.is_open = False
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Retune the host's side; servos at another rate no longer receive."""
+        """Set the host's baud rate; servos at another rate receive nothing."""
         self._baud = baudrate
         self._byte_s = self._rx_queue.byte_s = BITS_PER_BYTE / baudrate
         self.tx_time_per_byte = self._byte_s * 1e3
@@ -119,7 +119,7 @@ class Wire(ABC):
         return self._baud
 
     def clearPort(self) -> None:
-        """Drop what has arrived by now; bytes still under way will arrive all the same."""
+        """Drop arrived bytes; bytes under way still arrive."""
         now_s = self.clock.now_s()
         if self._sent:
             self._deliver(now_s)
@@ -127,7 +127,6 @@ class Wire(ABC):
             self._rx_queue.take(1 << 30, now_s)
 
     def getBytesAvailable(self) -> int:
-        """Bytes that have arrived by now."""
         if not (self._sent or self._rx_queue.packets):
             return 0
         now_s = self.clock.now_s()
@@ -135,7 +134,7 @@ class Wire(ABC):
         return self._rx_queue.count(now_s)
 
     def writePort(self, packet: bytes | list[int]) -> int:
-        """As ``write``; the number of bytes taken."""
+        """As ``write``; return the number of bytes."""
         data = bytes(packet)
         self.write(data)
         return len(data)
@@ -150,18 +149,16 @@ class Wire(ABC):
         self.setPacketTimeoutMillis(wait_s * 1e3)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Time-out from now, milliseconds."""
         self._deadline_s = self.clock.now_s() + msec * 1e-3
 
     def isPacketTimeout(self) -> bool:
-        """Whether the time-out has passed."""
         return self.clock.now_s() >= self._deadline_s
 
     # the same, in seconds
 
     @property
     def paced(self) -> bool:
-        """Whether bytes need the time of the baud rate; always true."""
+        """Whether bytes need the time of the baud rate: always."""
         return True
 
     @property
@@ -170,7 +167,7 @@ class Wire(ABC):
         return "simulated line"
 
     def write(self, data: bytes) -> None:
-        """Send bytes behind those already on the wire; returns at once."""
+        """Send bytes after those already on the wire; returns at once."""
         if self._script is not None or not self.is_open:
             self._resume_host()
         start_s = max(self.clock.now_s(), self._sent_until_s)
@@ -183,13 +180,13 @@ class Wire(ABC):
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing but the servos can change what is on the wire, and nobody listens."""
+        """Whether only the servos change the bytes, without taps."""
         return self.is_open and self._script is None and not self.taps
 
     def begin(self, packet: bytes) -> bool:
-        """As ``clearPort`` and ``write``, of one packet on a line that carries nothing else.
+        """As ``clearPort`` and ``write`` of one packet on an idle line.
 
-        False where both must be called: nothing was sent.
+        Returns False, without sending, if both must be called.
         """
         if not self.is_plain or self._rx_queue.packets:
             return False
@@ -222,7 +219,7 @@ class Wire(ABC):
         return rx_queue.take(count, clock.now_s())
 
     def drain_until_quiet(self, quiet_s: float) -> int:
-        """Discard bytes until none has come for ``quiet_s``, for a limited time; their number."""
+        """Discard bytes until none has come for ``quiet_s``, for a limited time; count them."""
         discarded, seen_s = 0, self.clock.now_s()
         limit_s = seen_s + quiet_s + DRAIN_LIMIT_S
         while True:
@@ -235,12 +232,12 @@ class Wire(ABC):
     # the wire
 
     def disconnect(self) -> None:
-        """Disconnect the port: reading and writing fail until it is back and opened again."""
+        """Disconnect the port: reading and writing fail until it is back and reopened."""
         self._disconnected, self.is_open = True, False
         self._rx_queue.clear()
 
     def reconnect(self) -> None:
-        """Give the port back; the host still has to open it."""
+        """Reconnect the port; the host must open it."""
         self._disconnected = False
 
     @property
@@ -249,7 +246,7 @@ class Wire(ABC):
         return self._disconnected
 
     def _resume_host(self) -> None:
-        """Wait until a paused host goes on, and check that the port is open."""
+        """Wait until a paused host continues, and check that the port is open."""
         if self._script is not None:
             self.clock.sleep_until_s(self._script.host_resumes_s(self.clock.now_s()))
         self._must_be_open()
@@ -263,18 +260,18 @@ class Wire(ABC):
             raise PortError(f"{self.name}: the port is closed")
 
     def settle(self) -> None:
-        """Bring servos and physics to the clock's present time."""
+        """Advance servos and physics to the clock's time."""
         now_s = self.clock.now_s()
         self._deliver(now_s)
         self._advance(now_s)
 
     def next_event_s(self) -> float | None:
-        """When the next packet ends or the next byte arrives; None while nothing is under way."""
+        """Time of the next packet end or byte arrival, or None."""
         times = [self._rx_queue.due_s(1), self._sent[0][0] if self._sent else None]
         return min((time_s for time_s in times if time_s is not None), default=None)
 
     def _transmit(self, start_s: float, packets: Iterable[bytes], *, arrives: bool) -> None:
-        """Put packets on the wire, back to back from ``start_s`` on."""
+        """Put packets on the wire, back to back from ``start_s``."""
         end_s = start_s
         for packet in packets:
             end_s += len(packet) * self._byte_s
@@ -284,7 +281,7 @@ class Wire(ABC):
         self._sent_until_s = end_s
 
     def _deliver(self, until_s: float) -> None:
-        """Deliver to the servos the packets whose last byte has arrived by ``until_s``."""
+        """Deliver packets that have fully arrived by ``until_s`` to the servos."""
         sent = self._sent
         while sent and sent[0][0] <= until_s + INSTANT_S:
             end_s, data = sent.popleft()
@@ -301,7 +298,7 @@ class Wire(ABC):
             self._send_replies(end_s, replies)
 
     def _arrive(self, end_s: float, count: int) -> None:
-        """Bring the servos to the end of a packet of ``count`` bytes."""
+        """Advance the servos to the end of a packet of ``count`` bytes."""
         self._advance(end_s)
         if end_s - count * self._byte_s > self._delivered_s + GAP_S:
             self._reset_parser()
@@ -319,7 +316,7 @@ class Wire(ABC):
             self._quiet_s = time_s
 
     def _cut_replies(self, start_s: float) -> None:
-        """Host and servos send at once: the rest of the replies is lost, and so is the packet."""
+        """Host and servos send at once: the packet and the rest of the replies are lost."""
         self.collisions += 1
         self._rx_queue.cut(start_s)
         self._quiet_s = start_s

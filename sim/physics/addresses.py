@@ -1,4 +1,4 @@
-"""Addresses, and what compiled loops do with them: pointers, calls of C functions, copies."""
+"""Operations on addresses for compiled loops: pointers, calls of C functions, copies."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def _pointer(typing: Any, address: Any) -> Any:
 
 
 def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
-    """Call ``void function(void*, void*)`` by its address: the caller stays cacheable."""
+    """Call ``void function(void*, void*)`` by its address, so the caller stays cacheable."""
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.VoidType(), [voidptr_t, voidptr_t])
@@ -30,7 +30,7 @@ def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
 
 
 def _call_with(typing: Any, function: Any, model: Any, data: Any, third: Any) -> Any:
-    """Call ``int function(void*, void*, void*)`` likewise."""
+    """Call ``int function(void*, void*, void*)`` by its address."""
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [voidptr_t, voidptr_t, voidptr_t])

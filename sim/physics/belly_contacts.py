@@ -1,9 +1,9 @@
-"""Belly contacts: where bellies meet the ground, found and written into MuJoCo's list of contacts.
+"""Belly contacts with the ground, found and written into MuJoCo's list of contacts.
 
-MuJoCo looks for contacts among all geoms, bodies that may touch each other first. On a chain nearly
-all of that is known: which belly meets which plane, with which parameters. Depth, place and normal
-are computed here as MuJoCo does, to the bit. Where links come near each other, MuJoCo looks for the
-contacts itself; so it does for whatever meets more than its ground, such as feet and obstacles.
+MuJoCo searches contacts among all geoms. On a chain the belly, plane and parameters of nearly every
+contact are known. Depth, place and normal are computed here, bit-identical to MuJoCo. MuJoCo still
+searches when links come near each other, and for models with other contacts, such as feet and
+obstacles.
 """
 
 import copy
@@ -44,7 +44,7 @@ class BellyContacts:
 
     @classmethod
     def of(cls, mechanics: Mechanics, layout: StepLayout) -> "BellyContacts | None":
-        """Read the constants from MuJoCo; None if more than bellies meets more than ground."""
+        """Read the constants from MuJoCo; None for models with other contacts."""
         model, planes = mechanics.model, mechanics.planes
         bellies = np.array([model.geom(k).name.startswith("belly") for k in range(model.ngeom)])
         known = bellies | (mechanics.contact_role == GROUND)
@@ -80,7 +80,7 @@ NO_CONTACTS = BellyContacts(
 def _sunk(
     model: mujoco.MjModel, planes: TangentPlanes, bellies: NDArray[np.bool_]
 ) -> mujoco.MjData:
-    """A body that lies straight, a little deep in its ground: it has all its contacts."""
+    """A straight body, slightly sunk into its ground: it has all its contacts."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     if len(planes.planes):
@@ -100,7 +100,7 @@ def _sunk(
 
 
 def _reach_m2(model: mujoco.MjModel, bellies: NDArray[np.bool_]) -> Floats:
-    """``BellyContacts.reach_m2``, of pairs that MuJoCo lets touch each other."""
+    """``BellyContacts.reach_m2``, for pairs that may touch in MuJoCo."""
     reach_m = np.zeros(model.nbody)
     for geom in np.flatnonzero(bellies):
         body = int(model.geom_bodyid[geom])
@@ -151,26 +151,24 @@ def write_contacts(
     plane_axes: Floats,
     held: NDArray[np.int64],
 ) -> int:
-    """Write all present contacts in sequence; returns their number, -1 for MuJoCo's own method.
+    """Write all present contacts in sequence; returns their number, -1 for MuJoCo's own search.
 
-    Their frames get the normal alone: without friction nobody reads the rest.
+    Their frames get the normal only: without friction the rest is unused.
 
     Args:
         reals: space for all contacts, as numbers.
-        at: where in a contact stand distance, place and normal, in words; begin
-            and end of the words that stay as they are: contacts without friction do not use them.
-        words: of ``BellyContacts``, and the two below.
-        geoms: likewise.
-        shapes_m: likewise.
+        at: offsets in words of distance, place and normal; begin and end of the unused words.
+        words: of ``BellyContacts``.
+        geoms: of ``BellyContacts``.
+        shapes_m: of ``BellyContacts``.
         place_m: (geoms, 3) centres.
         axes: (geoms, 9) rows of their matrices.
         plane_m: (geoms, 3) points of the planes.
-        plane_quat: (geoms, 4) how they lie, if they were just laid; else that is in ``axes``.
-        turn: address of ``mju_quat2Mat`` if they were just laid, else 0. Its last bits differ
-            between versions of MuJoCo.
+        plane_quat: (geoms, 4) their orientations, if they were just laid; else in ``axes``.
+        turn: address of ``mju_quat2Mat`` if they were just laid, else 0. Its last bits depend on
+            the version of MuJoCo.
         plane_axes: (9,) overwritten.
-        held: (C,) whose constants stand at each place of the list already, from the step before;
-            -1 for none.
+        held: (C,) contacts whose constants are already at each place of the list; -1 for none.
 
     """
     size, found = words.shape[1], 0
@@ -194,7 +192,7 @@ def write_contacts(
             continue
         dist = away - radius
         if dist >= margin:
-            return -1  # it touches and bears nothing: in MuJoCo's list, with a mark
+            return -1  # it touches without load: MuJoCo lists it with a mark
         base = size * found
         if held[found] != c:
             held[found] = c
@@ -211,5 +209,5 @@ def write_contacts(
         reals[base + at_normal + 1] = n1 * length
         reals[base + at_normal + 2] = n2 * length
         found += 1
-    held[found:] = -1  # entries behind the contacts are overwritten
+    held[found:] = -1  # entries after the contacts are overwritten
     return found

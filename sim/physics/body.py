@@ -1,11 +1,11 @@
 """The robot and its ground as a MuJoCo model.
 
-MuJoCo's order of bodies and joints is ours: the head floats, the other links follow, then the legs.
-A leg touches the ground only with its foot, a ball under MuJoCo's own friction. A link touches it
-with its belly: a capsule, a ball, or two capsules as rails. On a height field each capsule is two
-balls with tangent planes (``sim.physics.tangent_planes``). These contacts are frictionless
-(``condim`` 1), and ``sim.physics.friction`` adds friction. Links that are not neighbours touch each
-other, without friction.
+MuJoCo's order of bodies and joints is ours: the head floats, then links, then legs. A leg touches
+the ground only with its foot, a ball with MuJoCo's own friction. A link touches it with its belly:
+a capsule, a ball, or two capsules as rails. On a height field each capsule becomes balls with
+tangent planes (``sim.physics.tangent_planes``). Belly contacts are frictionless (``condim`` 1);
+``sim.physics.friction`` adds friction. Links that are not neighbours touch each other without
+friction.
 """
 
 import math
@@ -54,7 +54,7 @@ def build_model(
 
 
 def _planes(bodies: str, soft: str) -> tuple[str, str]:
-    """Tangent planes for bellies and feet on a height field: their geoms and pairs."""
+    """Geoms and pairs of tangent planes for bellies and feet on a height field."""
     geoms = pairs = ""
     for name, rest in re.findall(r'<geom name="((?:belly|foot)[^"]*)"([^>]*)/>', bodies):
         foot = re.search(r'condim="(\d)".*friction="(\S*)', rest)
@@ -75,16 +75,15 @@ def straight_part_m(length_m: float, radius_m: float) -> float:
     """Length of the straight part of a link's capsule belly.
 
     On a plane a capsule has two contacts, at the ends of this part. At ``length / sqrt(3)`` they
-    are the Gauss points of an even load. It is longer for a slender link, so that notches stay
-    shallow.
+    are the Gauss points of an even load. Slender links have a longer part for shallow notches.
     """
     return max(length_m / math.sqrt(3.0), length_m - 2.0 * NOTCH * radius_m)
 
 
 def belly_points_m(robot: RobotConfig, link: int) -> Floats:
-    """(C, P, 3) centres, about a link's, of P balls in a row in each of its C capsules.
+    """(C, P, 3) centres, relative to a link's, of P balls in each of its C capsules.
 
-    More than two only if the notches would be deeper than 0.3 of the radius. C is 0 for a link
+    P exceeds 2 only if the notches would be deeper than 0.3 of the radius. C is 0 for a link
     without a belly.
     """
     shape, radius_m = robot.link_shapes[link], robot.link_radii_m[link]
@@ -101,10 +100,9 @@ def belly_points_m(robot: RobotConfig, link: int) -> Floats:
 
 
 def overlapping_links(robot: RobotConfig) -> list[tuple[int, int]]:
-    """Pairs of links, not neighbours, that overlap as the body lies straight.
+    """Pairs of links, not neighbours, that overlap in the straight body.
 
-    Links with only links of length zero between them also count as neighbours: they are neighbours
-    at two axes.
+    Links separated only by links of length zero count as neighbours, at two axes.
     """
     ends, mean_m = robot.link_ends, robot.mean_link_length_m
     lengths_m, radii_m, shapes = robot.link_lengths_m, robot.link_radii_m, robot.link_shapes
@@ -123,7 +121,7 @@ def overlapping_links(robot: RobotConfig) -> list[tuple[int, int]]:
 
 
 def load_fault(text: str) -> str | None:
-    """Return why the installed MuJoCo cannot load a model; None if it can."""
+    """Return why the installed MuJoCo cannot load a model, or None."""
     try:
         mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
@@ -132,7 +130,7 @@ def load_fault(text: str) -> str | None:
 
 
 def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
-    """Fill in the elevations, which the text leaves out, and make all links equally soft.
+    """Fill in the elevations and make all links equally soft.
 
     In MuJoCo a contact is softer if its body moves more easily. The ends of a flat chain would
     carry 0.5 of their weight and the middle 1.5: 14 % of speed under isotropic friction.
@@ -147,7 +145,7 @@ def finish(model: mujoco.MjModel, ground: HeightField | None) -> mujoco.MjModel:
 
 
 def _is_between_axes(model: mujoco.MjModel, body: int) -> bool:
-    """Whether a body's joint and that of the body behind it are at one place: no length."""
+    """Whether a body has no length: its joint and the next one coincide."""
     behind = np.flatnonzero(model.body_parentid == body)
     first = body > 1 and bool(model.body_jntnum[body])
     return first and any(not model.body_pos[k].any() for k in behind)
@@ -161,9 +159,9 @@ def mjcf(
     *,
     planes: bool = False,
 ) -> str:
-    """Write the model as MJCF text; ``finish`` fills in the samples of a height field.
+    """Write the model as MJCF text; ``finish`` fills in a height field's samples.
 
-    With ``planes``, tangent planes carry bellies and feet in place of a height field.
+    With ``planes``, tangent planes replace a height field for bellies and feet.
     """
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
     held = f'solreffriction="{2.0 * step_s} 1" solimpfriction="{GEAR_IMPEDANCE} 0.001"'
@@ -171,7 +169,7 @@ def mjcf(
     asset, floor = _ground(world, ground, touches=not by_planes)
     options, obstacle = obstacle_mjcf(world)
     if robot.limbs:
-        options = ' cone="elliptic" impratio="10"'  # as an obstacle's: for friction that holds
+        options = ' cone="elliptic" impratio="10"'  # as for an obstacle: for friction that holds
     overlapping = "".join(
         f'<exclude body1="link{i}" body2="link{j}"/>' for i, j in overlapping_links(robot)
     )
@@ -221,12 +219,12 @@ def _levels(ground: HeightField) -> tuple[float, float]:
 
 
 def _link(robot: RobotConfig, index: int, *, balls: bool) -> str:
-    """Inertia of a cylinder; the frame of the head is its centre, of others their front joint."""
+    """Inertia of a cylinder; the head's frame is its centre, others' their front joint."""
     m, r = robot.link_masses_kg[index], robot.link_radii_m[index]
     length = robot.link_lengths_m[index]
     centre = f"{0.0 if index == 0 else -length / 2!r} 0 0"
     across = m * (3 * r**2 + length**2) / 12
-    mast = 0.0  # its mass is in the link's; here is what its height adds to the inertia
+    mast = 0.0  # its mass is in the link's; here its height adds to the inertia
     if robot.stereo_head is not None and robot.stereo_head.link == index:
         mast = robot.stereo_head.mass_kg * robot.stereo_head.height_m**2
     about = " ".join(repr(each) for each in (m * r**2 / 2 + mast, across + mast, across))
@@ -268,7 +266,7 @@ def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
 
 
 def _limbs(robot: RobotConfig, link: int) -> str:
-    """Legs at a link of the spine, behind the rest of the spine in MuJoCo's order, depth first."""
+    """Legs at a link of the spine, after the rest of the spine in MuJoCo's order, depth first."""
     text, start = "", robot.link_count
     for pair in robot.limbs:
         count = len(pair.joint_axes)
@@ -282,7 +280,7 @@ def _limbs(robot: RobotConfig, link: int) -> str:
 
 
 def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str:
-    """One leg, ``side`` 1 to the left; its segments are thin rods, its foot a ball at the end."""
+    """One leg, ``side`` 1 to the left; segments are thin rods, the foot a ball at the end."""
     text, limits = "", robot.limit_rad
     for k in reversed(range(len(pair.joint_axes))):
         name = robot.joint_names[first + k - 1]

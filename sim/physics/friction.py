@@ -1,10 +1,10 @@
 """Coulomb's ellipse: little friction along a link, much across it.
 
-The ellipse has the half axes ``mu_along N`` and ``mu_across N``. For a sliding velocity (v_a, v_c),
-maximum dissipation gives the force ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge* ``s =
-hypot(mu_a v_a, mu_c v_c)``. If friction backward differs, the forces fill two half ellipses with
-one axis across. Near rest each component is limited to a share of the force that would stop the
-link within the step.
+The half axes are ``mu_along N`` and ``mu_across N``. For a sliding velocity (v_a, v_c), maximum
+dissipation gives the force ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge* ``s = hypot(mu_a
+v_a, mu_c v_c)``. If friction backward differs, the forces fill two half ellipses with one axis
+across. Near rest each component is limited to a share of the force that would stop the link within
+the step.
 """
 
 import math
@@ -37,11 +37,10 @@ effect."""
 def stop_share(centre_m: Floats, radius_m: float) -> float:
     """Share of a link's momentum that friction may remove in a step, by their centres (L, 3).
 
-    Times its mass over the step this is the drag that stops the link, N s/m.
-
+    Times mass over step it is the drag that stops the link, N s/m.
     A straight body can also roll, so the effective mass at a contact is a third of the link's (``1
     + r^2 / (r^2 / 2)``, solid cylinder). In a bent body the mean square distance of the links from
-    its axis, seen from above, adds to the ``r^2 / 2``.
+    its axis, seen from above, adds to ``r^2 / 2``.
     """
     links = len(centre_m)
     x = y = xx = xy = yy = 0.0
@@ -70,9 +69,8 @@ def ellipse_force(
 ) -> tuple[float, float]:
     """Force along and across a link at one contact, N.
 
-    ``mu`` are the coefficients of sliding forward, across and back;
-    ``still_n_s_m`` is the drag that stops a link, see ``stop_share``;
-    ``link_normal_n`` the sum of the normal forces of the link's contacts, which share it.
+    ``mu`` are the coefficients forward, across and back; ``still_n_s_m`` the drag that stops a
+    link, see ``stop_share``; ``link_normal_n`` the sum of the link's normal forces.
     """
     mu_forward, mu_across, mu_back = mu
     mu_along = mu_forward if along_m_s >= 0.0 else mu_back
@@ -90,16 +88,16 @@ def ellipse_force(
 
 
 def make_lanes(contacts: int) -> tuple[Floats, NDArray[np.int64]]:
-    """Make a table for a number of contacts side by side, and the link of each."""
+    """Make a table for a number of contacts, and the link of each."""
     groups = (contacts + LANES - 1) // LANES
     return np.zeros(groups * ROWS), np.zeros(groups * LANES, np.int64)
 
 
 def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
-    """Write the friction of contacts side by side; they share a link's load by their depths.
+    """Write the friction of contacts; those of a link share its load by depth.
 
-    Contact ``k`` has its number of the row that begins at ``ROW`` at
-    ``k // LANES * ROWS + ROW + k % LANES``. Places beyond the last contact come to mean nothing.
+    Contact ``k`` has its value of the row at ``ROW`` at ``k // LANES * ROWS + ROW + k % LANES``.
+    Places after the last contact become meaningless.
     """
     for group in range((contacts + LANES - 1) // LANES):
         lane = table[group * ROWS : (group + 1) * ROWS]

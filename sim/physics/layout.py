@@ -1,7 +1,7 @@
 """The private interface of MuJoCo: the memory of ``mjData`` and C functions by address.
 
 The arrays of ``mjData`` never move, except those of the contact solver. The offsets come from the
-description of the C structures in the mujoco package. ``step_layout`` checks them once per process.
+structure descriptions in the mujoco package. ``step_layout`` checks them once per process.
 """
 
 import contextlib
@@ -54,7 +54,7 @@ class StepLayout:
         return len(self.functions) == len(FUNCTIONS)
 
     def fields(self, model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, int]:
-        """Return the fields of a ``step_memory.STEP_MEMORY`` that concern MuJoCo's memory."""
+        """Return the ``STEP_MEMORY`` fields of MuJoCo's memory."""
         return {
             "model_at": model._address,
             "data_at": data._address,
@@ -74,8 +74,8 @@ class StepLayout:
 def step_layout() -> StepLayout | str:
     """Return the layout of this MuJoCo, or the reason why it cannot be used.
 
-    It is checked on a ball on a floor: addresses against those that MuJoCo's Python objects show,
-    and a step by parts, with a contact written in place, against ``mj_step``.
+    It is checked on a ball on a floor: addresses against MuJoCo's Python objects, and a step by
+    parts, with a contact written in place, against ``mj_step``.
     """
     if is_forced("mujoco"):
         return "the environment asks for it"
@@ -93,7 +93,7 @@ def step_layout() -> StepLayout | str:
 
 
 def _described() -> tuple[StepLayout, dict[str, int]]:
-    """Return the layout that MuJoCo describes, and offsets in ``mjData`` of two arrays."""
+    """Return the layout that MuJoCo describes, and ``mjData`` offsets of two arrays."""
     data, contact = _structure("mjData"), _structure("mjContact")
     hessian = contact.H.offset // _WORD
     fields = {
@@ -115,7 +115,7 @@ def _described() -> tuple[StepLayout, dict[str, int]]:
 
 
 def _structure(name: str) -> Any:
-    """Return a structure of MuJoCo as one of ctypes."""
+    """Return a structure of MuJoCo as a ctypes structure."""
     ast_nodes, structs = _introspection()
     fields = []
     for member in structs.STRUCTS[name].fields:
@@ -145,7 +145,7 @@ def _ctype(kind: object) -> Any:
 
 
 def _addresses(functions: Iterable[str]) -> dict[str, int]:
-    """Find C functions in the library that the Python module itself is linked to."""
+    """Find C functions in the library of the Python module."""
     library = ctypes.CDLL(mujoco._functions.__file__)
     found = {name: ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in functions}
     return {name: address for name, address in found.items() if address}
@@ -157,7 +157,7 @@ def _ball() -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
-    """Whether numbers and addresses in memory are those of MuJoCo's Python objects."""
+    """Whether memory matches MuJoCo's Python objects."""
     model, data = _ball()
     mujoco.mj_step(model, data)
 
@@ -186,7 +186,7 @@ def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
 
 
 def _steps_by_parts(layout: StepLayout) -> bool:
-    """Whether steps by parts, with their contact written in place, are ``mj_step`` to the bit."""
+    """Whether steps by parts, with a contact written in place, equal ``mj_step`` to the bit."""
     model, whole = _ball()
     _, parts = _ball()
     part, add = ctypes.CFUNCTYPE(None, *_POINTERS[:2]), ctypes.CFUNCTYPE(ctypes.c_int, *_POINTERS)

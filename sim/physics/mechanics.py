@@ -25,14 +25,14 @@ it knows no direction. Everything else is 0: bellies, obstacles."""
 
 
 class PhysicsError(RuntimeError):
-    """The physics cannot go on: its state diverged, or this MuJoCo is not the one it knows."""
+    """The physics cannot continue: its state diverged, or this MuJoCo is unknown."""
 
 
 @dataclass(slots=True)
 class Mechanics:
     """One robot's model and data; link i is body ``1 + i``, joint j has position ``7 + j``.
 
-    The links of the spine come first, then those of the legs.
+    Links of the spine come first, then those of the legs.
     """
 
     model: mujoco.MjModel
@@ -71,7 +71,7 @@ class Mechanics:
         world: WorldConfig,
         ground: HeightField | None,
     ) -> "Mechanics":
-        """Gather what the steps need."""
+        """Collect the data of the steps."""
         mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
@@ -100,7 +100,7 @@ class Mechanics:
         return float(self.model.opt.timestep)
 
     def start_at_rest(self) -> None:
-        """Set up the memory for a state that was set, not stepped to, after ``mj_forward``."""
+        """Initialise the memory after ``mj_forward`` for a state that was set."""
         self.model.dof_frictionloss[:] = 0.0  # it grows with torques, which are still zero
         self.rotor[:] = 0.0
         loose = np.flatnonzero(self.gears[BACKLASH] > 0.0)
@@ -118,7 +118,7 @@ class Mechanics:
 
 
 def foot_geoms(model: mujoco.MjModel, robot: RobotConfig) -> list[int]:
-    """Geoms of the feet, in the order of the legs' joints; none of a snake."""
+    """Geoms of the feet, in the order of the legs' joints."""
     return [
         model.geom(f"foot{robot.link_count + k}").id
         for k, joint in enumerate(robot.limb_joints)
@@ -127,7 +127,7 @@ def foot_geoms(model: mujoco.MjModel, robot: RobotConfig) -> list[int]:
 
 
 def velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Floats, Floats]:
-    """Velocity of the links' centres and their spins, world frame, (L, 3) each."""
+    """Velocities of the links' centres and their spins, world frame, (L, 3) each."""
     centre, anchor = data.xipos[1:], data.xanchor
     velocity, spin = np.empty_like(centre), np.empty_like(centre)
     velocity[0], spin[0] = data.qvel[:3], data.xmat[1].reshape(3, 3) @ data.qvel[3:6]

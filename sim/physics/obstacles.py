@@ -1,4 +1,4 @@
-"""Pole, pipe, pegs and walls in the model, and how a coiled body is put at the first two.
+"""Pole, pipe, pegs and walls in the model, and the placing of a coil at pole and pipe.
 
 Bodies touch them with MuJoCo's own isotropic friction (``condim`` 3).
 """
@@ -53,9 +53,9 @@ def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
 
 
 def start_fault(m: Mechanics, world: WorldConfig) -> str | None:
-    """Why a body that has been placed cannot start: it is in a peg or wall; None if it can.
+    """Why a placed body cannot start, because it is in a peg or wall; or None.
 
-    A coil that is put at a pole or in a pipe touches it on purpose.
+    A coil at a pole or in a pipe touches it on purpose.
     """
     contact = m.data.contact
     if not isinstance(world.obstacle, PegsObstacle | CorridorObstacle):
@@ -77,8 +77,8 @@ def place_at_obstacle(
 ) -> bool:
     """Place a coiled body round the world's pole, or any body in its pipe, head up, at rest.
 
-    The coil is opened or closed until it just touches. Returns False, and does nothing, without
-    pole and pipe, or with a pole and no coil.
+    The coil is opened or closed until it just touches. Returns False, without effect, for other
+    worlds, or for a pole and no coil.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
@@ -112,7 +112,7 @@ def place_at_obstacle(
 
 
 def _links_m(m: Mechanics, joint_rad: Floats) -> Floats:
-    """(L, 3) centres of the links, the head at 0 along x."""
+    """(L, 3) centres of the links with the head at 0 along x."""
     m.data.qpos[:7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     m.data.qpos[7:] = joint_rad
     mujoco.mj_kinematics(m.model, m.data)
@@ -141,7 +141,7 @@ def _touching(
 
 
 def _rotation(line: Floats, up: Floats, about_rad: float) -> Floats:
-    """(3, 3) that turns unit ``line`` to ``up``, then about it."""
+    """(3, 3) rotation of unit ``line`` to ``up``, then about it."""
     cross, dot = np.cross(line, up), float(line @ up)
     if dot < -1.0 + 1e-9:
         side = np.linalg.svd(up[None])[2][1]
@@ -160,7 +160,7 @@ def _skew(v: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Coil:
-    """A cylinder through the links of a body."""
+    """Cylinder through the links of a body."""
 
     axis: Floats
     """(3,) unit, from tail to head."""
@@ -173,7 +173,7 @@ class Coil:
 
 
 def fit_coil(links_m: Floats) -> Coil:
-    """Cylinder through points (L, 3) of a helix: least squares on the distances from its axis."""
+    """Cylinder through points (L, 3) of a helix: least squares of the distances from its axis."""
     bends = np.diff(links_m, n=2, axis=0)
     axis = np.linalg.svd(bends)[2][2] if np.abs(bends).max() > 1e-9 else links_m[0] - links_m[-1]
     axis = axis / np.linalg.norm(axis)

@@ -1,4 +1,4 @@
-"""Placing a body on the ground or in water so that it lies still."""
+"""Placing a body on the ground or in water at rest."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -54,11 +54,11 @@ def place(
     heading_rad: float,
     joint_rad: ArrayLike,
 ) -> None:
-    """Place the body with its head above ``start_m``; ends at rest, with its contact forces.
+    """Place the body at rest, its head above ``start_m``, with its contact forces.
 
-    On a height field the pitch joints bend so that the links follow the ground. Then the body is
-    lowered until it touches, and settles with strong damping and constant joints; the head may sink
-    and lean, but not slide or turn.
+    On a height field the pitch joints bend to the ground. Then the body is lowered until it
+    touches, and settles with strong damping and constant joints; the head may sink and lean, but
+    not slide or turn.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
@@ -84,7 +84,7 @@ def lay_down(
     heading_rad: float,
     joint_rad: ArrayLike,
 ) -> None:
-    """Put the body on a level floor, at rest, without settling: a thousandth of a second.
+    """Place the body on a level floor, at rest, without settling, in a millisecond.
 
     Its lowest link touches the floor without load. The time of the data does not change.
 
@@ -111,7 +111,7 @@ def float_at(
     heading_rad: float,
     joint_rad: ArrayLike,
 ) -> bool:
-    """Put a body that water carries at the height where it stays; False where it would touch.
+    """Place a floating body at its height in water; False if it would touch the ground.
 
     Raises:
         ValueError: ``joint_rad`` is not (J,).
@@ -144,9 +144,9 @@ def _pose(
 
 
 def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls) -> None:
-    """Fit height, lean and pitch joints to the ground under the links: Gauss-Newton on clearances.
+    """Fit height, lean and pitch joints to the ground: Gauss-Newton on clearances.
 
-    Clearances are those of the bellies, which bridge a trench and rest on the edge of a step.
+    Clearances are those of the bellies, which bridge a trench and rest on an edge.
     """
     model, data = m.model, m.data
     free = np.array([2, 3, 4, *(6 + j for j in robot.pitch_joints)])
@@ -194,14 +194,14 @@ def _settle(m: Mechanics) -> None:
 def _clearance_m(
     m: Mechanics, robot: RobotConfig, ground: HeightField | None, balls: _Balls
 ) -> Floats:
-    """(L,) height by which each link's belly or foot clears the ground, negative below it.
+    """(L,) height of each link's belly or foot above the ground, negative below it.
 
-    Infinite for links that support nothing: segments of a leg without a foot, links of length zero.
+    Infinite for links without support: leg segments without a foot, links of length zero.
     """
     mujoco.mj_kinematics(m.model, m.data)
     spine, link = robot.link_count, balls.link
     axes = np.asarray(m.data.xmat[1 : 1 + spine]).reshape(-1, 3, 3)
-    # products by hand: BLAS adds in another order on another processor
+    # products by hand: BLAS sums in a processor-dependent order
     centres = m.data.xipos[1 : 1 + spine][link]
     points = centres + balls.along_m * axes[link, :, 0] + balls.aside_m * axes[link, :, 1]
     clear = np.full(m.joint_count + 1, np.inf)

@@ -1,4 +1,4 @@
-"""A ``sim.plant.Plant`` in MuJoCo: the body is placed, stepped and measured here."""
+"""A ``sim.plant.Plant`` in MuJoCo: placing, stepping and measuring a body."""
 
 import math
 from functools import partial
@@ -30,7 +30,7 @@ distance at 2 ms, and 0.1 to 2 % at 1 ms (``python -m benchmarks step_length``).
 
 @compiled("void(float64[::1], float64[:, ::1])", makes_arrays=False)
 def _pose(place: Floats, pose: Floats) -> None:
-    """Place and unit quaternion (7,) to place, and below it the matrix of axes as columns."""
+    """Convert place and unit quaternion (7,) to place, then the matrix of axes as columns."""
     w, x, y, z = place[3], place[4], place[5], place[6]
     pose[0, 0], pose[0, 1], pose[0, 2] = place[0], place[1], place[2]
     pose[1, 0] = w * w + x * x - y * y - z * z
@@ -44,8 +44,7 @@ def _pose(place: Floats, pose: Floats) -> None:
 class MujocoPlant:
     """A chain on its ground; starts straight at the origin, heading along x, at rest.
 
-    With ``is_placed=False`` it is nowhere until ``reset`` or ``set_state``; to lie down on hills
-    needs a quarter of a second.
+    With ``is_placed=False`` it needs ``reset`` or ``set_state``: placing on hills needs 0.25 s.
     """
 
     def __init__(
@@ -82,7 +81,7 @@ class MujocoPlant:
 
     @property
     def time_s(self) -> float:
-        """Whole steps since the last reset, in seconds."""
+        """Seconds of whole steps since the last reset."""
         return self._count * self.step_s
 
     @property
@@ -99,7 +98,7 @@ class MujocoPlant:
         """Step to the last whole step at or before ``until_s``.
 
         Raises:
-            PhysicsError: the state has diverged.
+            PhysicsError: the state diverged.
 
         """
         steps = math.floor(until_s / self.step_s + 1e-6) - self._count
@@ -110,21 +109,21 @@ class MujocoPlant:
             time_s = self.steps.run(steps, drive)
             self._count = count
         except BaseException:
-            # A signal may end it anywhere; on the way out the body is stepped on from there.
+            # A signal may end it anywhere; later steps of the shutdown continue from there.
             self._count = round(self._data.time / self.step_s)
             raise
-        if abs(time_s - count * self.step_s) > 0.5 * self.step_s:  # MuJoCo resets what diverges
+        if abs(time_s - count * self.step_s) > 0.5 * self.step_s:  # MuJoCo resets a diverged state
             raise PhysicsError(
                 f"the physics diverged before {self.time_s:.3f} s; "
                 f"a step of {self.step_s * 1e3:g} ms may be too long for this robot"
             )
 
     def reset(self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike) -> None:
-        """Put the body on the ground, at rest, at time 0.
+        """Place the body on the ground, at rest, at time 0.
 
         Yaw joints start at ``joint_rad`` (J,). Pitch joints start from it and drape over the
-        ground, as those of a robot without power do (on a plane they keep it). A coil goes round a
-        pole, everything into a pipe, and what water carries floats: ``start_m`` is of the floor.
+        ground, like those of an unpowered robot (on a plane they keep it). A coil goes round a
+        pole, everything into a pipe; a floating body floats. ``start_m`` is on the floor.
 
         Raises:
             ValueError: ``joint_rad`` is not (J,).
@@ -139,10 +138,10 @@ class MujocoPlant:
     def lay_down(
         self, start_m: tuple[float, float], heading_rad: float, joint_rad: ArrayLike
     ) -> None:
-        """Put the body elsewhere on its level floor, at rest, between two steps.
+        """Move the body on its level floor, at rest, between two steps.
 
-        It is quick enough for a running control loop, since the body does not settle; time, energy
-        and distance continue.
+        It is quick enough for a running control loop, because the body does not settle. Time,
+        energy and distance continue.
 
         Raises:
             ValueError: ``joint_rad`` is not (J,), or the ground is not a level, open floor.
@@ -153,9 +152,9 @@ class MujocoPlant:
         lay_down(self.mechanics, self.robot, start_m, heading_rad, joint_rad)
 
     def set_state(self, before: Floats, now: Floats, dt_s: float) -> None:
-        """Put it at MuJoCo's coordinates ``now`` (7 + J,), where it came from ``before`` in dt_s.
+        """Set MuJoCo's coordinates ``now`` (7 + J,); the velocity is that from ``before`` in dt_s.
 
-        The loads on the links are those of this state at once; it is time 0.
+        The loads on the links are those of this state; time is 0.
         """
         m, d = self.mechanics, self._data
         mujoco.mj_resetData(m.model, d)
@@ -200,7 +199,7 @@ class MujocoPlant:
         return copy
 
     def link_motion(self, link: int) -> LinkMotion:
-        """Where a link of the spine is now."""
+        """Motion of a link of the spine."""
         m, d = self.mechanics.model, self._data
         mujoco.mj_kinematics(m, d)
         body = m.body(f"link{link}").id
@@ -208,7 +207,7 @@ class MujocoPlant:
 
     @property
     def contact_count(self) -> int:
-        """Links that bear load, of L."""
+        """Number of links that bear load."""
         d = self._data
         row = np.asarray(d.contact.efc_address)
         bears = row >= 0
@@ -237,27 +236,27 @@ class MujocoPlant:
 
     @property
     def friction_loss_j(self) -> float:
-        """Energy that ground friction and water have taken since the reset."""
+        """Energy lost to ground friction and water since the reset."""
         return float(self.mechanics.totals[0])
 
     @property
     def gear_loss_j(self) -> float:
-        """Energy that the drag of the gears has taken since the reset."""
+        """Energy lost to gear drag since the reset."""
         return float(self.mechanics.totals[2])
 
     @property
     def slip_m(self) -> float:
-        """Distance slipped across the links since the reset, mean over all links."""
+        """Mean distance slipped across the links since the reset."""
         return float(self.mechanics.totals[1])
 
     @property
     def qpos(self) -> Floats:
-        """(7 + J,) MuJoCo's present coordinates, a copy: the input of a film."""
+        """(7 + J,) copy of MuJoCo's coordinates, for a film."""
         copy: Floats = self._data.qpos.copy()
         return copy
 
     def _update_kinematics(self) -> None:
-        """Bring positions and axes up to the state: a step leaves those it started from."""
+        """Update positions and axes: a step leaves those of its start."""
         m, d = self.mechanics.model, self._data
         mujoco.mj_kinematics(m, d)
         mujoco.mj_comPos(m, d)
@@ -265,7 +264,7 @@ class MujocoPlant:
 
 
 def plant_imu(robot: RobotConfig, plant: MujocoPlant, baud: int, seed: int = 0) -> Imu | None:
-    """Return the robot's IMU in the body of ``plant``; None where it has none."""
+    """The robot's IMU in the body of ``plant``, or None."""
     if robot.imu is None:
         return None
     return Imu(robot.imu, partial(plant.link_motion, robot.imu.link), baud, seed)

@@ -1,7 +1,7 @@
-"""The steps of a plant through MuJoCo's public interface: slower than the compiled ones, same bits.
+"""The steps of a plant through MuJoCo's public interface: slower than compiled, same bits.
 
-The forces are the compiled ones of ``step_forces``; contacts and constraint forces are copied from
-MuJoCo's arrays in every step.
+``step_forces`` computes the forces; contacts and constraint forces are copied from MuJoCo in every
+step.
 """
 
 import mujoco
@@ -57,7 +57,7 @@ class PublicSteps:
         self._lanes = make_lanes(2 * mechanics.joint_count)
 
     def run(self, steps: int, drive: ServoDrive) -> float:
-        """Advance ``steps`` steps; return MuJoCo's time then."""
+        """Advance ``steps`` steps; return MuJoCo's time."""
         mechanics, data = self._mechanics, self._mechanics.data
         body, shafts = self._body(), Shafts(Motors(*drive.columns()), self._gears, self._work)
         for _ in range(steps):

@@ -1,7 +1,4 @@
-"""Pole, pipe, pegs and walls as the cylinders and boxes of which they are made.
-
-Physics and drawings use the same solids; MuJoCo is not needed for it.
-"""
+"""The cylinders and boxes of poles, pipes, pegs and walls, for physics and drawings."""
 
 import math
 from dataclasses import dataclass
@@ -31,7 +28,7 @@ Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """One part of an obstacle; a cylinder stands along the third of its axes."""
+    """One part of an obstacle; a cylinder's axis is the third of its axes."""
 
     kind: Literal["cylinder", "box"]
     half_m: tuple[float, ...]
@@ -47,7 +44,7 @@ def solids(thing: Obstacle) -> list[Solid]:
     """Parts of an obstacle, in the world."""
     upright = np.eye(3)
     if isinstance(thing, PegsObstacle):
-        # as deep below z = 0 as high above it, so that pegs stand in hollows, too
+        # as deep below z = 0 as high above it, for pegs in hollows
         size = (thing.radius_m, thing.height_m)
         return [
             Solid("cylinder", size, np.array([x, y, 0.0]), upright, WOOD)

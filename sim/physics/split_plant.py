@@ -1,4 +1,4 @@
-"""A body of which some shafts are turned by simulated servos, and the others follow real ones."""
+"""A body with some shafts turned by simulated servos, and the others following real ones."""
 
 from collections.abc import Sequence
 
@@ -20,16 +20,16 @@ _INPUTS = 9
 
 
 class SplitPlant:
-    """The shafts of ``plant`` that simulated servos turn; implements ``sim.plant.Plant``.
+    """The simulated shafts of ``plant``; implements ``sim.plant.Plant``.
 
-    Strong motors move the others to the angles of ``follow``: their weight, contacts and friction
+    Strong motors move the others to the angles of ``follow``. Their weight, contacts and friction
     act on the simulated ones, and nothing acts on the real ones.
     """
 
     def __init__(self, plant: Plant, motors: Sequence[MotorModel], real: Sequence[int]) -> None:
-        """Prepare; the shafts that follow are limp until the first ``follow``.
+        """Prepare; following shafts are limp until the first ``follow``.
 
-        ``plant`` has J shafts; ``real`` are the places of the shafts that follow.
+        ``plant`` has J shafts; ``real`` are the indices of the following ones.
         """
         self._plant = plant
         self._real = np.array(sorted(real), np.intp)
@@ -42,7 +42,7 @@ class SplitPlant:
 
     @property
     def time_s(self) -> float:
-        """Time of the state that the shafts show."""
+        """Time of the shafts' state."""
         return self._plant.time_s
 
     @property
@@ -56,7 +56,7 @@ class SplitPlant:
         return self._plant.velocity_rad_s[self._simulated]
 
     def follow(self, measured_at_s: Floats, position_rad: Floats, velocity_rad_s: Floats) -> None:
-        """Copy the measured positions of the real joints, (J,) each, if they are finite."""
+        """Store the measured positions of the real joints, (J,) each, if finite."""
         known = np.isfinite(position_rad[self._real])
         rows = self._real[known]
         self._measured_at_s[known] = measured_at_s[rows]
@@ -65,7 +65,7 @@ class SplitPlant:
         self._drive.torque_on[rows] = 1.0
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
-        """Step the body under ``drive`` (S,), its other shafts towards where they should be."""
+        """Step the body under ``drive`` (S,), with its other shafts following."""
         whole, rows = self._drive, self._simulated
         for mine, given in zip(whole.columns()[:_INPUTS], drive.columns(), strict=False):
             mine[rows] = given

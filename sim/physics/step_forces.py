@@ -1,14 +1,13 @@
 """Forces of a step: motors, ground friction and water before it, energies and loads after it.
 
 ``apply_forces`` runs between ``mj_step1`` and ``mj_step2``, ``settle`` after them. Friction acts at
-the present contacts under the load of the last step, which the contacts of a link share by depth. A
-link slides at the rate at which it *moved* in the last step. Its generalised velocity is not that
-rate. Euler's step moves the head along its velocity and leaves out the turning of the links within
-the step. This reads as 1 mm/s of phantom motion per millisecond of step, and as a loss of 6 % of
-speed under isotropic friction at 2 ms.
-
-If a robot's file has friction of the gears, MuJoCo holds each joint by the friction that torque and
-load of the last step allow (``dof_frictionloss``: BAM's own simulation does the same).
+the present contacts under the load of the last step, shared by depth.
+A link slides at the rate at which it *moved* in the last step, not at its generalised velocity.
+Euler's step moves the head along its velocity and omits the turning of the links within the step.
+That would give 1 mm/s of phantom motion per millisecond of step, and cost 6 % of speed under
+isotropic friction at 2 ms.
+If a robot's file has gear friction, MuJoCo holds each joint by the friction from torque and load of
+the last step (``dof_frictionloss``: BAM's own simulation does the same).
 """
 
 from numba.extending import register_jitable
@@ -53,7 +52,7 @@ LEAST_FRICTION_N_M = 1e-9
 
 
 def _move(body: Body) -> None:
-    """Rate at which each link's centre moved in the last step, and its spin, from the head on."""
+    """Rate of each link's centre in the last step, and its spin, from the head."""
     centre, rotation, _, axis, parents = body.chain
     v, w, _, _, before, _, _, _ = body.links
     qvel = body.state.qvel
@@ -93,7 +92,7 @@ def _collect(body: Body) -> None:
 
 
 def _line_up(body: Body, contacts: Contacts, still_n_s: float, lanes: Lanes) -> int:
-    """Lay out the contacts of bellies with the ground for ``rub``; return their number.
+    """Arrange the contacts of bellies with the ground for ``rub``; return their number.
 
     Contacts with an obstacle and of a foot have MuJoCo's own friction, those of two links none.
     """
@@ -198,7 +197,7 @@ def apply_forces(body: Body, shafts: Shafts, contacts: Contacts, lanes: Lanes) -
 
 
 def _through_teeth(shafts: Shafts, j: int, pressed_n_m: float, step_s: float) -> float:
-    """Torque on a joint with backlash, of ``pressed_n_m`` while a tooth touches.
+    """Torque on a joint with backlash, ``pressed_n_m`` while a tooth touches.
 
     The rotor in the gap is stepped here. Its momentum reaches the joint in the step after the gap
     has closed, when MuJoCo already counts its inertia.
@@ -219,7 +218,7 @@ def _through_teeth(shafts: Shafts, j: int, pressed_n_m: float, step_s: float) ->
 def _settle_teeth(shafts: Shafts, j: int, rate: float, step_s: float, friction_n_m: float) -> None:
     """Open or close the gap of a joint after a step, at its new ``rate``, rad/s.
 
-    ``friction_n_m`` is the torque of the gears' friction on the joint in the step.
+    ``friction_n_m`` is the gears' friction torque on the joint in the step.
     """
     gear, rotor = shafts.gears.terms[:, j], shafts.gears.rotor[:, j]
     half, inertia = 0.5 * gear[BACKLASH], (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
@@ -242,7 +241,7 @@ def _settle_teeth(shafts: Shafts, j: int, rate: float, step_s: float, friction_n
 
 
 def has_friction(gear: Floats) -> bool:
-    """Whether any gearbox has other friction than a viscous one."""
+    """Whether any gearbox has more than viscous friction."""
     terms = 0.0
     for j in range(gear.shape[1]):
         terms += gear[1, j] + gear[3, j] + gear[5, j] + gear[6, j] + gear[7, j] + gear[8, j]
@@ -270,7 +269,7 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
         has_play = gear[BACKLASH, j] > 0.0
         free = has_play and rotor[SIDE, j] == 0.0
         rate = rotor[SPEED, j] if free else qvel[6 + j]
-        # a force does its work at the mean of the speeds before and after Euler's step
+        # a force works at the mean of the speeds before and after Euler's step
         middle = 0.5 * (speed[j] + rate)
         heat_w = ohm[j] * current[j] * current[j]
         input_w = heat_w + k_e[j] * speed[j] * current[j]
@@ -281,7 +280,7 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
         totals[2] += gear[2, j] * speed[j] * middle * step_s
         held_n_m = 0.0
         if rubs:
-            if friction[6 + j] > 0.0:  # MuJoCo's first constraints are these, in their order
+            if friction[6 + j] > 0.0:  # these are MuJoCo's first constraints, in their order
                 held_n_m = force_n[j]
                 totals[2] -= held_n_m * middle * step_s
             outside_n_m = ground_n_m[j] - bias[6 + j] + constraint[6 + j] - held_n_m

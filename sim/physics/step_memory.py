@@ -1,6 +1,6 @@
-"""Addresses and sizes of everything that the compiled steps use: one record with a name per field.
+"""Addresses and sizes for the compiled steps: one record with a name per field.
 
-Passing forty arrays one by one would need 7 us per call.
+Passing forty arrays separately would need 7 us per call.
 """
 
 from collections.abc import Mapping
@@ -76,7 +76,7 @@ STEP_MEMORY = np.dtype(
 
 
 def addresses(arrays: Mapping[str, NDArray[Any]]) -> dict[str, int]:
-    """Return the fields of ``STEP_MEMORY`` for some of ``ARRAYS``."""
+    """``STEP_MEMORY`` fields of some of ``ARRAYS``."""
     return {f"{name}_at": array.ctypes.data for name, array in arrays.items()}
 
 
@@ -192,7 +192,7 @@ def ground_at(m: Any) -> tuple[Any, ...]:
 
 
 def contact_fields_at(m: Any) -> ContactFields:
-    """Return where a contact's fields are (compiled code only)."""
+    """Return the offsets of a contact's fields (compiled code only)."""
     return ContactFields(
         m.contact_size // 8,
         m.contact_dist // 8,

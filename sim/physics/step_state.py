@@ -20,7 +20,7 @@ class State(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """Where the B bodies are: row 0 is the world, row 1 + i is link i."""
+    """Poses of the B bodies: row 0 is the world, row 1 + i is link i."""
 
     centre: Floats
     """(B, 3) centres of mass."""
@@ -128,7 +128,7 @@ class Shafts(NamedTuple):
 
 
 class ContactFields(NamedTuple):
-    """Places of a contact's fields: in words of eight bytes, the last two in words of four."""
+    """Offsets of a contact's fields: in words of eight bytes, the last two in words of four."""
 
     size: int
     dist: int
@@ -139,7 +139,7 @@ class ContactFields(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """The present contacts, as numbers and, in the same memory, as integers."""
+    """The present contacts as numbers and, in the same memory, as integers."""
 
     reals: Floats
     integers: NDArray[np.int32]

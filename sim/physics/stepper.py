@@ -1,11 +1,10 @@
-"""The steps of a plant without Python between them: drive, friction and MuJoCo's step, compiled.
+"""The compiled steps of a plant: drive, friction and MuJoCo's step without Python.
 
-``mj_step1`` and ``mj_step2`` are called by address, with ``step_forces`` between them. If nothing
-but bellies can touch nothing but ground, ``mj_step1`` is called by parts, around contacts that
+``mj_step1`` and ``mj_step2`` are called by address, with ``step_forces`` between them. If only
+bellies can touch the ground, ``mj_step1`` is called by parts, around contacts that
 ``sim.physics.belly_contacts`` writes: the same bits in less time.
-
-MuJoCo's memory layout is not a public interface. ``sim.physics.layout`` checks it; if the check
-fails, ``make_steps`` returns the slower ``PublicSteps``, with the same bits.
+MuJoCo's memory layout is not a public interface. If the check of ``sim.physics.layout`` fails,
+``make_steps`` returns the slower ``PublicSteps``, with the same bits.
 """
 
 from typing import Any, Protocol
@@ -54,12 +53,12 @@ class Steps(Protocol):
     """Drive, friction and ``mj_step``, a number of times."""
 
     def run(self, steps: int, drive: ServoDrive) -> float:
-        """Advance ``steps`` steps; return MuJoCo's time then."""
+        """Advance ``steps`` steps; return MuJoCo's time."""
         ...
 
 
 def make_steps(mechanics: Mechanics) -> Steps:
-    """Return the compiled steps, or the public ones if this MuJoCo's memory is not as expected."""
+    """Return the compiled steps, or the public ones if the memory layout is unexpected."""
     layout = step_layout()
     if isinstance(layout, StepLayout):
         return CompiledSteps(mechanics, layout)
@@ -72,7 +71,7 @@ def make_steps(mechanics: Mechanics) -> Steps:
 
 
 def _bellies_at(m: Any) -> tuple[Any, ...]:
-    """Return what the arguments of ``write_contacts`` are made of, and of ``links_near``."""
+    """Return arrays for ``write_contacts`` and ``links_near``."""
     contacts, bodies = m.count_contacts, m.count_bodies
     return (
         carray(pointer(m.belly_words_at), (contacts, m.count_words), np.int64),
@@ -87,7 +86,7 @@ def _bellies_at(m: Any) -> tuple[Any, ...]:
 
 
 def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, ...]) -> int:
-    """Write the contacts of the bellies; return their number, -1 if MuJoCo has to find them."""
+    """Write the contacts of the bellies; return their number, -1 if MuJoCo must search."""
     words, geoms, shapes_m, reach_m2, work, axes, held, plane_axes = bellies
     places, balls, _, _, _, _, plane_m, plane_quat = ground
     if links_near(xipos, reach_m2, work):
@@ -95,7 +94,7 @@ def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tupl
     tangent = len(balls) > 0
     ncon = integers_at(m.ncon_at, (1,))
     ncon[0] = 0
-    # drops the contacts of the step before
+    # drops the contacts of the previous step
     call_with(m.mj_addContact_at, m.model_at, m.data_at, words.ctypes.data)
     held[0] = 0
     list_at = carray(pointer(m.contact_at), (1,), np.int64)[0]
@@ -111,7 +110,7 @@ def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tupl
 
 
 def _step1(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, ...]) -> None:
-    """Call ``mj_step1`` on planes that are laid again; by parts if all contacts are of bellies."""
+    """Lay the planes and call ``mj_step1``; by parts if all contacts are of bellies."""
     model, data, held = m.model_at, m.data_at, bellies[6]
     by_parts, tangent = len(held) > 0, len(ground[1]) > 0
     if by_parts:
@@ -138,16 +137,10 @@ def _step1(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, .
 
 
 def _run(steps: int, memory: NDArray[np.void]) -> float:
-    """Advance ``steps`` steps; return MuJoCo's time then.
-
-    Args:
-        steps: their number.
-        memory: (1,) of ``STEP_MEMORY``.
-
-    """
+    """Advance ``steps`` steps with ``memory`` (1,) of ``STEP_MEMORY``; return MuJoCo's time."""
     m = memory[0]
     body, shafts, ground, bellies = body_at(m), shafts_at(m), ground_at(m), _bellies_at(m)
-    bellies[6][:] = -1  # others may have been at the memory since the last run
+    bellies[6][:] = -1  # other data may have used the memory since the last run
     rubs = has_friction(shafts.gears.terms)
     lanes, at = make_lanes(2 * m.count_joints), contact_fields_at(m)
     ncon = integers_at(m.ncon_at, (1,))
@@ -216,7 +209,7 @@ class CompiledSteps:
         self._drive: ServoDrive | None = None
 
     def run(self, steps: int, drive: ServoDrive) -> float:
-        """Advance ``steps`` steps; return MuJoCo's time then."""
+        """Advance ``steps`` steps; return MuJoCo's time."""
         if drive is not self._drive:
             self._drive = drive
             set_fields(self._memory, addresses(Motors(*drive.columns())._asdict()))

@@ -1,10 +1,9 @@
-"""Tangent planes of a height field for the balls of a belly, found again in every step.
+"""Tangent planes of a height field for the balls of a belly, updated in every step.
 
-MuJoCo lets a ball meet each prism of a height field by itself. It then meets inner edges of a level
-floor as well, with normals up to 10 degrees off, which throws a body about. Here every ball has two
-planes. They go through the points of the surface with the least distance from the ball's centre:
-one on a slope or an edge, two in a crease. The surface is that of ``HeightField``, two triangles a
-cell.
+MuJoCo lets a ball meet each prism of a height field separately. It then also meets inner edges of a
+level floor, with normals up to 10 degrees off, which throws a body about. Here every ball has two
+planes through the surface points nearest to its centre: one on a slope or an edge, two in a crease.
+The surface is that of ``HeightField``, two triangles per cell.
 """
 
 import math
@@ -39,7 +38,7 @@ _POINT = "float64, float64, float64"
 def _face(
     x: float, y: float, z_m: Floats, corner_m: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Elevation and slopes along x and y of the triangle over a point, clamped to the border."""
+    """Elevation and slopes along x and y of the triangle at a point, clamped to the border."""
     x0, y0, spacing = corner_m
     rows, columns = z_m.shape
     u = min(max((x - x0) / spacing, 0.0), columns - 1.0)
@@ -74,7 +73,7 @@ def _is_above(x: float, y: float, z: float, corners: Floats) -> bool:
 
 @compiled(f"boolean({_POINT}, float64[:, ::1], float64[::1])")
 def _nearest_point(x: float, y: float, z: float, corners: Floats, nearest: Floats) -> bool:
-    """Point of a triangle that is nearest to a point; whether it lies inside, not on an edge."""
+    """Point of a triangle nearest to a point; whether it is inside, not on an edge."""
     a0, a1, a2 = corners[0, 0], corners[0, 1], corners[0, 2]
     b0, b1, b2 = corners[1, 0] - a0, corners[1, 1] - a1, corners[1, 2] - a2
     c0, c1, c2 = corners[2, 0] - a0, corners[2, 1] - a1, corners[2, 2] - a2
@@ -125,7 +124,7 @@ def _is_nearest(
     z_m: Floats,
     corner_m: tuple[float, float, float],
 ) -> bool:
-    """Whether no point of the surface around one on an edge is nearer."""
+    """Whether an edge point is nearer than the surface around it."""
     reach = _PROBE * corner_m[2]
     for k in range(_RING):
         angle = 2.0 * math.pi * k / _RING  # the edges of the triangles are among these
@@ -140,7 +139,7 @@ def _is_nearest(
 
 @compiled(f"void(float64[::1], {_POINT}[:, ::1])")
 def _keep(point: Floats, distance: float, same_m: float, found: Floats) -> None:
-    """Put a contact in place of one at the same point, or of the shallowest, if it is deeper."""
+    """Replace a contact at the same point, or the shallowest, by a deeper one."""
     slot = 0
     for k in range(PLANES):
         apart = 0.0
@@ -206,7 +205,7 @@ def touch(
                 if square >= radius_m * radius_m:
                     continue
                 distance = math.sqrt(square)
-                if inside:  # a face seen from behind, such as the wall under a trench's edge
+                if inside:  # not a face seen from behind, such as the wall under a trench's edge
                     counts = _is_above(x, y, z, corners)
                 else:
                     counts = _is_nearest(x, y, z, nearest, distance, z_m, corner_m)
@@ -228,7 +227,7 @@ def lay_planes(
     plane_m: Floats,
     plane_quat: Floats,
 ) -> None:
-    """Move the planes of every ball to where it touches the field, or away.
+    """Move the planes of every ball to its contacts, or away.
 
     Args:
         places_m: (geoms, 3) centres in the world.
@@ -261,7 +260,7 @@ def lay_planes(
                 n0, n1, n2 = -gx / steep, -gy / steep, 1.0 / steep
             for axis in range(3):
                 plane_m[plane, axis] = found[k, axis]
-            # the shortest turn from the vertical to the normal
+            # the shortest rotation from the vertical to the normal
             length = math.sqrt(2.0 * (1.0 + n2))
             plane_quat[plane, 0] = 0.5 * length
             plane_quat[plane, 1] = -n1 / length
@@ -271,7 +270,7 @@ def lay_planes(
 
 @dataclass(frozen=True, slots=True)
 class TangentPlanes:
-    """The planes of one model and the field that they follow."""
+    """The planes of one model and their field."""
 
     model: mujoco.MjModel
     balls: NDArray[np.int32]
@@ -285,7 +284,7 @@ class TangentPlanes:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, ground: HeightField | None) -> "TangentPlanes":
-        """Find the planes that ``sim.physics.body`` made."""
+        """Find the planes made by ``sim.physics.body``."""
         if ground is None:
             none = np.zeros(0, dtype=np.int32)
             flat, corner = np.zeros((2, 2)), (0.0, 0.0, 1.0)
@@ -297,7 +296,7 @@ class TangentPlanes:
         return cls(model, balls, first, radius_m, np.ascontiguousarray(ground.z_m), corner)
 
     def lay(self, data: mujoco.MjData) -> None:
-        """Lay the planes under the balls of the present positions; before every step."""
+        """Lay the planes under the balls; call it before every step."""
         if len(self.balls):
             mujoco.mj_kinematics(self.model, data)
             lay_planes(

@@ -1,7 +1,6 @@
-"""A twin: a second simulated body at the robot's pose, on which a motion is tried first.
+"""A twin: a second simulated body at the robot's pose, to try a motion on.
 
-Its joints have motors like those of servos, without a bus. Its steps are twice as long as those of
-the robot.
+Its joints have motors like servos, without a bus. Its steps are twice as long as the robot's.
 """
 
 import mujoco
@@ -17,10 +16,10 @@ from snakewalk.sim.servo.motor import MotorColumns, make_drive, motors_of, p_gai
 
 
 class PlantTwin:
-    """A ``MujocoPlant`` that runs with the robot, without servos of its own."""
+    """A ``MujocoPlant`` without servos that runs with the robot."""
 
     def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
-        """Make a body of ``robot``; its servos have torque and the robot's gains."""
+        """Make a body with torque and the robot's gains."""
         self._plant = MujocoPlant(robot, world, ground, FLOOR_STEP_S, is_placed=False)
         motors = motors_of(robot)
         self._drive = make_drive(motors, robot.servo.supply_v)
@@ -32,21 +31,21 @@ class PlantTwin:
     def begin(
         self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
     ) -> None:
-        """Put it where the robot is, moving as the robot did since ``dt_s`` ago.
+        """Place it at the robot's pose, moving as the robot did since ``dt_s`` (> 0) ago.
 
-        ``before_rad`` and ``now_rad`` are (J,); ``dt_s`` is more than 0.
+        ``before_rad`` and ``now_rad`` are (J,).
         """
         self._plant.set_state(_qpos(before, before_rad), _qpos(now, now_rad), dt_s)
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Lay it on ground with this friction."""
+        """Set the friction of its ground."""
         self._plant.mechanics.mu = friction.along, friction.across, friction.backward
 
     def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
-        """Hold goals (J,) for ``dt_s``; returns the head's pose and the joints (J,) then.
+        """Hold goals (J,) for ``dt_s``; return the head's pose and the joints (J,) then.
 
         Raises:
-            PhysicsError: the state has diverged.
+            PhysicsError: the state diverged.
 
         """
         self._drive.goal_rad[:] = goal_rad

@@ -25,7 +25,7 @@ GAUSS = 0.5 / math.sqrt(3.0)
 
 
 def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
-    """(J + 1, 7) of each link, all zero where the world is dry.
+    """(J + 1, 7) of each link, all zero in a dry world.
 
     Columns: drag across and along of half the link, kg/m; a Gauss point's arm, radius and surface,
     m; lift of the link under water, N; axis of the link's frame along it. The axis is 0, or 1 for a
@@ -54,15 +54,15 @@ def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
 
 
 def immersed(height_m: float, radius_m: float, surface_m: float) -> float:
-    """Share of a ball's volume under the surface, its centre at a height."""
+    """Share of a ball's volume below the surface."""
     x = min(max((surface_m - height_m + radius_m) / (2.0 * radius_m), 0.0), 1.0)
     return x * x * (3.0 - 2.0 * x)
 
 
 def floating_height_m(water: Water, radius_m: float) -> float:
-    """Height of a link's centre at which water carries it: the surface's, or half the depth.
+    """Height of a floating link's centre: at the surface, or half the depth.
 
-    A body that is heavier than its water lies on the bottom.
+    A body heavier than water lies on the bottom.
     """
     if water.buoyancy < 1.0:
         return radius_m
@@ -87,7 +87,7 @@ def add_water(
     water: Floats,
     step_s: float,
 ) -> float:
-    """Add drag and lift to the links' wrenches; returns the energy lost in the step, J.
+    """Add drag and lift to the links' wrenches; return the energy lost in the step, J.
 
     Args:
         wrench: (L, 6) force, and torque about the world's origin; changed.

@@ -23,7 +23,7 @@ SIZE_PX = (640, 480)
 
 
 class _Pose:
-    """The dressed model, in the pose that was drawn last."""
+    """The drawn model and its pose."""
 
     def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
         self.model = dressed_model(robot, world, ground)
@@ -31,7 +31,7 @@ class _Pose:
         self.distance_m = DISTANCE_LENGTHS * robot.length_m
 
     def move(self, qpos: Floats) -> Floats:
-        """Move the body; returns its middle, (3,) m."""
+        """Move the body; return its middle, (3,) m."""
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
@@ -56,7 +56,7 @@ class ChaseView:
         self._screen = Offscreen(model, *SIZE_PX)
 
     def draw(self, qpos: Floats) -> Image:
-        """Draw a pose, (height, width, 3), top row first; a new array each time."""
+        """Draw a pose, (height, width, 3), top row first; a new array."""
         camera = self._camera
         camera.lookat[:] = self._pose.move(qpos)
         camera.distance = self._pose.distance_m
@@ -91,7 +91,7 @@ class ChaseWindow:
         )
 
     def draw(self, qpos: Floats) -> None:
-        """Show a pose; nothing happens after a person has closed the window."""
+        """Show a pose; no effect after the window was closed."""
         if not self._window.is_running():
             return
         with self._window.lock():

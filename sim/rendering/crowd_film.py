@@ -1,4 +1,4 @@
-"""Many bodies on one ground as a film: tubes, as detailed as each is near, and their shadows."""
+"""Many bodies on one ground as a film: tubes with detail by distance, and shadows."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class BodyChain:
 
 @dataclass(frozen=True, slots=True)
 class CrowdShot:
-    """One frame: a camera that looks at a point from a distance, and the bodies in view."""
+    """One frame: an orbiting camera, and the bodies in view."""
 
     lookat_m: Floats
     """(3,)"""
@@ -50,7 +50,7 @@ class CrowdView:
     """Draws crowds on a world; ``close`` it.
 
     Raises:
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: no off-screen OpenGL.
 
     """
 
@@ -102,7 +102,7 @@ def render_crowd(
     size_px: tuple[int, int],
     on_frame: Callable[[int], None] = lambda done: None,
 ) -> int:
-    """Write shots as an MP4; returns their number."""
+    """Write shots as an MP4; return their number."""
     done = 0
     with MovieFile(path, fps, size_px) as film:
         for shot in shots:

@@ -1,7 +1,7 @@
-"""Meshes of many bodies at several levels of detail, and their shadows, drawn in few calls.
+"""Meshes of many bodies at several levels of detail, and their shadows, in few draw calls.
 
 A body is a tube around its centre line: ``rings`` x ``sides`` corners. All bodies of one kind and
-level are one MuJoCo skin that can hold them all; only the faces in use are drawn.
+level are one MuJoCo skin; only the faces in use are drawn.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ _SHADOW_WIDTH: Final = 1.7
 
 @dataclass(frozen=True, slots=True)
 class TubeGrid:
-    """Rings along a body and sides around it; all arrays are the same for every body."""
+    """Rings along a body and sides around it; the same arrays for every body."""
 
     rings: int
     sides: int
@@ -72,13 +72,7 @@ class TubeGrid:
         return np.stack([along, belly], axis=-1).reshape(-1, 2)
 
     def tubes(self, points_m: Floats, radius_m: Floats) -> tuple[Floats, Floats]:
-        """(B, V, 3) corners of bodies with centre lines (B, n, 3), and their normals.
-
-        Args:
-            points_m: head first.
-            radius_m: (B, n).
-
-        """
+        """(B, V, 3) corners and normals of bodies with centre lines (B, n, 3) and radii (B, n)."""
         place, slope = _spline(points_m.shape[1], self.rings)
         centre, ahead = place @ points_m, -_unit(slope @ points_m)
         radius = radius_m @ place.T
@@ -101,17 +95,17 @@ class TubeGrid:
 
 
 class CrowdMeshes:
-    """Skins of one model that hold every body of a frame; ``add_to`` prepares the model."""
+    """Skins of one model for all bodies of a frame; ``add_to`` prepares the model."""
 
     def __init__(self, bodies: int) -> None:
-        """Reserve the memory of ``bodies`` at any level."""
+        """Reserve memory for ``bodies`` at any level."""
         self._bodies = bodies
         self._capacity = -(-bodies // len(COLOURS))
         self._grids = tuple(TubeGrid(*mesh) for mesh in MESHES)
         self._ribbon = _ribbon_faces(), _ribbon_uv()
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
-        """Add the skins and textures to a model that is not compiled yet."""
+        """Add skins and textures to an uncompiled model."""
         for kind, (back, band) in enumerate(COLOURS):
             _material(spec, f"crowd{kind}", _banded(back, band), alpha=False)
             for level, grid in enumerate(self._grids):
@@ -133,15 +127,10 @@ class CrowdMeshes:
         bodies: list[tuple[int, int, Floats, Floats]],
         ground: HeightField,
     ) -> None:
-        """Lay bodies and their shadows into a scene that was just updated.
+        """Lay bodies and their shadows into an updated scene with enough free geoms.
 
-        Args:
-            model: the one with the skins.
-            scene: has free geoms for all skins.
-            bodies: number of the colours, level from 0, centre line (n, 3), radius (n,). Bodies of
-                one level have equally many points.
-            ground: catches the shadows.
-
+        ``bodies`` are colour number, level from 0, centre line (n, 3), radius (n,). Bodies of one
+        level have equally many points. ``ground`` catches the shadows.
         """
         groups: dict[tuple[int, int], list[tuple[Floats, Floats]]] = {}
         for kind, level, points, radius in bodies:
@@ -162,7 +151,7 @@ class CrowdMeshes:
 
 
 def _along(rings: int) -> Floats:
-    """(rings,) places along a body, closer to each other at its ends."""
+    """(rings,) places along a body, denser at its ends."""
     even = np.linspace(0.0, 1.0, rings)
     return np.asarray(even - 0.6 * np.sin(2.0 * np.pi * even) / (2.0 * np.pi))
 
@@ -173,7 +162,7 @@ def _unit(vectors: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def _spline(points: int, rings: int) -> tuple[Floats, Floats]:
-    """(rings, points) weights of points in the places of a cubic spline, and in its slopes."""
+    """(rings, points) weights of points in a cubic spline and its slopes."""
     line = CubicSpline(np.linspace(0.0, 1.0, points), np.eye(points))
     return line(_along(rings)), line(_along(rings), 1)
 
@@ -203,7 +192,7 @@ def _ribbon_uv() -> Floats:
 
 
 def _banded(back: Rgba, band: Rgba) -> Image:
-    """(H, W, 3) bands across a back, a paler belly, and eyes."""
+    """(H, W, 3) texture: bands across a back, a paler belly, and eyes."""
     wide, high = _TEXTURE
     along, belly = np.meshgrid(np.linspace(0.0, 1.0, wide), np.linspace(0.0, 1.0, high))
     dark = (np.mod(_BANDS * along + 0.35, 1.0) < 0.28) & (belly < 0.75) & (along > 0.08)
@@ -216,7 +205,7 @@ def _banded(back: Rgba, band: Rgba) -> Image:
 
 
 def _soft_edge() -> Image:
-    """(H, W, 4) of a shadow: dark in its middle, clear at its edges and ends."""
+    """(H, W, 4) shadow texture: dark in its middle, clear at its edges and ends."""
     wide, high = _TEXTURE
     along, across = np.meshgrid(np.linspace(0.0, 1.0, wide), np.linspace(-1.0, 1.0, high))
     soft = np.clip(1.6 * (1.0 - np.abs(across)), 0.0, 1.0)
@@ -243,7 +232,7 @@ def _material(spec: mujoco.MjSpec, name: str, picture: Image, *, alpha: bool) ->
 def _skin(
     spec: mujoco.MjSpec, name: str, material: str, faces: Ints, uv: Floats, capacity: int
 ) -> None:
-    """Add a skin that can hold several copies of a mesh."""
+    """Add a skin for several copies of a mesh."""
     corners = len(uv)
     skin = spec.add_skin(name=name, material=material, rgba=[1.0, 1.0, 1.0, 1.0])
     shift = corners * np.arange(capacity)[:, None, None]

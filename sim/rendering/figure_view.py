@@ -1,4 +1,4 @@
-"""Pictures of a mesh that moves on level ground, with its shadow: people, from any side."""
+"""Pictures of a moving mesh, such as a person, on level ground, with its shadow."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from snakewalk.sim.rendering.soft_shadow import SHAPE_RGBA, soft_shadow
 
 @dataclass(frozen=True, slots=True)
 class OrbitCamera:
-    """A camera that looks at a point; below the horizon the elevation is negative."""
+    """A camera that looks at a point; a negative elevation is below the horizon."""
 
     lookat_m: tuple[float, float, float]
     distance_m: float
@@ -25,10 +25,10 @@ class OrbitCamera:
 
 
 class FigureView:
-    """Draws a mesh whose corners are given in each frame; ``close`` it.
+    """Draws a mesh with given corners; ``close`` it.
 
     Raises:
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: no off-screen OpenGL.
 
     """
 
@@ -37,12 +37,8 @@ class FigureView:
     ) -> None:
         """Prepare the view.
 
-        Args:
-            look: faces and texture; its bones float freely and are not used.
-            robot: any; the look replaces it.
-            world: level ground.
-            size_px: width and height.
-
+        ``look`` gives faces and texture and replaces the robot; its free bones are not used.
+        ``world`` is level ground.
         """
         self._model = dressed_model(robot, world, None, look=look, fine=True)
         self._data = mujoco.MjData(self._model)
@@ -58,7 +54,7 @@ class FigureView:
         self._screen = Offscreen(self._model, *size_px)
 
     def draw(self, corners_m: Floats, camera: OrbitCamera, caption: str = "") -> Image:
-        """Draw the mesh with corners (V, 3), (height, width, 3); a new array each time."""
+        """Draw the mesh with corners (V, 3), (height, width, 3); a new array."""
         shadow_m = corners_m - corners_m[:, 2:] / SUN_DIRECTION[2] * SUN_DIRECTION
         shadow_m[:, 2] = LIFT_M
         below = corners_m - [0.0, 0.0, 1e3]
@@ -84,7 +80,7 @@ class FigureView:
 
 
 def _normals(corners_m: Floats, faces: Ints) -> Floats:
-    """(V, 3) means of the faces around each corner, by area."""
+    """(V, 3) area-weighted means of the normals of adjacent faces."""
     a, b, c = (corners_m[faces[:, k]] for k in range(3))
     face = np.cross(b - a, c - a)
     total = np.zeros_like(corners_m)

@@ -29,7 +29,7 @@ DISTANCE_LENGTHS = 1.2
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """How a film is drawn."""
+    """Style of a film."""
 
     fps: int = 25
     """Frames a second of film."""
@@ -72,17 +72,17 @@ def render_film(
     marks: Marks = Marks(),
     on_frame: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Write an MP4 (H.264 where PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,).
+    """Write an MP4 (H.264 if PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,), increasing.
 
-    ``time_s`` increases. ``qpos`` are ``MujocoPlant.qpos``; of a free look, (T, 7 L). ``on_frame``
-    is called with (frames done, of) after each.
+    ``qpos`` are ``MujocoPlant.qpos``; of a free look, (T, 7 L). ``on_frame`` is called with (frames
+    done, of) after each.
 
     Returns:
         Number of frames.
 
     Raises:
         InputError: fewer than two poses, odd size, or PyAV missing.
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: no off-screen OpenGL.
 
     """
     times, poses = np.asarray(time_s, float), np.asarray(qpos, float)
@@ -126,7 +126,7 @@ def _check(times: Floats, poses: Floats, size: tuple[int, int]) -> None:
 
 
 class _Stage:
-    """The dressed model, and the scene of one pose of it after the other."""
+    """The drawn model, and the scene of one pose after another."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class _Stage:
         self._reached = 0
 
     def scene(self, trail: int) -> mujoco.MjvScene:
-        """Return a scene with space for the model and ``trail`` more geoms."""
+        """Return a scene for the model and ``trail`` more geoms."""
         room = self.model.ngeom + self.model.nbody + 11 + AXES_GEOMS + trail
         scene = mujoco.MjvScene(self.model, maxgeom=room)
         scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
@@ -166,7 +166,7 @@ class _Stage:
         return scene
 
     def pose(self, scene: mujoco.MjvScene, shot: Floats, camera: Floats, now_s: float) -> None:
-        """Draw a pose into a scene as a camera shows it; waypoints reached by now are green."""
+        """Draw a pose into a scene from a camera; waypoints reached by ``now_s`` are green."""
         model, data, view = self.model, self.data, self._view
         while self._reached < len(self._reached_s) and self._reached_s[self._reached] <= now_s:
             mark_reached(model, self._reached)
@@ -182,7 +182,7 @@ class _Stage:
         self.shade.lay(scene, self._surface_m(scene))
 
     def _surface_m(self, scene: mujoco.MjvScene) -> Floats:
-        """Points (P, 3) of the body's surface as it was posed last."""
+        """Points (P, 3) of the body's surface in its last pose."""
         if self._faces is None:
             spine, data = self.spine, self.data
             links = np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])
@@ -194,7 +194,7 @@ class _Stage:
 def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Floats:
     """Poses (F, 7 + J) at ``at_s``, linear between the recorded ones; quaternions stay unit.
 
-    The first ``bodies`` groups of seven columns are place and quaternion of a floating body each.
+    The first ``bodies`` groups of seven columns are place and quaternion of a floating body.
     """
     q = qpos.copy()
     turns = [slice(7 * k + 3, 7 * k + 7) for k in range(bodies)]
@@ -215,10 +215,10 @@ def _camera(
     size_m: float,
     spine: slice,
 ) -> tuple[Floats, Floats]:
-    """Camera of each frame (F, 5), smoothed both ways, and the body's centre (F, 3).
+    """Camera of each frame (F, 5), smoothed in both directions, and the body's centre (F, 3).
 
     A camera is its look-at point, azimuth in degrees and distance. ``size_m`` is the length to
-    show: the spine, and a leg to its side.
+    show: the spine, and a leg beyond it.
     """
     middle, centre, body = (
         np.empty((len(shots), 3)),
@@ -241,7 +241,7 @@ def _camera(
 
 
 def _corner(camera: Floats) -> Floats:
-    """Where (2,) on the ground the scale lies: to the left of the look-at point, and nearer."""
+    """Place (2,) of the scale on the ground: to the left of the look-at point, and nearer."""
     turn = np.radians(camera[3])
     ahead = np.array([np.cos(turn), np.sin(turn)])
     left = np.array([-ahead[1], ahead[0]])

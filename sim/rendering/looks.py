@@ -1,4 +1,4 @@
-"""The looks of the body and its ground in pictures; they have no effect on the physics."""
+"""Looks of the body and its ground in pictures, without effect on the physics."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -91,9 +91,9 @@ def dressed_model(
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
-    ``look`` is the skin; None is a capsule a link. ``fine`` smooths edges: three times the work of
-    a software renderer. ``hollow`` waypoints, of a run whose arrivals are not measured, have a
-    dashed ring and no pole. ``additions`` add to the model before it is compiled.
+    ``look`` None is a capsule per link. ``fine`` smooths edges, at three times the cost of a
+    software renderer. ``hollow`` waypoints, for unmeasured arrivals, have a dashed ring and no
+    pole. ``additions`` change the model before it is compiled.
 
     Raises:
         InputError: the installed MuJoCo cannot edit models.
@@ -108,7 +108,7 @@ def dressed_model(
     if look is not None and look.free:
         _replace_robot(spec, len(look.rest_m))
     for geom in spec.geoms:
-        geom.group = 4 if geom.name.startswith(("belly", "foot")) else 0  # drawn by other geoms
+        geom.group = 4 if geom.name.startswith(("belly", "foot")) else 0  # other geoms draw it
     _light(spec, robot, fine)
     _floor(spec, ground)
     if look is None:
@@ -141,7 +141,7 @@ def dressed_model(
 
 
 def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:
-    """Put floating bodies in the place of the robot's links."""
+    """Replace the robot's links by floating bodies."""
     spec.delete(spec.body("link0"))
     for k in range(bones):
         bone = spec.worldbody.add_body(name=f"link{k}", mass=1.0, inertia=[1.0, 1.0, 1.0])
@@ -157,7 +157,7 @@ def mark_reached(model: mujoco.MjModel, waypoint: int) -> None:
 
 
 def _ring(ground: HeightField | None, x: float, y: float, radius_m: float) -> Floats:
-    """Corners (RING_PARTS + 1, 3) of a circle that lies on the ground."""
+    """Corners (RING_PARTS + 1, 3) of a circle on the ground."""
     turn = np.linspace(0.0, 2.0 * np.pi, RING_PARTS + 1)
     east, north = x + radius_m * np.cos(turn), y + radius_m * np.sin(turn)
     z = np.zeros_like(turn) if ground is None else ground.elevation_m(east, north)
@@ -254,7 +254,7 @@ def _print(spec: mujoco.MjSpec, name: str, sheet: FloorPrint) -> None:
 
 
 def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) -> None:
-    """Tint the floor by the water above it and draw its surface, which is seen through."""
+    """Tint the floor below water, and draw the transparent surface."""
     water = water_surface_m(world, ground)
     if water is None:
         return
@@ -266,7 +266,7 @@ def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) 
 
 
 def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
-    """Colour by the map's own colours; else by elevation, with contour lines."""
+    """Colour the ground by the map's colours, else by elevation with contour lines."""
     w, h = ground.size_m
     x = ground.x0_m + (np.arange(TEXELS) + 0.5) / TEXELS * w
     y = ground.y0_m + (np.arange(TEXELS) + 0.5) / TEXELS * h
@@ -285,7 +285,7 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
 
 
 def _contours(level: Floats) -> Floats:
-    """How much of each texel (n, m) a line covers where ``level`` is whole; of even width."""
+    """Share (n, m) of each texel that a line of whole ``level`` covers, of constant width."""
     rise = np.hypot(*np.gradient(level))
     flat = rise < 1e-6
     texels = np.abs(level - np.round(level)) / np.where(flat, 1.0, rise)
@@ -294,7 +294,7 @@ def _contours(level: Floats) -> Floats:
 
 
 def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
-    """A capsule a link; a broad head with eyes and a forked tongue."""
+    """A capsule per link; a broad head with eyes and a forked tongue."""
     links, lengths_m, radii_m = robot.link_count, robot.link_lengths_m, robot.link_radii_m
     thickness = _thickness_m(robot)
     for i in range(1, links):
@@ -330,7 +330,7 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
 
 
 def _mast(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
-    """A rod with a bar across; the lenses are at the bar's front."""
+    """A rod with a bar across; the lenses are at its front."""
     config = robot.stereo_head
     if config is None:
         return
@@ -342,9 +342,9 @@ def _mast(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
 
 
 def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
-    """A capsule a segment, a ball over the seam of two of them, and the feet.
+    """A capsule per segment, a ball over each seam, and the feet.
 
-    The geoms that touch the ground are not drawn, as bellies are not.
+    The geoms that touch the ground are not drawn, like bellies.
     """
     for k, joint in enumerate(robot.limb_joints):
         pair = robot.limbs[joint.pair]
@@ -353,14 +353,14 @@ def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         thick = pair.foot_radius_m
         colour = BACK[joint.place % 2]
         _add(body, _CAPSULE, (thick, 0, 0), (), colour, (0, 0, 0, 0, end, 0))
-        if joint.place:  # the round ends of both segments lie in each other
+        if joint.place:  # the round ends of both segments overlap
             _add(body, _SPHERE, (1.04 * thick, 0, 0), (0, 0, 0), colour)
         if joint.has_foot:
             _add(body, _SPHERE, (1.02 * thick, 0, 0), (0, end, 0), HEAD)
 
 
 def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
-    """A skin that MuJoCo bends with the bodies of the links."""
+    """A skin that MuJoCo bends with the links' bodies."""
     links = len(look.rest_m)
     skin = spec.add_skin(name="animal", rgba=BACK[0])
     if look.texture is not None:
@@ -374,7 +374,7 @@ def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
         material.specular, material.shininess = 0.2, 0.3
         skin.material, skin.rgba = "animal", [1.0, 1.0, 1.0, 1.0]
     skin.vert = look.vertices_m.ravel()
-    skin.texcoord = (look.uv * [1.0, -1.0] + [0.0, 1.0]).ravel()  # the first row lies at 0
+    skin.texcoord = (look.uv * [1.0, -1.0] + [0.0, 1.0]).ravel()  # the first row is at 0
     skin.face = look.faces.ravel().tolist()
     skin.bodyname = [f"link{k}" for k in range(links)]
     skin.bindpos = look.rest_m.ravel()
@@ -385,7 +385,7 @@ def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
 
 
 def _thickness_m(robot: RobotConfig) -> Floats:
-    """Skin radius (L,) of each link: the robot's profile, or one thinner at neck and tail."""
+    """Skin radius (L,) of each link: the robot's profile, or thinner at neck and tail."""
     links = robot.link_count
     if robot.body_profile is not None:
         return np.array(robot.radii_m(2 * links + 1))[1::2]  # at the links' middles

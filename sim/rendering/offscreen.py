@@ -1,4 +1,4 @@
-"""Pictures without a screen: OSMesa where it is installed, else EGL."""
+"""Pictures without a screen: OSMesa if installed, else EGL."""
 
 import ctypes
 import weakref
@@ -15,13 +15,13 @@ REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 with a drive
 
 
 class OffscreenError(InputError):
-    """No OpenGL here can draw without a screen."""
+    """No OpenGL that can draw without a screen."""
 
 
 class Offscreen:
-    """A frame buffer of one model; use it as a context manager, or ``close`` it.
+    """A frame buffer of one model; a context manager, or ``close`` it.
 
-    Several may be open at once: each makes its OpenGL context current before it draws or deletes.
+    Several may be open: each activates its OpenGL context before it draws or deletes.
 
     Raises:
         OffscreenError: neither OSMesa nor EGL works.
@@ -45,8 +45,7 @@ class Offscreen:
     ) -> Image:
         """Draw one frame, (height, width, 3), top row first; valid until the next one.
 
-        ``size_px`` is the width and height of a smaller frame; its view is that of the scene's
-        cameras.
+        ``size_px`` is the width and height of a smaller frame with the view of the scene's cameras.
         """
         width, height = size_px or (self._view.width, self._view.height)
         view = mujoco.MjrRect(0, 0, width, height)
@@ -66,7 +65,7 @@ class Offscreen:
         return pixels[::-1]
 
     def reload(self, model: mujoco.MjModel, texture: int) -> None:
-        """Pass a texture of the model, which has changed, to the renderer."""
+        """Upload a changed texture of the model to the renderer."""
         self._gl.make_current()
         mujoco.mjr_uploadTexture(model, self._mjr, texture)
 
@@ -84,7 +83,7 @@ def _free(gl: Any, mjr: mujoco.MjrContext) -> None:
 
 
 def _context(width: int, height: int) -> Any:
-    """Make an OpenGL context: MuJoCo's own choice by MUJOCO_GL falls at its import, too early."""
+    """Make an OpenGL context; MuJoCo's choice by MUJOCO_GL is made at its import, too early."""
     faults = []
     for name, library, module in (
         ("OSMesa", "libOSMesa.so.8", "mujoco.osmesa"),

@@ -1,8 +1,8 @@
 """The body's shade on the ground under the sun.
 
-MuJoCo's shadow maps need half of a software renderer's time. With OSMesa they also omit everything
-below half a metre. A film draws one soft shadow (``SoftShade``). The simulated overhead camera
-draws a flat dark patch per link (``add_shade``).
+MuJoCo's shadow maps need half of a software renderer's time; with OSMesa they omit everything below
+half a metre. A film draws one soft shadow (``SoftShade``). The simulated overhead camera draws a
+flat dark patch per link (``add_shade``).
 """
 
 import mujoco
@@ -31,10 +31,10 @@ _SOFT_LIFT = 0.004
 
 
 class SoftShade:
-    """One soft shadow of a body: a sheet on the ground whose texture is dark without the sun."""
+    """One soft shadow of a body: a sheet on the ground with a dark texture."""
 
     def __init__(self, model: mujoco.MjModel, ground: HeightField | None) -> None:
-        """Use the sheet of a model that ``add_sheet`` prepared."""
+        """Use the sheet of ``add_sheet``."""
         self._model, self._ground = model, ground
         self.texture = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXTURE, SHADE)
         skin = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SKIN, SHADE)
@@ -42,9 +42,9 @@ class SoftShade:
         self._rows = slice(start, start + int(model.skin_vertnum[skin]))
 
     def lay(self, scene: mujoco.MjvScene, body_m: Floats) -> None:
-        """Lay the shadow of points (P, 3) of the body's surface into an updated scene.
+        """Lay the shadow of surface points (P, 3) into an updated scene.
 
-        The texture changes in the model. ``Offscreen.reload`` passes it to the renderer.
+        The model's texture changes; ``Offscreen.reload`` uploads it.
         """
         place = under_sun(body_m, self._ground)
         low, high = place.min(axis=0), place.max(axis=0)
@@ -88,9 +88,9 @@ def add_sheet(spec: mujoco.MjSpec) -> None:
 
 
 def shade_picture(place: Floats) -> Image:
-    """(128, 128, 4) of points (P, 2) in the unit square: one dark area with a soft edge.
+    """(128, 128, 4) shadow of points (P, 2) in the unit square, with a soft edge.
 
-    Overlapping parts are as dark as single ones. The first row is at y = 0.
+    Overlaps are not darker. The first row is at y = 0.
     """
     texel = np.clip((place * _TEXELS).astype(np.int64), 0, _TEXELS - 1)
     covered = np.zeros((_TEXELS, _TEXELS), dtype=bool)
@@ -104,7 +104,7 @@ def shade_picture(place: Floats) -> Image:
 
 
 def under_sun(points_m: Floats, ground: HeightField | None) -> Floats:
-    """(P, 2) where the sun's rays through points (P, 3) meet the ground, nearly."""
+    """(P, 2) approximate ground points of the sun's rays through points (P, 3)."""
     slide = SUN_DIRECTION[:2] / -SUN_DIRECTION[2]
     level = np.zeros(len(points_m))
     if ground is not None:
@@ -124,7 +124,7 @@ def link_surface_m(links_m: Floats, forward: Floats, robot: RobotConfig) -> Floa
 
 
 def _half_sizes_m(robot: RobotConfig, links: int) -> tuple[float, Floats]:
-    """Half length of a drawn link, and the radius (L,) of each: thinner towards the tail."""
+    """Half length of a drawn link, and radii (L,): thinner towards the tail."""
     thin = 1.0 - 0.5 * np.clip(np.linspace(0.0, 1.0, links) - 0.55, 0.0, None) / 0.45
     return 0.62 * robot.length_m / links, robot.body_radius_m * thin
 
@@ -136,7 +136,7 @@ def add_shade(
     robot: RobotConfig,
     ground: HeightField | None,
 ) -> None:
-    """Append one patch per link to a scene that was just updated and has enough free geoms.
+    """Append one patch per link to an updated scene with enough free geoms.
 
     ``links_m`` (L, 3) are the centres of the links, ``forward`` (L, 3) their axes.
     """
@@ -155,7 +155,7 @@ def add_shade(
 
 
 def _on_ground(links_m: Floats, ground: HeightField | None) -> tuple[Floats, Floats]:
-    """Where the sun's rays through (L, 3) points meet the ground, and its normals (L, 3) there."""
+    """Ground points of the sun's rays through (L, 3) points, and the normals (L, 3) there."""
     place = np.zeros_like(links_m)
     place[:, :2] = under_sun(links_m, ground)
     if ground is None:

@@ -1,8 +1,8 @@
 """A soft shadow from three pictures of one view: the ground, the shadow's shape, and everything.
 
-Shadow maps of the software renderer leave out what is close to the ground. A dark transparent
-patch per link shows every overlap. Here the shape is drawn in one bright colour, and darkens the
-ground wherever that colour is visible, with a blurred edge.
+Shadow maps of the software renderer omit shadows close to the ground, and transparent patches show
+every overlap. Here the shape is drawn in one bright colour and, blurred, darkens the ground where
+it is visible.
 """
 
 import cv2
@@ -22,12 +22,8 @@ _LEAST = 12
 def soft_shadow(empty: Image, shape: Image, full: Image, blur_px: float = 2.5) -> Image:
     """Return the full picture with the shadow on its ground.
 
-    Args:
-        empty: (H, W, 3) the ground alone.
-        shape: (H, W, 3) the ground, and on it the shadow's shape in a bright colour.
-        full: (H, W, 3) the ground and the bodies.
-        blur_px: width of the shadow's edge.
-
+    All pictures are (H, W, 3): ``empty`` the ground, ``shape`` with the shadow's shape in a bright
+    colour, ``full`` with the bodies. ``blur_px`` is the width of the edge.
     """
     shade = _differ(shape, empty).astype(np.float32)
     body = _differ(full, empty).astype(np.float32)
@@ -37,5 +33,5 @@ def soft_shadow(empty: Image, shape: Image, full: Image, blur_px: float = 2.5) -
 
 
 def _differ(one: Image, other: Image) -> Bools:
-    """(H, W) where two pictures differ by more than the renderer's smoothing of edges."""
+    """(H, W) where two pictures differ by more than edge smoothing."""
     return np.asarray(cv2.absdiff(one, other).max(axis=-1) > _LEAST)

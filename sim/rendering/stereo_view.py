@@ -1,4 +1,4 @@
-"""The view of a pair of cameras over a world: the pictures of a stereo head."""
+"""The pictures of a stereo head in a world."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ _CONTRAST = 34.0
 
 @dataclass(frozen=True, slots=True)
 class CameraFrame:
-    """Where a camera is and looks."""
+    """Pose of a camera."""
 
     at_m: Floats
     """(3,) its lens."""
@@ -35,9 +35,9 @@ class CameraFrame:
 
 
 def tilted(tilt_rad: float, carrier: Floats) -> Floats:
-    """(3, 3) axes of a camera, right, down and forward, that looks ahead and down by an angle.
+    """(3, 3) axes of a camera (right, down, forward) that looks ahead and down by an angle.
 
-    ``carrier`` are the axes (3, 3) of the carrying link: columns forward, left and up.
+    ``carrier`` (3, 3) has the link's axes as columns: forward, left, up.
     """
     c, s = math.cos(tilt_rad), math.sin(tilt_rad)
     return np.asarray(carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]])
@@ -48,10 +48,10 @@ def _level(c: float, s: float) -> Floats:
 
 
 class StereoView:
-    """Draws a hilly world, with grain on it, from two places; ``close`` it.
+    """Draws a hilly world with grain from two cameras; ``close`` it.
 
     Raises:
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: no off-screen OpenGL.
 
     """
 
@@ -79,7 +79,7 @@ class StereoView:
 
     @property
     def camera_matrix(self) -> Floats:
-        """(3, 3) of both cameras, which have no distortion."""
+        """(3, 3) of both cameras, without distortion."""
         wide, tall = self._size
         f = self._focal_px
         return np.array([[f, 0.0, 0.5 * (wide - 1)], [0.0, f, 0.5 * (tall - 1)], [0.0, 0.0, 1.0]])
@@ -87,7 +87,7 @@ class StereoView:
     def pictures(
         self, at_m: tuple[float, float, float], heading_rad: float, tilt_rad: float
     ) -> tuple[Image, Image]:
-        """(H, W, 3) left and right pictures, with the sensors' noise, without the robot.
+        """(H, W, 3) left and right pictures with sensor noise, without the robot.
 
         ``at_m`` is the left camera; ``heading_rad`` is seen from above, ``tilt_rad`` downwards.
         """
@@ -97,7 +97,7 @@ class StereoView:
     def taken(
         self, frames: Sequence[CameraFrame], qpos: Floats | None = None
     ) -> tuple[Image, Image]:
-        """(H, W, 3) left and right pictures of a left camera that moves while it exposes.
+        """(H, W, 3) left and right pictures of a left camera that moves during exposure.
 
         ``frames`` are successive poses; the picture is their mean. ``qpos`` is (7 + J,).
         """
@@ -133,7 +133,7 @@ class StereoView:
             camera.frustum_near, camera.frustum_far = _NEAR_M, _FAR_M
 
     def _paint(self) -> None:
-        """Give the ground a grain in place of its map's colours."""
+        """Replace the map's colours by a grain."""
         grain = np.zeros((TEXELS, TEXELS))
         for size in _GRAIN_TEXELS:
             noise = gaussian_filter(self._random.normal(size=grain.shape), size, mode="wrap")

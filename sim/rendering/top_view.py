@@ -1,4 +1,4 @@
-"""The view from above: the picture of a camera over the simulated robot."""
+"""The picture of a camera above the simulated robot."""
 
 import math
 from collections.abc import Sequence
@@ -17,17 +17,16 @@ from snakewalk.sim.rendering.shade import add_shade
 
 NOISE = 3.0
 """Standard deviation of the sensor's noise, of 255."""
-_FIELDS, _SLACK = 8, 128  # of noise, and by how many pixels a field is larger than a picture
+_FIELDS, _SLACK = 8, 128  # number of noise fields, and their excess size in pixels
 
 
 class TopView:
     """Draws ``MujocoPlant.qpos`` from above; ``close`` it.
 
-    The ground is drawn once, and of each picture only the part round the robot.
-    The same seed gives the same noise.
+    The ground is drawn once, then only the part around the robot. The seed determines the noise.
 
     Raises:
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: neither OSMesa nor EGL works.
 
     """
 
@@ -66,7 +65,7 @@ class TopView:
         self._floor = self._screen.draw(self._scene).copy()
 
     def picture(self, qpos: Floats) -> Image:
-        """(H, W, 3) the robot at ``qpos`` (7 + J,)."""
+        """(H, W, 3) picture of the robot at ``qpos`` (7 + J,)."""
         data = self._data
         data.qpos[:] = qpos
         self._update(mujoco.MjvOption())
@@ -87,7 +86,7 @@ class TopView:
         return self._sensed(grey)
 
     def empty_floor(self) -> Image:
-        """(H, W, 3) the same without the robot."""
+        """(H, W, 3) picture without the robot."""
         return self._sensed(self._floor)
 
     def close(self) -> None:
@@ -103,7 +102,7 @@ class TopView:
         mujoco.mjv_updateScene(model, data, option, None, self._view, everything, self._scene)
 
     def _window(self, links_m: Floats) -> tuple[int, int, int, int]:
-        """Columns and rows, first and behind the last, that hold the robot and its shade."""
+        """First and end columns and rows that contain the robot and its shade."""
         camera, robot = self._camera, self._robot
         c, s = math.cos(camera.turn_rad), math.sin(camera.turn_rad)
         nearest = camera.height_m - float(links_m[:, 2].max()) - robot.body_radius_m
@@ -119,7 +118,7 @@ class TopView:
         return span[0], span[1], span[2], span[3]
 
     def _look_at(self, left: int, right: int, top: int, low: int) -> None:
-        """Narrow the updated scene's cameras to these columns and rows."""
+        """Narrow the scene's cameras to these columns and rows."""
         for camera in self._scene.camera:
             half = camera.frustum_top
             pixel = 2.0 * half / self._camera.height_px
@@ -127,7 +126,7 @@ class TopView:
             camera.frustum_top, camera.frustum_bottom = half - pixel * top, half - pixel * low
 
     def _sensed(self, grey: Image) -> Image:
-        """Add the sensor's noise: one of a few fields, a part of it by chance."""
+        """Add sensor noise: a random part of one of a few fields."""
         field = self._noise[self._random.integers(_FIELDS)]
         down, right = (int(k) for k in self._random.integers(_SLACK, size=2))
         rows, columns = grey.shape[:2]

@@ -1,4 +1,4 @@
-"""Lines on the ground of a picture: where head and body went, paths to follow, and a scale."""
+"""Lines on the ground of a picture: trails of head and body, paths, and a scale."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ MOST = 400
 
 @dataclass(frozen=True, slots=True)
 class TrailLine:
-    """Where a point of the body went."""
+    """Trail of a point of the body."""
 
     time_s: Floats
     """(H,) when it was at each point of the line."""
@@ -46,7 +46,7 @@ class TrailLine:
     rgba: Rgba
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
-        """Append the line's end up to a time."""
+        """Append the end of the line up to a time."""
         been = int(np.searchsorted(self.time_s, now_s, side="right"))
         for k in range(max(1, been - MOST), been):
             kind, piece = mujoco.mjtGeom.mjGEOM_LINE, _next(scene)
@@ -71,9 +71,9 @@ class Trail:
         return max((len(dots) for dots in self.dots_m), default=0) * 2 + MOST * len(self.lines)
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
-        """Append dots and lines to a scene that was just updated and has enough free geoms.
+        """Append dots and lines to an updated scene with enough free geoms.
 
-        Drawn are the path in force, pale the one before it, and the trails.
+        It draws the path in force, the previous one in pale, and the trails.
         """
         current = int(np.searchsorted(self.starts_s, now_s, side="right")) - 1
         for k, colour in ((current - 1, FORMER), (current, PATH)):
@@ -93,15 +93,10 @@ def make_trail(
     centre_m: Floats,
     ground: HeightField | None,
 ) -> Trail:
-    """Lay paths, each (P, 2) with the time from when on it is in force, and trails on the ground.
+    """Lay paths (P, 2), each with its start time, and trails on the ground.
 
-    Args:
-        paths: in the order of their times; none on a run without a path.
-        time_s: (T,) increasing.
-        head_m: (T, 2 or more) the head's x and y at these times.
-        centre_m: (T, 2 or more) those of the body's centre.
-        ground: None on a plane.
-
+    ``paths`` are in order of time. ``time_s`` (T,) increases; ``head_m`` and ``centre_m`` are (T, 2
+    or more). ``ground`` None is a plane.
     """
     return Trail(
         starts_s=np.array([start for start, _ in paths], dtype=float),
@@ -116,12 +111,12 @@ def make_trail(
 def add_axes(
     scene: mujoco.MjvScene, at_m: Floats, length_m: float, ground: HeightField | None
 ) -> None:
-    """Append a rod along the world's x and one along its y, around (2,), above the ground."""
-    at_m = at_m - 0.5 * length_m  # so that both keep close to the place, whichever way they point
+    """Append rods along the world's x and y, around (2,), above the ground."""
+    at_m = at_m - 0.5 * length_m  # so that both stay close to the place
     along_m = np.linspace(0.0, length_m, _AXES_SAMPLES)[:, None]
     below = np.concatenate([at_m + along_m * np.eye(2)[axis] for axis in range(2)])
     highest_m = _on_ground(below, ground)[:, 2].max()
-    foot = np.array([*at_m, highest_m + 0.03 * length_m])  # no hill covers a rod
+    foot = np.array([*at_m, highest_m + 0.03 * length_m])  # no hill hides a rod
     rod, still = mujoco.mjtGeom.mjGEOM_CAPSULE, (np.zeros(3), np.zeros(3), np.eye(3).ravel())
     _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
     for axis, (name, colour) in enumerate(zip("xy", AXES, strict=True)):
@@ -150,7 +145,7 @@ def _next(scene: mujoco.MjvScene) -> mujoco.MjvGeom:
 
 
 def _dots(path_m: Floats) -> Floats:
-    """Points of a path at equal arc length (D, 2)."""
+    """Points of a path at equal arc lengths (D, 2)."""
     if len(path_m) < 2:
         return np.zeros((0, 2))
     arc = _arc_m(path_m)

@@ -1,4 +1,4 @@
-"""Servos of a chain, as named on a command line, on a bench behind one line."""
+"""Servos of a chain specification, on a bench behind one line."""
 
 from collections.abc import Sequence
 
@@ -28,12 +28,12 @@ def bench_line(
     start_rad: ArrayLike = 0.0,
     imu: ImuConfig | None = None,
 ) -> SimLine | Ax12Line | FeetechLine:
-    """Line of ``baud`` with the servos of ``chain``; shafts start at ``start_rad``, of all or each.
+    """Line of ``baud`` with the servos of ``chain``; ``start_rad`` of all shafts, or of each.
 
-    An ``imu`` lies level and still on the bench with them.
+    An ``imu`` lies level and still on the bench.
 
     Raises:
-        InputError: a model is not known or lacks the baud rate, two devices share an ID, or devices
+        InputError: a model is unknown or lacks the baud rate, two devices share an ID, or devices
             of two protocols are on one bus.
 
     """
@@ -92,7 +92,7 @@ def _ax12_line(ids: tuple[int, ...], facts: ServoModel, baud: int, plant: BenchP
 
 
 def feetech_line(servos: FeetechServos, baud: int) -> FeetechLine:
-    """Line of ``baud`` to which Feetech servos are set.
+    """Line of ``baud`` with Feetech servos at that rate.
 
     Raises:
         ControlTableError: the model lacks the rate.

@@ -1,7 +1,7 @@
 """Servos on a command line: ``1-16``, ``1,2,5-8:XL330-M288``, ``1-2:XL430-W250,3:XM540-W270``.
 
-A model holds for the IDs before it, back to the model before; IDs behind the last are of it, too.
-A model is a name, or the path of a file that describes it.
+A model applies to the IDs before it, back to the previous model. IDs after the last model have that
+model. A model is a name, or the path of its file.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class ChainSpec:
         """Record of each servo's model.
 
         Raises:
-            InputError: the model does not exist; or the faults of its file.
+            InputError: the model does not exist, or the faults of its file.
 
         """
         known = {model: servo_model(model, Path()) for model in self.kinds}
@@ -42,21 +42,21 @@ class ChainSpec:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The models there are, in the order of the chain."""
+        """The different models, in the order of the chain."""
         return tuple(dict.fromkeys(self.models))
 
     @property
     def model(self) -> str:
-        """The model of all, or the models, joined by a comma."""
+        """The models, joined by a comma."""
         return ", ".join(self.kinds)
 
 
 def parse_chain(text: str) -> ChainSpec:
-    """Read ``IDS[:MODEL]``, several of them joined by commas.
+    """Read ``IDS[:MODEL]``, joined by commas.
 
     Raises:
-        InputError: no numbers, a range that runs backwards, an ID out of 0 to 252, or a colon
-            without a model behind it.
+        InputError: no numbers, a reversed range, an ID outside 0 to 252, or a colon without a
+            model.
 
     """
     ids: list[int] = []
@@ -77,7 +77,7 @@ def parse_imu(text: str) -> ImuConfig:
     """Read ``ID[:MODEL]`` of an IMU on the bus of the servos.
 
     Raises:
-        InputError: no ID, or a model that is not known.
+        InputError: no ID, or an unknown model.
 
     """
     number, _, model = text.partition(":")

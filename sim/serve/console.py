@@ -1,4 +1,4 @@
-"""A console of simulated servos: registers, loads, faults and the pace, changed while they run."""
+"""A console of simulated servos: changes registers, loads, faults and pace during a run."""
 
 from collections.abc import Callable
 from typing import Final
@@ -23,7 +23,7 @@ quit"""
 
 
 class Console:
-    """Executes lines that a person types."""
+    """Executes lines of an operator."""
 
     def __init__(self, line: SimLine, faults: FaultPlayer) -> None:
         self._line, self._faults = line, faults
@@ -39,7 +39,7 @@ class Console:
         }
 
     def execute(self, text: str) -> str:
-        """Do what a line says; returns what became of it, also where it cannot be done."""
+        """Execute a line; return its result or fault."""
         word, *rest = text.split() or ["help"]
         do = self._commands.get(word)
         if do is None:

@@ -1,6 +1,6 @@
 """Live table of a simulated bus: registers of all servos, and the latest packets.
 
-All functions here are quick: the servos reply in between.
+Its functions are quick, because the servos reply in between.
 """
 
 from collections import deque
@@ -31,7 +31,7 @@ KEPT = 32
 
 
 class LiveTable:
-    """A ``PacketTap`` that counts packets and keeps the latest; ``registers`` reads the rows."""
+    """A ``PacketTap`` that counts and stores packets; ``registers`` reads the rows."""
 
     def __init__(self, registers: Callable[[], Rows]) -> None:
         self.registers = registers
@@ -39,7 +39,7 @@ class LiveTable:
         self._recent: deque[Packet] = deque(maxlen=KEPT)
 
     def __call__(self, time_s: float, from_host: bool, data: bytes) -> None:
-        """Count one packet and keep it."""
+        """Count and store one packet."""
         self.questions += from_host
         self.answers += not from_host
         self.bytes += len(data)
@@ -53,7 +53,7 @@ class LiveTable:
 
 
 def servo_rows(line: SimLine) -> Rows:
-    """One row a servo of Protocol 2.0: mode, motion and state."""
+    """One row per servo of Protocol 2.0: mode, motion and state."""
     line.firmware.refresh()
     bank, measured = line.bank, line.bank.measures_current
     columns = {key: np.asarray(bank[name]) for key, name in COLUMNS.items()}
@@ -71,7 +71,7 @@ def servo_rows(line: SimLine) -> Rows:
 
 
 def ax12_rows(servos: Ax12Servos) -> Rows:
-    """One row for each servo of Protocol 1.0."""
+    """One row per servo of Protocol 1.0."""
     servos.refresh()
     shown = (
         "ID",

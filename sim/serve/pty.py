@@ -1,9 +1,9 @@
 """A pseudo-terminal with simulated servos behind it, in real time: a serial port for any client.
 
-The line's simulated clock advances by ``pace`` times real time. Bytes that a client writes to
-``path`` go onto the line, and replies are returned when their bytes have arrived. If the server
-stalls (a busy machine, or physics slower than real time), simulated time pauses. If a client sets a
-baud rate, servos at another rate are silent.
+The line's clock advances by ``pace`` times real time. Bytes that a client writes to ``path`` go
+onto the line; replies return when their bytes have arrived. If the server stalls (a busy machine,
+or slow physics), simulated time pauses. After a client sets a baud rate, servos at another rate are
+silent.
 """
 
 import fcntl
@@ -53,12 +53,11 @@ _LOGGER = logging.getLogger("snakewalk")
 class PtyServer:
     """Serves ``line`` at ``path`` from construction until ``close``; use it in a ``with``.
 
-    ``link`` is a symbolic link that always leads to the device, even if the name of the device
-    changes.
+    ``link`` is a symbolic link that always leads to the device, whose name may change.
 
     Raises:
-        InputError: ``link`` is taken, by a file or by a server that runs; ``pace`` is not
-            positive, or over ``PACE_MAX``.
+        InputError: ``link`` is a file or belongs to a running server; ``pace`` is not positive, or
+            over ``PACE_MAX``.
 
     """
 
@@ -100,7 +99,7 @@ class PtyServer:
     def close(self) -> None:
         """Remove the device; safe to call twice."""
         if self.path and select.select([self._master], [], [], 0.0)[0]:
-            self._receive()  # a flush since the last look is counted, too
+            self._receive()  # count a flush since the last check
         for end in (self._master, self._slave):
             if end >= 0:
                 os.close(end)
@@ -110,7 +109,7 @@ class PtyServer:
             self._link.unlink()
 
     def set_pace(self, pace: float) -> None:
-        """Let time on the line run at another factor from now on.
+        """Change the factor of time on the line.
 
         Raises:
             InputError: it is not positive.
@@ -120,16 +119,16 @@ class PtyServer:
         self._pace = pace
 
     def real_time_s(self, line_s: float) -> float:
-        """Return the time of the server's clock at a time of the line."""
+        """Return the server's clock time at a time of the line."""
         return (line_s - self._offset_s) / self._pace
 
     def serve(self, stopped: Callable[[], bool]) -> None:
-        """Serve until ``stopped()``, which is asked at least every ``IDLE_S``."""
+        """Serve until ``stopped()``, called at least every ``IDLE_S``."""
         while not stopped():
             self.step(IDLE_S)
 
     def step(self, wait_s: float) -> None:
-        """Wait up to ``wait_s`` (of real time) for a client or an answer; hand on what is due."""
+        """Wait up to ``wait_s`` (real time) for a client or a reply; pass on due bytes."""
         line = self._line
         if not self.path:
             select.select([], [], [], wait_s)
@@ -162,7 +161,7 @@ class PtyServer:
             self.overrun_bytes += len(arrived)
 
     def _receive(self) -> bytes:
-        """Bytes of the client; empty if the kernel reports something else."""
+        """Bytes of the client; empty if the kernel reports another event."""
         received = os.read(self._master, CHUNK_BYTES)
         if received[0] == termios.TIOCPKT_DATA:
             return received[1:]
@@ -170,7 +169,7 @@ class PtyServer:
         return b""
 
     def _wait(self, wait_s: float) -> bool:
-        """Wait for a client, an event on the line or ``wait_s``; whether a client has sent."""
+        """Wait for a client, a line event or ``wait_s``; return whether a client has sent."""
         until_s, due_s = self._clock.now_s() + wait_s, self._line.next_event_s()
         if due_s is not None:
             until_s = min(until_s, (due_s - self._offset_s) / self._pace)
@@ -180,14 +179,14 @@ class PtyServer:
             before_s, left_s = left_s, until_s - self._clock.now_s()
             if nap_s > 0.0 or left_s <= 0.0:
                 return False
-            nap_s = left_s if left_s == before_s else 0.0  # a clock that a test moves by hand
+            nap_s = left_s if left_s == before_s else 0.0  # a clock that a test moves
         return True
 
     def _open(self) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)  # no echo; held open so that clients may come and go
         os.set_blocking(self._master, False)
-        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))  # reports flushes, too
+        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))  # reports flushes
         self.path = os.ttyname(self._slave)
         self._speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         if self._link is not None:
@@ -195,12 +194,12 @@ class PtyServer:
 
     def _make_link(self, link: Path) -> None:
         if link.is_symlink() and (not link.exists() or os.readlink(link) == self.path):
-            link.unlink()  # left by a server that was killed, whose device's name may be ours now
+            link.unlink()  # left by a killed server, whose device name may be reused here
         try:
             link.symlink_to(self.path)
         except FileExistsError:
             what = f"leads to {os.readlink(link)}" if link.is_symlink() else "is no link"
-            self._link = None  # another's: not to be taken away at the end
+            self._link = None  # another server's: do not remove it at the end
             self.close()
             raise InputError(
                 f"{link}: is there already, and {what}: end the server whose it is, choose another "
@@ -210,7 +209,7 @@ class PtyServer:
     def _check_link(self) -> None:
         """Report once a second that another program deleted or redirected the link.
 
-        A deleted link is made again; another's is left alone.
+        A deleted link is restored; a redirected one is left alone.
         """
         link, now_s = self._link, self._clock.now_s()
         if link is None or now_s - self._link_checked_s < _LINK_CHECK_S:
@@ -231,7 +230,7 @@ class PtyServer:
         _LOGGER.warning("%s: %s; the servos are at %s", link, text, self.path)
 
     def _follow_baud_rate(self) -> None:
-        """Follow the client's baud rate, once it has set one."""
+        """Follow the client's baud rate after a change."""
         speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         if speed != self._speed:
             self._speed = speed
@@ -240,7 +239,6 @@ class PtyServer:
                 self._line.setBaudRate(baud)
 
     def _catch_up(self) -> None:
-        """Bring the line to the present."""
         line = self._line
         since_s = self._now_s() - line.clock.now_s()
         self.latest_s = max(self.latest_s, since_s - IDLE_S * self._pace)

@@ -23,7 +23,7 @@ _BUSES: "pytest.StashKey[list[ServoBus]]" = pytest.StashKey()
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
-    """Add to the report of a failed test how late its buses were served."""
+    """Add the delays of its buses to the report of a failed test."""
     outcome = yield
     report = outcome.get_result()
     if report.when == "call" and report.failed:

@@ -1,4 +1,4 @@
-"""A recorded exchange as a device: a line that gives the replies which it once heard."""
+"""A recorded exchange as a device: a line that repeats recorded replies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,17 +18,17 @@ _WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE)
 
 @dataclass(slots=True)
 class Exchange:
-    """A packet of the host, and what came back."""
+    """A packet of the host, and its replies."""
 
     question: bytes
     replies: list[Reply] = field(default_factory=list)
 
 
 class RecordedLine(Wire):
-    """A line without servos: it answers a packet as the recording does.
+    """A line without servos: it answers a packet as in the recording.
 
-    It searches a packet from the last match to the end, and then from the beginning. For a write it
-    compares servo and address only. Packets that the recording lacks get no reply.
+    It searches a packet from the last match to the end, then from the beginning. For a write it
+    compares servo and address only. Unknown packets get no reply.
     """
 
     def __init__(self, exchanges: Sequence[Exchange], baud: int = 1_000_000) -> None:
@@ -41,10 +41,10 @@ class RecordedLine(Wire):
 
     @staticmethod
     def of(path: Path, baud: int = 1_000_000) -> "RecordedLine":
-        """Line of a recording of ``bus serve --record``, whose servos were at ``baud``.
+        """Line of a recording of ``bus serve --record`` at ``baud``.
 
         Raises:
-            InputError: it is not such a recording, or no host sends anything in it.
+            InputError: it is not such a recording, or no host sends in it.
 
         """
         byte_s = BITS_PER_BYTE / baud
@@ -63,9 +63,9 @@ class RecordedLine(Wire):
 
     @property
     def ids(self) -> list[int]:
-        """Servos that answer in the recording."""
+        """Servos that reply in the recording."""
         told = {reply.data[_ID_AT] for each in self._exchanges for reply in each.replies}
-        return sorted(told - {BROADCAST_ID})  # of a fast read: all that were asked
+        return sorted(told - {BROADCAST_ID})  # of a fast read: all requested servos
 
     # the wire
 
@@ -104,7 +104,7 @@ def _same_write(recorded: bytes, data: bytes) -> bool:
 
 
 def _place(data: bytes) -> bytes | None:
-    """ID, instruction and address of a write; None of anything else."""
+    """ID, instruction and address of a write, else None."""
     if len(data) < _ADDRESS.stop or data[_CODE_AT] not in _WRITES:
         return None
     return bytes([data[_ID_AT], data[_CODE_AT]]) + data[_ADDRESS]

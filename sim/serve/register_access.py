@@ -1,4 +1,4 @@
-"""Registers and loads of simulated servos, set from outside: by a console or a test."""
+"""Registers and loads of simulated servos, set by a console or a test."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -33,10 +33,10 @@ def rows_of(line: BenchLine, servo_ids: Sequence[int] | None) -> list[int]:
 
 
 def register_name(line: BenchLine, name: str, rows: Sequence[int]) -> str:
-    """Name of a register as the tables spell it.
+    """Name of a register as in the tables.
 
     Raises:
-        InputError: not all servos have it; the closest names are listed.
+        InputError: not all servos have it; lists the closest names.
 
     """
     known = {each.lower(): each for each in _names(line)}
@@ -53,7 +53,7 @@ def _names(line: BenchLine) -> Iterable[str]:
 
 
 def set_register(line: BenchLine, rows: Sequence[int], name: str, value: int) -> str:
-    """Set a register of servos, as their firmware would; returns its name in the tables.
+    """Set a register of servos, like their firmware; return its name in the tables.
 
     Raises:
         InputError: the register is unknown, or measured by the servo.

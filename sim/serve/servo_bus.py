@@ -1,4 +1,4 @@
-"""One simulated bus for a test: in simulated time as a port object, in real time as a device."""
+"""One simulated bus for a test: a port object in simulated time, a device in real time."""
 
 import queue
 import threading
@@ -28,7 +28,7 @@ _BUSY_MS = 10.0
 
 
 class _Order:
-    """A change that the serving thread carries out."""
+    """A change for the serving thread."""
 
     def __init__(self, change: Callable[[], None]) -> None:
         self.change = change
@@ -37,7 +37,7 @@ class _Order:
 
 
 class ServoBus:
-    """One simulated bus; ``path`` starts serving it in real time."""
+    """One simulated bus; reading ``path`` starts serving it in real time."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class ServoBus:
 
     @property
     def path(self) -> str:
-        """Serial device to open; from the first look on, time on the bus is real time."""
+        """Serial device to open; the first access starts real time on the bus."""
         if self._server is None:
             self._server = PtyServer(self.line, WallClock())
             self._thread = threading.Thread(
@@ -71,10 +71,10 @@ class ServoBus:
         return self._server.path
 
     def __getitem__(self, register: str) -> NDArray[np.integer]:
-        """(S,) values of a register, in the order of the IDs; a copy, as fresh as a read is.
+        """(S,) current values of a register, in the order of the IDs; a copy.
 
         Raises:
-            KeyError: the register does not exist; the closest names are listed.
+            KeyError: the register does not exist; lists the closest names.
 
         """
         if self._server is None:
@@ -85,12 +85,9 @@ class ServoBus:
             raise KeyError(str(error)) from None
 
     def set(self, register: str, value: int, ids: Sequence[int] | None = None) -> None:
-        """Set a register of some servos, or of all, as another program would.
+        """Set a register of some servos, or of all (``ids`` None), like another program.
 
-        Args:
-            register: by the SDK's name.
-            value: whole number, as it is in the register.
-            ids: of the servos; None: all.
+        ``register`` is the SDK's name; ``value`` the raw number.
 
         Raises:
             InputError: the register or an ID is unknown, or the servo measures the register.
@@ -114,7 +111,7 @@ class ServoBus:
 
     @property
     def lateness(self) -> str | None:
-        """How late the bus was served, as one line; None before ``path`` was read."""
+        """Delay of the bus as one line; None before ``path`` was read."""
         server = self._server
         if server is None:
             return None
@@ -131,7 +128,7 @@ class ServoBus:
         return rows_of(self.line, ids)
 
     def _do(self, change: Callable[[], None]) -> None:
-        """Carry out a change between two steps of the server, or at once without one."""
+        """Execute a change between two steps of the server, or at once without one."""
         if self._thread is None:
             self.line.settle()
             change()

@@ -1,4 +1,4 @@
-"""A body that is looked at in regular intervals, and whose goals may arrive late."""
+"""A body with regular samples and, optionally, delayed goals."""
 
 from collections import deque
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from snakewalk.sim.plant import Plant, ServoDrive
 class WatchedPlant:
     """Calls ``on_sample`` every ``period_s`` of simulated time; implements ``sim.plant.Plant``.
 
-    With ``goal_delay_s`` the motors follow the goals of the servos later, as if they came late.
+    With ``goal_delay_s`` the motors follow the servos' goals later.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class WatchedPlant:
 
     @property
     def time_s(self) -> float:
-        """Time of the state that the shafts show."""
+        """Time of the shafts' state."""
         return self._plant.time_s
 
     @property
@@ -45,7 +45,7 @@ class WatchedPlant:
         return self._plant.velocity_rad_s
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
-        """Step the body under ``drive``; stop for each sample."""
+        """Step the body under ``drive``, with a stop at each sample."""
         while (due_s := self._start_s + self._samples * self._period_s) <= until_s:
             self._step(due_s, drive)
             self._samples += 1

@@ -1,10 +1,9 @@
-"""Backlash: play of the gears between the motor and the shaft that the encoder measures.
+"""Backlash: play of the gears between the motor and the measured shaft.
 
-Rotor and shaft are two inertias. One side of a tooth touches and both turn as one, as long as the
-torque in the teeth presses them together. Otherwise the rotor turns freely in the gap, with the
-friction of the gears, and the shaft without the motor. Where the gap closes, both go on with their
-common momentum (an impact without rebound; Moreau, "Unilateral contact and dry friction in finite
-freedom dynamics", 1988).
+Rotor and shaft are two inertias. They turn as one while the torque in the teeth presses one side
+together. Otherwise the rotor turns freely in the gap, with the friction of the gears, and the shaft
+without the motor. When the gap closes, both continue with their common momentum (an impact without
+rebound; Moreau, "Unilateral contact and dry friction in finite freedom dynamics", 1988).
 """
 
 from typing import Final
@@ -67,7 +66,7 @@ def turn_with_backlash(
     damping_n_m_s: float,
     load_n_m: float,
 ) -> tuple[float, float]:
-    """Speed of a shaft after a step, and what it turned more than that speed says, over ``h``.
+    """Speed of a shaft after a step, and its additional turn over ``h``.
 
     Args:
         gear: (13,) fields of a ``Gearbox``.
@@ -78,7 +77,7 @@ def turn_with_backlash(
         before_rad_s: the shaft's speed before the step.
         joined_rad_s: its speed after the step if rotor and shaft turn as one.
         push_n_m: the motor's torque at rest.
-        damping_n_m_s: its loss with the rotor's speed, viscous friction included.
+        damping_n_m_s: its loss per rotor speed, viscous friction included.
         load_n_m: torque of the load on the shaft.
 
     """

@@ -1,8 +1,7 @@
-"""The control tables of all servos of a bus as one array, and the rules for reading and writing.
+"""The control tables of all servos of a bus as one array, and the rules of access.
 
-A register is a live, typed view over all servos at once, so a group read or write is one slice. The
-actions of registers (drive the motor, show the shaft, run the watchdog) are in
-``sim.servo.firmware``.
+A register is a live, typed view over all servos, so a group read or write is one slice.
+``sim.servo.firmware`` has the effects of registers.
 """
 
 import math
@@ -68,21 +67,20 @@ class ServoScales:
 
 
 class ServoBank:
-    """S servos with factory settings, except ID and baud rate, of one model or of several.
+    """S servos with factory settings except ID and baud rate, of one or several models.
 
-    The registers of a run are at the same address in all models of a bank, so a register is one
-    column over all servos. Other registers and the rules are looked up by row.
+    The registers of a run have the same address in all models, so a register is one column. Other
+    registers and the rules are looked up by row.
 
     Args:
         ids: in the order of the chain.
         model: name, file or record; of all servos, or (S,) of each.
         baud: of all servos.
-        clashing: two servos may share an ID, as they do in an unlucky chain.
+        clashing: permits two servos with one ID.
 
     Raises:
         ControlTableError: a model cannot be simulated, two models have registers at different
-            addresses, an ID is out of range or used twice, or the baud rate is not one of a
-            model's.
+            addresses, an ID is out of range or used twice, or a model lacks the baud rate.
 
     """
 
@@ -155,16 +153,16 @@ class ServoBank:
         return len(self.ids)
 
     def __getitem__(self, name: str) -> SignedInts:
-        """(S,) live view of a register of all servos; 0 for servos without it."""
+        """(S,) live view of a register; 0 for servos without it."""
         return self._columns[name]
 
     def __contains__(self, name: object) -> bool:
-        """Whether a servo has the register, and all that have it at the same address."""
+        """Whether servos have the register, all at the same address."""
         return name in self._columns
 
     @property
     def names(self) -> Iterable[str]:
-        """Registers that lie at the same place in all models that have them."""
+        """Registers with the same address in all models that have them."""
         return self._registers
 
     def register(self, name: str) -> Register:
@@ -181,27 +179,27 @@ class ServoBank:
         return tuple(each.facts for each in self._of_row)
 
     def range_of(self, row: int, name: str) -> tuple[int, int]:
-        """Lowest and highest value that a register accepts; 0 and 0 if it is read-only."""
+        """Lowest and highest accepted value; 0 and 0 if read-only."""
         rule = self._of_row[row].rules[name]
         return (rule.low or 0, rule.high or 0)
 
     def tuned_to(self, baud: int) -> Indices:
-        """Rows of the servos that are tuned to ``baud``."""
+        """Rows of the servos at ``baud``."""
         codes = np.array([codes.get(baud, -1) for codes in self._codes])
         return np.flatnonzero(self["Baud Rate"] == codes)
 
     def alert(self, rows: Indices | slice | int) -> Bytes:
-        """Bit 7 of the error field: set while Hardware Error Status(70) is not 0."""
+        """Bit 7 of the error field: Hardware Error Status(70) is not 0."""
         wrong = (self["Hardware Error Status"][rows] != 0) | self.false_alert[rows]
         alert: Bytes = np.multiply(wrong, ALERT, dtype=np.uint8)
         return alert
 
     def shut_down(self, row: int) -> bool:
-        """Whether a hardware error of Shutdown(63) holds the torque off until a reboot."""
+        """Whether a hardware error in Shutdown(63) keeps the torque off until a reboot."""
         return bool(self["Hardware Error Status"][row] & self["Shutdown"][row])
 
     def readable(self, rows: Indices | int, address: int, length: int) -> bool:
-        """Whether a block lies in the tables of some servos and begins at a register of each.
+        """Whether a block is in the tables of some servos and begins at a register of each.
 
         Gaps between registers read as 0.
         """
@@ -209,9 +207,9 @@ class ServoBank:
         return inside and bool(self._defined[rows, address].all())
 
     def check(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
-        """Error of the reply to a write of ``data``; nothing is written.
+        """Error of the reply to a write of ``data``; writes nothing.
 
-        ``ram_only`` refuses the EEPROM, as a servo does that is addressed by its secondary ID.
+        ``ram_only`` rejects the EEPROM, as for a servo addressed by its secondary ID.
         """
         if not data:
             return ResultError.DATA_LENGTH
@@ -239,7 +237,7 @@ class ServoBank:
         return ResultError.NONE
 
     def write(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
-        """Write a block to one servo, all of it or, with an error, none of it."""
+        """Write a block to one servo completely or, with an error, not at all."""
         error = self.check(row, address, data, ram_only=ram_only)
         if not error:
             for at, run in self.indirect.resolve(row, address, data, self._of_row[row].indirect):
@@ -250,7 +248,7 @@ class ServoBank:
     def register_write(
         self, row: int, address: int, data: bytes, *, ram_only: bool = False
     ) -> ResultError:
-        """Reg Write: check as ``write`` does, and keep for Action."""
+        """Reg Write: check as ``write``, and store for Action."""
         error = self.check(row, address, data, ram_only=ram_only)
         if not error:
             self._registered[row] = (address, data)
@@ -258,12 +256,12 @@ class ServoBank:
         return error
 
     def take_registered(self, row: int) -> tuple[int, bytes] | None:
-        """Remove and return the registered write, address and data; None without one."""
+        """Remove and return the registered write (address, data), or None."""
         self["Registered Instruction"][row] = 0
         return self._registered.pop(row, None)
 
     def reset(self, rows: Indices, keep: Sequence[str], ram_only: bool = False) -> None:
-        """Set initial values, in the RAM area alone (reboot) or in both (factory reset)."""
+        """Set initial values, in the RAM only (reboot) or in both areas (factory reset)."""
         for kind, own in self._kinds:
             some = np.intersect1d(rows, own)
             for name, rule in kind.rules.items():
@@ -281,7 +279,7 @@ class ServoBank:
         self.indirect.refresh()
 
     def back_up(self, row: int) -> ResultError:
-        """Store the EEPROM and the saved part of the RAM; only with torque off (e-manual)."""
+        """Store the EEPROM and the backed-up part of the RAM; only with torque off (e-manual)."""
         if self["Torque Enable"][row]:
             return ResultError.RESULT_FAIL
         if not self.has(row, "Backup Ready"):
@@ -291,7 +289,7 @@ class ServoBank:
         return ResultError.NONE
 
     def restore(self, row: int) -> ResultError:
-        """Put the stored EEPROM back; the servo then reboots."""
+        """Restore the stored EEPROM; the servo then reboots."""
         if self["Torque Enable"][row] or row not in self._backup:
             return ResultError.RESULT_FAIL
         end = self._of_row[row].facts.ram_from
@@ -299,7 +297,7 @@ class ServoBank:
         return ResultError.NONE
 
     def restore_ram(self, row: int) -> None:
-        """Put the stored gains, profile and indirect addresses back (RAM Restore, at start)."""
+        """Restore the stored gains, profile and indirect addresses (RAM Restore, at start)."""
         kept = self._backup.get(row)
         if kept is None:
             return
@@ -312,7 +310,7 @@ class ServoBank:
         self.indirect.refresh()
 
     def switch_mode(self, rows: Indices) -> None:
-        """Reset what a new Operating Mode(11) resets: gains, profile, limits of the output."""
+        """Reset gains, profile and output limits after a change of Operating Mode(11)."""
         for kind, own in self._kinds:
             some = np.intersect1d(rows, own)
             for name in MODE_RESETS:
@@ -323,7 +321,7 @@ class ServoBank:
         self._zero_goal_velocity(rows)
 
     def _zero_goal_velocity(self, rows: Indices) -> None:
-        """Stop servos in velocity mode: enabling torque alone turns nothing.
+        """Stop servos in velocity mode: enabling torque alone causes no motion.
 
         (E-manual, Bus Watchdog(98), example, steps 1 and 2.)
         """
@@ -347,7 +345,7 @@ class ServoBank:
         return ResultError.NONE
 
     def goal_limits(self, name: str, row: int) -> tuple[int, int]:
-        """Least and greatest value that a goal register accepts at present."""
+        """Least and greatest value that a goal register accepts now."""
         if name == "Goal Position":
             if self["Operating Mode"][row] == POSITION_MODE:
                 return int(self["Min Position Limit"][row]), int(self["Max Position Limit"][row])
@@ -365,7 +363,7 @@ class ServoBank:
 
 
 def _in_one_place(kinds: Sequence[ModelRegisters]) -> dict[str, Register]:
-    """Registers that lie at the same place in all models that have them."""
+    """Registers with the same address in all models that have them."""
     found: dict[str, Register] = {}
     apart: set[str] = set()
     for kind in kinds:
@@ -376,5 +374,5 @@ def _in_one_place(kinds: Sequence[ModelRegisters]) -> dict[str, Register]:
 
 
 def _different(models: Sequence[Model]) -> list[Model]:
-    """Models without repetitions; records cannot be hashed."""
+    """Models without repetitions; records are not hashable."""
     return [model for k, model in enumerate(models) if model not in models[:k]]

@@ -1,4 +1,4 @@
-"""A bench of independent shafts: enough mechanics to serve and test the bus without MuJoCo."""
+"""A bench of independent shafts: mechanics for the bus without MuJoCo."""
 
 from collections.abc import Callable, Sequence
 
@@ -22,10 +22,9 @@ _READ = readonly_array(layout="C")
 class BenchPlant:
     """J shafts with inertia and friction, semi-implicit Euler; a ``sim.plant.Plant``.
 
-    Viscous damping and back-EMF are taken implicitly, and dry friction never reverses a shaft, so
-    that any step size is stable and a shaft without drive comes to rest exactly. A ``gear`` (of all
-    shafts, or one or none each) brings its own inertia, added, and its own friction, in place of
-    ``viscous_n_m_s`` and ``dry_n_m``.
+    Viscous damping and back-EMF are implicit, and dry friction never reverses a shaft: any step
+    size is stable, and a shaft without drive comes to rest exactly. A ``gear`` (of all shafts, or
+    one or None each) adds its inertia, and its friction replaces ``viscous_n_m_s`` and ``dry_n_m``.
     """
 
     def __init__(
@@ -69,7 +68,7 @@ class BenchPlant:
         return self._velocity
 
     def set_load(self, joints: Sequence[int], load_n_m: float) -> None:
-        """Put a constant load on shafts, from the present time on; where none is a function."""
+        """Put a constant load on shafts; without effect if the load is a function."""
         self._constant_load[list(joints)] = load_n_m
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
@@ -120,10 +119,10 @@ def _step(
     heat_j: Floats,
     work_j: Floats,
 ) -> None:
-    """Make ``steps`` steps of ``h`` under a constant load; the columns of a drive in their order.
+    """Make ``steps`` steps of ``h`` under a constant load; then the columns of a drive in order.
 
-    ``gear`` (13, J): the fields of ``Gearbox``, the shaft's own inertia, ``shaft_kg_m2``, added to
-    the rotor's. ``play`` (3, J): state of the backlash.
+    ``gear`` (13, J): the fields of ``Gearbox``, with ``shaft_kg_m2`` added to the rotor's inertia.
+    ``play`` (3, J): state of the backlash.
     """
     for k in range(len(position)):
         inertia, viscous = gear[0, k], gear[2, k]

@@ -1,8 +1,7 @@
-"""Shafts that something holds: a blocked gear, or a body in the way.
+"""Blocked shafts: a blocked gear, or an obstacle to the body.
 
-A plant has no blocked shafts, so the drive of a blocked servo becomes a stiff brake at the place
-where it was blocked. Its registers show what those of the real servo would: the output that its
-error asks for, and the stall current.
+A plant has no blocked shafts, so the drive of a blocked servo becomes a stiff brake at that angle.
+Its registers show the values of a real servo: the output for its error, and the stall current.
 """
 
 import numpy as np
@@ -17,7 +16,7 @@ STRENGTH = 4.0
 
 
 class BlockedShaft:
-    """Which servos of a bus are blocked, and the drive and registers of those."""
+    """Blocked servos of a bus, their drive and registers."""
 
     def __init__(self, drive: ServoDrive) -> None:
         self._drive = drive
@@ -33,7 +32,7 @@ class BlockedShaft:
         """Whether a servo is blocked."""
 
     def block(self, row: int, at_rad: float) -> None:
-        """Hold a shaft where it is; the firmware then applies its registers again."""
+        """Hold a shaft; the firmware then applies its registers again."""
         self.rows[row], self._at_rad[row], self.any = True, at_rad, True
 
     def free(self, row: int) -> None:
@@ -42,14 +41,14 @@ class BlockedShaft:
         self.any = bool(self.rows.any())
 
     def hold(self, fresh: Bools | None = None) -> None:
-        """Turn the blocked servos' drive, just set by registers or control loops, into a brake.
+        """Turn the newly set drive of blocked servos into a brake.
 
-        ``fresh`` (S,) are the servos whose goal has just been set; None: all.
+        ``fresh`` (S,) are the servos with a new goal; None: all.
         """
         if not self.any:
             return
         drive, rows = self._drive, self.rows
-        updated = rows & (drive.pwm_limit <= 1.0)  # else that is still the brake's
+        updated = rows & (drive.pwm_limit <= 1.0)  # else it is still the brake's
         self._on = np.where(updated, drive.torque_on, self._on)
         self._limit = np.where(updated, drive.pwm_limit, self._limit)
         self._limit_a = np.where(updated, drive.current_limit_a, self._limit_a)
@@ -66,11 +65,11 @@ class BlockedShaft:
         drive.current_limit_a[rows] = np.inf
 
     def pwm(self) -> Floats:
-        """(S,) output as the servos see it, fraction of the supply."""
+        """(S,) output in the servos' registers, fraction of the supply."""
         return np.where(self.rows, self._output, self._drive.pwm) if self.any else self._drive.pwm
 
     def current_a(self) -> Floats:
-        """(S,) current as the servos measure it."""
+        """(S,) measured current."""
         if not self.any:
             return self._drive.current_a
         stall = self._output * self._drive.supply_v / self._drive.resistance_ohm
@@ -78,6 +77,6 @@ class BlockedShaft:
         return np.where(self.rows, stall, self._drive.current_a)
 
     def limit_a(self) -> Floats:
-        """(S,) limit of the current that the registers hold."""
+        """(S,) current limit in the registers."""
         limit_a = self._drive.current_limit_a
         return np.where(self.rows, self._limit_a, limit_a) if self.any else limit_a

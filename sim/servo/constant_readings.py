@@ -1,4 +1,4 @@
-"""Constant readings: registers that do not show the measured value, as of a dead sensor."""
+"""Constant readings: registers of a dead sensor."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,12 +11,7 @@ class ConstantReadings:
     """Values that registers of some servos show instead of the measured ones."""
 
     def __init__(self, view: Callable[[str], NDArray[np.integer[Any]]]) -> None:
-        """Start without any.
-
-        Args:
-            view: returns the live view (S,) of a register.
-
-        """
+        """Start empty; ``view`` returns the live view (S,) of a register."""
         self._view = view
         self._values: dict[str, dict[int, int]] = {}
 
@@ -26,13 +21,13 @@ class ConstantReadings:
         return bool(self._values)
 
     def set(self, rows: NDArray[np.intp], name: str, value: int | None) -> None:
-        """Show a value in a register of servos; None: the one that it shows now."""
+        """Show a value in a register of servos; None: the present one."""
         shown = self._view(name)
         by_row = self._values.setdefault(name, {})
         by_row |= {row: int(shown[row]) if value is None else value for row in rows.tolist()}
 
     def clear(self, rows: NDArray[np.intp], name: str) -> None:
-        """Show the measured values in a register of servos again."""
+        """Show measured values in a register of servos again."""
         by_row = self._values.get(name, {})
         for row in rows.tolist():
             by_row.pop(row, None)

@@ -1,10 +1,10 @@
-"""The servos' own control loops where they are more than the bridge's plain proportional law.
+"""The servos' control loops beyond the plain proportional law.
 
 Position PID with feed-forward along a profile, and the velocity loop, run every ``CONTROL_S``. They
-reach the motors through the same drive: a proportional gain, and a goal shifted by the sum of the
-other terms. Gains are the e-manual's: K_P = register / 128 PWM units a tick, K_D / 16, K_I / 65536,
-feed-forward / 4; velocity K_P / 128 a unit of velocity, K_I / 65536. It gives no unit of time for
-the other terms: they are taken a control period, one millisecond (ours).
+reach the motors through the same drive: a proportional gain, and a goal shifted by the other terms.
+Gains are the e-manual's: K_P = register / 128 PWM units per tick, K_D / 16, K_I / 65536,
+feed-forward / 4; velocity K_P / 128 per unit of velocity, K_I / 65536. It gives no time unit for
+the other terms; here it is a control period, one millisecond (ours).
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ _FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 
 
 class ControlLoops:
-    """Control loops of all servos of a bank; idle, and free of cost, in the plain case."""
+    """Control loops of all servos of a bank; idle in the plain case."""
 
     def __init__(self, bank: ServoBank, drive: ServoDrive, motor: MotorColumns) -> None:
         self._bank, self._drive, self._motor = bank, drive, motor
@@ -59,7 +59,7 @@ class ControlLoops:
         self._last_error = np.zeros(servos)
 
     def apply_registers(self, on: Bools, shaft_rad: Floats) -> None:
-        """Apply modes, gains and profiles after a write; servos that join start where they are."""
+        """Apply modes, gains and profiles after a write; joining servos start at their angle."""
         bank = self._bank
         mode = bank["Operating Mode"]
         placed = (mode == POSITION_MODE) | (mode == EXTENDED_MODE) | (mode == CURRENT_POSITION_MODE)
@@ -89,7 +89,7 @@ class ControlLoops:
             self._settings = np.stack([goal_rad_s, bank["Profile Acceleration"], *gains])
 
     def set_goals(self, goal_rad: Floats) -> None:
-        """Pass on position goals, in the shafts' frame."""
+        """Set position goals, in the shafts' frame."""
         if not self.active:
             return
         bank = self._bank
@@ -99,9 +99,9 @@ class ControlLoops:
         self.trajectory.set_goals(goal, velocity, ramp, self._timed)
 
     def tick(self, plant: Plant, goal_rad: Floats, sign: Floats, held: Bools) -> None:
-        """Run one control period: set the drive of the servos that need these loops.
+        """Run one control period: set the drive of the servos with these loops.
 
-        ``goal_rad`` is the place of held servos; ``sign`` turns registers into the shafts' frame.
+        ``goal_rad`` is the angle of held servos; ``sign`` converts registers to the shafts' frame.
         """
         drive, path = self._drive, self.trajectory
         if self._any_velocity:
@@ -122,7 +122,7 @@ class ControlLoops:
 
 @compiled("float64(float64, float64, float64, float64)")
 def _limited_sum(errors: float, gain: float, pwm_limit: float, full_pwm: float) -> float:
-    """Sum of errors that puts out no more than the bridge may (no wind-up)."""
+    """Sum of errors limited to the bridge's output (anti-windup)."""
     limit = pwm_limit * full_pwm / max(gain, 1e-12) if gain > 0.0 else 0.0
     return min(max(errors, -limit), limit)
 
@@ -147,10 +147,10 @@ def _run_position(
     p_gain_per_rad: Floats,
     goal_rad: Floats,
 ) -> None:
-    """Position PID with feed-forward, of the servos in ``run``.
+    """Position PID with feed-forward, for the servos in ``run``.
 
     ``gains`` (5, S): P in the drive's unit, I, D, feed-forward of speed and of acceleration.
-    ``scales`` (4, S): positions in a radian, PWM of full output, units of velocity, acceleration.
+    ``scales`` (4, S): positions per radian, PWM of full output, units of velocity, acceleration.
     """
     for k in range(len(run)):
         if not run[k]:
@@ -188,10 +188,10 @@ def _run_velocity(
     sums: Floats,
     goal_rad: Floats,
 ) -> None:
-    """Velocity PI along a ramp, of the servos in ``run``.
+    """Velocity PI along a ramp, for the servos in ``run``.
 
-    ``settings`` (4, S): goal in rad/s of the servo, Profile Acceleration, P and I. ``scales`` as
-    in ``_run_position``.
+    ``settings`` (4, S): goal in rad/s of the servo, Profile Acceleration, P and I. ``scales`` as in
+    ``_run_position``.
     """
     for k in range(len(run)):
         if not run[k]:

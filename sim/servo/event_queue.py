@@ -1,11 +1,11 @@
-"""Events on a simulated bus that happen at a time of their own."""
+"""Scheduled events on a simulated bus."""
 
 import heapq
 from collections.abc import Callable
 
 
 class EventQueue:
-    """Actions by time, run in order; equal times in the order of scheduling."""
+    """Actions by time; equal times in scheduling order."""
 
     def __init__(self) -> None:
         self._scheduled: list[tuple[float, int, Callable[[], None]]] = []
@@ -20,7 +20,7 @@ class EventQueue:
         self.next_s = self._scheduled[0][0]
 
     def run_due(self, now_s: float) -> None:
-        """Run all that is due."""
+        """Run all due actions."""
         while self._scheduled and self._scheduled[0][0] <= now_s:
             heapq.heappop(self._scheduled)[2]()
         self.next_s = self._scheduled[0][0] if self._scheduled else float("inf")

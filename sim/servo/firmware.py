@@ -1,7 +1,7 @@
 """The servos' firmware: registers drive the motors, and the shafts show in the registers.
 
-Physics is always stepped first to the time of an access (with stops where a watchdog runs out or a
-protection is due); only then are registers read or written.
+Physics is first stepped to the time of an access (with stops for watchdogs and protections); only
+then are registers read or written.
 """
 
 from collections.abc import Sequence
@@ -62,7 +62,7 @@ class Firmware:
         joints = len(bank)
         mounted = mounting or Mounting(np.ones(joints), np.zeros(joints))
         self._mounted_sign = mounted.sign
-        # a whole number of positions, so that a mirrored servo's numbers are mirrored to the bit
+        # a whole number of positions, so that a mirrored servo's numbers are exact mirror images
         self._scales = scales = bank.scales
         self._mounted_ticks = np.rint(mounted.zero_rad * scales.positions_per_rad)
         self._extended = np.array([bank.range_of(row, "Goal Position") for row in range(joints)]).T
@@ -145,7 +145,7 @@ class Firmware:
     # from registers to motors
 
     def apply_registers(self) -> None:
-        """Apply the registers after a write of anything but goal positions alone."""
+        """Apply the registers after a write of more than goal positions."""
         bank, drive = self.bank, self.drive
         mode = bank["Operating Mode"]
         on = bank["Torque Enable"] == 1
@@ -195,9 +195,9 @@ class Firmware:
         self._watchdog.arm(on)
 
     def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], at: int) -> None:
-        """Goal Position(116) of many servos: entries of ``raw`` from ``at`` on, ID and 4 bytes.
+        """Goal Position(116) of many servos: entries of ``raw`` from ``at``, ID and 4 bytes.
 
-        Values out of limits are refused.
+        Values out of limits are rejected.
         """
         plain = not (
             self._holding or self._pushed or self.control_loops.active or self.blocked_shaft.any
@@ -221,7 +221,7 @@ class Firmware:
                 self.apply_registers()
 
     def reboot(self, row: int, factory_keeping: tuple[str, ...] | None = None) -> None:
-        """Restart one servo; with ``factory_keeping``, first reset all but these registers."""
+        """Restart one servo; with ``factory_keeping``, first reset all other registers."""
         rows = np.array([row])
         if factory_keeping is None:
             self.bank.reset(rows, keep=(), ram_only=True)
@@ -230,7 +230,7 @@ class Firmware:
         self.power_up(rows)
 
     def power_up(self, rows: NDArray[np.intp]) -> None:
-        """After power-on or reboot: one turn of position, goal = present, protections cleared."""
+        """State after power-on or reboot: one turn of position, goal = present, no alarms."""
         self._reset_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
         self._last_on[rows] = False
@@ -249,7 +249,7 @@ class Firmware:
             self.apply_registers()
 
     def clear_turns(self, row: int) -> bool:
-        """Clear instruction: position back into one turn; refused (False) while moving."""
+        """Clear instruction: position back into one turn; False while moving."""
         if self._present_values.turning()[row]:
             return False
         self._reset_turns(np.arange(len(self.bank)) == row)
@@ -257,7 +257,7 @@ class Firmware:
         return True
 
     def clear_error(self, row: int) -> bool:
-        """Clear instruction: clear hardware errors whose cause is gone; False if one remains."""
+        """Clear instruction: clear hardware errors without a cause; False if one remains."""
         self.bank["Hardware Error Status"][row] = 0
         self.protection.restart(np.array([row]))
         self.protection.check(self.plant)
@@ -265,7 +265,7 @@ class Firmware:
         return not self.bank["Hardware Error Status"][row]
 
     def hold_position(self) -> None:
-        """Give every servo its present position as goal, at rest: its shaft was put elsewhere."""
+        """Set every goal to the present position, at rest, after a shaft was moved."""
         torque, goal = self.bank["Torque Enable"], self.bank["Goal Position"]
         on = torque.copy()
         torque[:] = 0
@@ -288,7 +288,7 @@ class Firmware:
         self.apply_registers()
 
     def cut_output(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Cut the output stages of servos off their motors, or connect them again."""
+        """Disconnect output stages from their motors, or reconnect them."""
         self.no_output[rows] = on
         self.apply_registers()
 
@@ -302,12 +302,12 @@ class Firmware:
         self._readings.clear(rows, name)
 
     def cut_power(self, rows: NDArray[np.intp]) -> None:
-        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
+        """Switch the supply off: shafts go limp, only the EEPROM remains."""
         self.powered[rows] = False
         self.apply_registers()
 
     def restore_power(self, rows: NDArray[np.intp]) -> None:
-        """Give the supply back: the servos restart, and have lost their turns."""
+        """Restore the supply: the servos restart without their turn counts."""
         self.powered[rows] = True
         self.bank.reset(rows, keep=(), ram_only=True)
         self.power_up(rows)
@@ -321,7 +321,7 @@ class Firmware:
             self._readings.apply()
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
-        """Write the present values, at least those that a read of this block shows."""
+        """Write the present values, at least those in this block."""
         indirect, present = self.bank.indirect, self._present_values
         gather = indirect.covers(address, length)
         stop = address + length
@@ -359,9 +359,9 @@ class Firmware:
         self._turns[which] = np.floor(from_low / scales.positions_per_turn)[which]
 
     def _hold(self, late: NDArray[np.bool_]) -> None:
-        """Hold the servos whose watchdog has run out where they are, without a profile.
+        """Hold the servos whose watchdog has expired at their angle, without a profile.
 
-        Their profile registers are 0 from then on (e-manual, Bus Watchdog(98), example, step 4).
+        Their profile registers become 0 (e-manual, Bus Watchdog(98), example, step 4).
         """
         for name in PROFILE:
             self.bank[name][late] = 0

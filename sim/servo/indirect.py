@@ -1,7 +1,7 @@
-"""Indirect Address and Indirect Data: bytes of the RAM area gathered where one block reads them.
+"""Indirect Address and Indirect Data: bytes of the RAM area gathered for one block.
 
-An Indirect Data byte *is* the byte that its Indirect Address points at: it reads and writes as that
-one does, with its access and range. (e-manual, Indirect Address, Indirect Data.)
+An Indirect Data byte reads and writes the byte at its Indirect Address, with its access and range.
+(e-manual, Indirect Address, Indirect Data.)
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from snakewalk.sim.servo.register_rules import IndirectBlock
 
 
 class Indirect:
-    """The indirect registers in the control tables ``table`` (S, bytes) of all servos.
+    """The indirect registers in the control tables ``table`` (S, bytes).
 
     ``blocks`` are those of each model with the rows of its servos.
     """
@@ -27,14 +27,14 @@ class Indirect:
         """Whether any Indirect Data byte stands for another than itself."""
 
     def refresh(self) -> None:
-        """Look up again whether any byte points anywhere but at itself."""
+        """Update whether any byte points elsewhere than at itself."""
         self.used = any(
             bool((self._targets(rows, b) != np.arange(b.data, b.data + b.count)).any())
             for rows, b in self._blocks
         )
 
     def on_write(self, address: int, length: int) -> None:
-        """Refresh after a write that may have touched an Indirect Address."""
+        """Refresh after a write to an Indirect Address."""
         if any(
             address < block.addresses + 2 * block.count and block.addresses < address + length
             for _, block in self._blocks
@@ -42,14 +42,14 @@ class Indirect:
             self.refresh()
 
     def covers(self, address: int, length: int) -> bool:
-        """Whether a read of this block has to ``gather`` before."""
+        """Whether a read of this block must ``gather`` first."""
         return self.used and any(
             address < block.data + block.count and block.data < address + length
             for _, block in self._blocks
         )
 
     def gather(self) -> None:
-        """Copy to every Indirect Data byte the byte that it stands for, all servos at once."""
+        """Copy its target to every Indirect Data byte."""
         for rows, block in self._blocks:
             values = np.take_along_axis(self._table[rows], self._targets(rows, block), axis=1)
             self._table[rows, block.data : block.data + block.count] = values
@@ -57,7 +57,7 @@ class Indirect:
     def resolve(
         self, row: int, address: int, data: bytes, blocks: Sequence[IndirectBlock]
     ) -> list[tuple[int, bytes]]:
-        """Split a write into (address, bytes) where it really goes, consecutive bytes together.
+        """Split a write into (address, bytes) of its targets, consecutive bytes together.
 
         ``blocks`` are those of the servo's model.
         """

@@ -1,8 +1,7 @@
 """Motors and gearboxes of servos, from the files of their models and of the robot.
 
-A model's file has torque, current and speed at the recommended voltage; the other constants are
-derived from them here. Thermal figures are not published: they are ours, and only determine when a
-hot servo shuts down, not how it moves.
+A model's file has torque, current and speed at the recommended voltage; other constants are derived
+here. Thermal figures are ours; they only determine when a hot servo shuts down.
 """
 
 import math
@@ -72,7 +71,7 @@ class MotorModel:
 
     @property
     def resistance_ohm(self) -> float:
-        """All the supply drops over the winding at stall."""
+        """At stall the winding drops the whole supply."""
         return self.nominal_v / self.stall_current_a
 
     @property
@@ -86,11 +85,11 @@ class MotorModel:
         return self.nominal_v / self.no_load_rad_s
 
     def with_constants(self, own: MotorConfig | None) -> "MotorModel":
-        """Return the motor with constants of a robot's file; the rest stays the model's."""
+        """The motor with the constants of a robot's file."""
         if own is None:
             return self
         k_t, k_e = self.torque_constant_n_m_a, self.back_emf_v_s
-        if own.torque_constant_n_m_a is not None:  # one winding: the two are the same
+        if own.torque_constant_n_m_a is not None:  # one winding: both are equal
             k_t = k_e = own.torque_constant_n_m_a
         stall_a = self.nominal_v / (own.resistance_ohm or self.resistance_ohm)
         divisor = self.p_gain_divisor
@@ -106,7 +105,7 @@ class MotorModel:
 
 
 class _ByName(Mapping[str, V]):
-    """Values of the shipped models that can be simulated, made when they are looked up."""
+    """Values of the shipped models that can be simulated, made on look-up."""
 
     def __init__(self, make: Callable[[ServoModel], V | None]) -> None:
         self._make = make
@@ -130,7 +129,7 @@ MOTORS: Mapping[str, MotorModel] = _ByName(MotorModel.of)
 
 
 def known_motors(robot: RobotConfig) -> list[MotorModel | None]:
-    """Motors of a robot's J servos, with the constants of its file; None if not known."""
+    """Motors of a robot's J servos, with the constants of its file; None if unknown."""
     models = zip(robot.servo_records, robot.motors, strict=True)
     return [
         None if facts.motor is None else MotorModel.of(facts).with_constants(own)
@@ -150,7 +149,7 @@ def motors_of(robot: RobotConfig) -> list[MotorModel]:
 
 
 class MotorColumns:
-    """Constants of the motors of S servos, (S,) each; as in ``MotorModel``."""
+    """Constants of the motors of S servos, (S,) each."""
 
     def __init__(self, motors: Sequence[MotorModel]) -> None:
         def column(name: str) -> Floats:
@@ -172,13 +171,13 @@ class MotorColumns:
 
 
 def p_gain_per_rad(register: int | AnyInts, motor: MotorModel | MotorColumns) -> Floats:
-    """PWM fraction per radian of position error for Position P Gain(84)."""
+    """PWM fraction per radian of error for Position P Gain(84)."""
     gain = np.asarray(register, dtype=np.float64)
     return np.asarray(gain / motor.p_gain_divisor * motor.positions_per_rad / motor.full_pwm)
 
 
 def make_drive(motors: Sequence[MotorModel], supply_v: ArrayLike) -> ServoDrive:
-    """Make a drive of J servos at rest: torque off, goals 0, gains 0; registers set the rest."""
+    """Make a drive of J servos at rest: torque off, zero goals and gains."""
     joints, columns = len(motors), MotorColumns(motors)
     return ServoDrive(
         torque_on=np.zeros(joints),
@@ -198,13 +197,13 @@ class Gearbox:
     """Friction and inertia of a gearbox at the output shaft; numbers, or (J,) of J servos.
 
     The greatest friction torque is ``dry + |by_load t_load - by_motor t_motor|``: teeth press
-    harder the more they carry, and most when motor and load strive against each other. While the
-    shaft is slow it is ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|`` more, times
-    ``exp(-(|w| / stribeck_rad_s)^stribeck_exponent)``. If motor and load oppose each other, the
-    slow share also has a square: ``by_load_square t_load^2`` while the motor is stronger,
-    ``by_motor_square t_motor^2`` while the load is. (Duclusaud et al., "Extended Friction Models
-    for the Physics Simulation of Servo Actuators", ICRA 2025: models M1 to M6.) It never reverses a
-    shaft; a shaft that it can hold rests.
+    harder under load, most if motor and load oppose each other. A slow shaft has an additional
+    ``stribeck + |by_load_slow t_load - by_motor_slow t_motor|``, times ``exp(-(|w| /
+    stribeck_rad_s)^stribeck_exponent)``. If motor and load oppose each other, the slow share also
+    has ``by_load_square t_load^2`` while the motor is stronger, ``by_motor_square t_motor^2`` while
+    the load is. (Duclusaud et al., "Extended Friction Models for the Physics Simulation of Servo
+    Actuators", ICRA 2025: models M1 to M6.) Friction never reverses a shaft; a shaft that it can
+    hold rests.
     """
 
     armature_kg_m2: Floats | float
@@ -234,15 +233,15 @@ class Gearbox:
         return Gearbox(*(np.array([getattr(gear, name) for gear in gears]) for name in names))
 
     def rows(self) -> Floats:
-        """(13, J) its fields in their order, for ``friction_n_m``."""
+        """(13, J) fields in order, for ``friction_n_m``."""
         return np.array([np.atleast_1d(getattr(self, each.name)) for each in fields(self)], float)
 
 
 @compiled(f"float64({readonly_array()}, float64, float64, float64)")
 def friction_n_m(gear: Floats, speed_rad_s: float, motor_n_m: float, load_n_m: float) -> float:
-    """Greatest friction torque but for the viscous part, which grows with the speed.
+    """Greatest friction torque without the viscous part.
 
-    ``gear`` (13,) holds the fields of a ``Gearbox`` in their order.
+    ``gear`` (13,) has the fields of a ``Gearbox`` in order.
     """
     friction = gear[1] + abs(gear[6] * load_n_m - gear[5] * motor_n_m)
     slow = gear[3] + abs(gear[7] * load_n_m - gear[8] * motor_n_m)
@@ -272,7 +271,7 @@ GEARBOXES: Mapping[str, Gearbox] = _ByName(measured_gearbox)
 
 
 def gears_of(robot: RobotConfig) -> list[Gearbox]:
-    """Gearboxes of a robot's J servos, as its file says: without friction where it has none."""
+    """Gearboxes of a robot's J servos from its file; without friction by default."""
     terms = [
         Gearbox(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         if own is None

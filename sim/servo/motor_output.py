@@ -1,8 +1,8 @@
-"""Output and current of the motors as the servos themselves measure them.
+"""Output and current of the motors as the servos measure them.
 
-A plant reports the output that the bridge was asked for. If a current limit cuts the output, or
-something holds the shaft, a servo's registers show the remaining output. So a gripper that closes
-with little current does not look like one that pushes with full output.
+A plant reports the requested output. If a current limit cuts it, or a shaft is blocked, registers
+show the remaining output. So a gripper that closes with little current does not look like one at
+full output.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ class MotorOutput:
         self._heat_j, self._since_j = drive.heat_j.copy(), np.zeros_like(drive.heat_j)
 
     def take_heat_j(self, seconds: float) -> Floats:
-        """(S,) heat of the windings since the last call, ``seconds`` ago; kept until the next."""
+        """(S,) winding heat since the last call, ``seconds`` ago; valid until the next."""
         drive = self._drive
         since_j = np.subtract(drive.heat_j, self._heat_j, out=self._since_j)
         self._heat_j[:] = drive.heat_j
@@ -41,7 +41,7 @@ class MotorOutput:
         return np.where(self._blocked_shaft.rows, stall_j, since_j)
 
     def pwm(self, velocity_rad_s: Floats) -> Floats:
-        """(S,) fraction of the supply that the bridges put out, at these shaft speeds."""
+        """(S,) output of the bridges at these shaft speeds, fraction of the supply."""
         pwm = self._blocked_shaft.pwm()
         if not self.limited:
             return pwm

@@ -27,7 +27,7 @@ IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
 class PresentValues:
     """The present values of all servos of a bank.
 
-    A ``frame`` (2, S) is how registers count: sign of the shaft, and ticks where it is straight.
+    A ``frame`` (2, S) is the sign of each shaft, and its ticks when straight.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class PresentValues:
             control_loops,
             protection,
         )
-        # Without a sensor load is "inferred from the internal output": in tenths of a per cent
+        # Without a sensor the load is "inferred from the internal output", in tenths of a percent
         first = "Present Current" if "Present Current" in bank else "Present Load"  # one place
         names = (first, "Present Velocity", "Present Position")
         self._addresses = np.array([bank.register(name).address for name in names])
@@ -80,7 +80,7 @@ class PresentValues:
         )
 
     def path(self, frame: Floats, time_s: float) -> None:
-        """Bring up output, trajectories, flags of motion and clock (120 to 143) at ``time_s``."""
+        """Update output, trajectories, motion flags and clock (120 to 143) at ``time_s``."""
         bank, control_loops, (sign, zero) = self._bank, self._control_loops, frame
         path = control_loops.trajectory
         output = self._motor_output.pwm(self._plant.velocity_rad_s) * sign

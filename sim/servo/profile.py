@@ -1,8 +1,8 @@
 """Profiles: trajectories of a servo towards a new goal (e-manual, section Profile).
 
 Velocity-based profiles limit speed and acceleration. Time-based ones (Drive Mode(10), bit 2) state
-the duration of the whole move and of its acceleration, and become the former when the goal is set.
-Profile Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezoid or triangle.
+the duration of the move and of its acceleration; they are converted when the goal is set. Profile
+Velocity 0 is a step, Profile Acceleration 0 a rectangle, else a trapezoid or triangle.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ STEP, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x00, 0x10, 0x20, 0x30
 
 
 class Trajectory:
-    """Positions (S,) that run to goals under limits of speed and acceleration (inf: none).
+    """Positions (S,) that move to goals with limits of speed and acceleration (inf: none).
 
     ``rad_s_per_velocity`` and ``rad_s2_per_acceleration`` (S,) are the units of the registers.
     """
@@ -41,7 +41,7 @@ class Trajectory:
 
     @property
     def ongoing(self) -> Bools:
-        """(S,) goal not reached by the trajectory."""
+        """(S,) whether the trajectory has not reached its goal."""
         return np.asarray((self.position != self.goal) | (self.velocity != 0.0))
 
     def restart(self, which: Bools, position: Floats) -> None:
@@ -72,7 +72,7 @@ class Trajectory:
         self.kind[new] = np.where(step, STEP, kind)[new]
 
     def advance(self, seconds: float, which: Bools) -> None:
-        """Move those of ``which`` (S,) on by one step of the control loop."""
+        """Advance those of ``which`` (S,) by one control step."""
         columns = (self.position, self.velocity, self.acceleration)
         _advance(seconds, which, self.goal, self._speed, self._ramp, *columns)
 
@@ -95,7 +95,7 @@ def _advance(
             position[k], velocity[k], acceleration[k] = goal[k], 0.0, 0.0
             continue
         distance, brake, limit = goal[k] - position[k], ramp[k] * seconds, np.inf
-        if np.isfinite(brake):  # so fast that the steps to come can still stop in time
+        if np.isfinite(brake):  # so fast that later steps can still stop in time
             root = np.sqrt(1.0 + 8.0 * abs(distance) / max(brake * seconds, 1e-300))
             limit = 0.5 * brake * (root - 1.0)
         wanted = np.sign(distance) * min(speed[k], limit, abs(distance) / seconds)

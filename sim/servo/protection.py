@@ -1,7 +1,7 @@
-"""Protections of a servo: against heat, a blocked shaft, a supply out of range.
+"""Protections of a servo against heat, a blocked shaft, a supply out of range.
 
-Detected faults go to Hardware Error Status(70); those in the mask of Shutdown(63) switch the torque
-off until a reboot (e-manual, Shutdown).
+Faults go to Hardware Error Status(70); those in Shutdown(63) switch the torque off until a reboot
+(e-manual, Shutdown).
 """
 
 import math
@@ -61,7 +61,7 @@ class SupplyAndAmbient:
 
     @staticmethod
     def of(robot: RobotConfig) -> "SupplyAndAmbient":
-        """Supply of a robot, as its file says."""
+        """Supply of a robot's file."""
         power = robot.power
         return SupplyAndAmbient(
             robot.servo.supply_v, cabling=None if power is None else Cabling.of(robot, power)
@@ -110,23 +110,23 @@ class Protection:
         return {kind: bit for kind, bit in ALARMS.items() if kind in known}
 
     def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
-        """Change the supply of all, or of ``rows``; None: back to the usual voltage."""
+        """Set the supply of all servos, or of ``rows``; None: the usual voltage."""
         self._supply.change(volts, rows)
 
     def heat(self, rows: NDArray[np.intp], celsius: float) -> None:
-        """Set housings to a temperature."""
+        """Set housing temperatures."""
         self.temperature_c[rows] = celsius
 
     def detect(self, rows: NDArray[np.intp], error: int) -> None:
-        """Raise an error of some servos; it ends the torque if Shutdown(63) lists it."""
+        """Raise an error of some servos; Shutdown(63) may end the torque."""
         self._set_errors(np.isin(np.arange(len(self._bank)), rows) * error)
 
     def restart(self, rows: NDArray[np.intp]) -> None:
-        """Restart the count of an overload; heat stays."""
+        """Restart the overload count; heat stays."""
         self._blocked_s[rows] = 0.0
 
     def check(self, plant: Plant) -> bool:
-        """Check all servos at the end of a slice of ``SLICE_S``; True if registers have changed."""
+        """Check all servos after a slice of ``SLICE_S``; return whether registers changed."""
         heat_j = self._motor_output.take_heat_j(SLICE_S)
         warm_up(self.temperature_c, heat_j, SLICE_S, self._around.ambient_c, self._thermal)
         drive = self._drive
@@ -143,7 +143,7 @@ class Protection:
         )
         low, high, hottest = self._limits
         wrong = out_of_range(self.temperature_c, hottest, drive.supply_v, low, high)
-        if longest_s < OVERLOAD_S and not wrong:  # starved is outside, too
+        if longest_s < OVERLOAD_S and not wrong:  # a starved servo is out of range too
             return False
         tenths = np.rint(drive.supply_v * 10.0)
         outside = (tenths < low) | (tenths > high)
@@ -164,16 +164,16 @@ class Protection:
         bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0
 
     def supply_v(self, velocity_rad_s: Floats) -> Floats:
-        """(S,) voltage as the servos measure it, under what the motors draw at this moment.
+        """(S,) voltage measured by the servos under the present currents.
 
-        The motors go on with that of the last check, as long as a slice lasts.
+        The motors keep the voltage of the last check for a slice.
         """
         out = np.empty_like(self._drive.supply_v)
         self._sag(self._motor_output.pwm(velocity_rad_s), out)
         return out
 
     def _sag(self, pwm: Floats, out: Floats) -> None:
-        """Write the voltage at each servo (S,) under the present currents into ``out``."""
+        """Write the voltage at each servo (S,) under the present currents to ``out``."""
         current_a = self._motor_output.current_a()
         if self._around.cabling is not None:
             self._sag_along(self._around.cabling, pwm, current_a)
@@ -184,11 +184,10 @@ class Protection:
         self._supply.feed(out, self._drop_v)
 
     def _sag_along(self, cabling: Cabling, pwm: Floats, current_a: Floats) -> None:
-        """Let the voltage sag along the chain; output and shaft speed stay as they are now.
+        """Compute the sag along the chain; output and shaft speed stay constant.
 
-        A bridge draws more at more volts, by ``pwm^2 / R``, unless something limits its current. So
-        the voltages are solved for the whole chain at once, even if the cables cause most of the
-        drop.
+        A bridge draws more at a higher voltage, by ``pwm^2 / R``, unless its current is limited. So
+        the voltages of the whole chain are solved at once, even if cables cause most of the drop.
         """
         drive = self._drive
         drives = (pwm * current_a > 0.0) & (np.abs(current_a) < AT_LIMIT * drive.current_limit_a)

@@ -1,4 +1,4 @@
-"""Rules of each register besides its address: initial value and range, from the model's file."""
+"""Rules of each register from the model's file: initial value and range."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Rule:
 
     @property
     def writable(self) -> bool:
-        """Access column: RW."""
+        """Whether the access is RW."""
         return self.low is not None
 
 
@@ -40,7 +40,7 @@ MODE_RESETS = (
 
 @dataclass(frozen=True, slots=True)
 class IndirectBlock:
-    """Consecutive Indirect Address registers and the data bytes that they give a meaning to."""
+    """Consecutive Indirect Address registers and their data bytes."""
 
     addresses: int
     data: int
@@ -78,7 +78,7 @@ def motor_row(facts: ServoModel) -> MotorRow:
     """Motor of a model.
 
     Raises:
-        ControlTableError: its file has none, so it cannot be simulated.
+        ControlTableError: its file has no motor, so it cannot be simulated.
 
     """
     if facts.motor is None:
@@ -131,7 +131,7 @@ def _registers(layout: ControlTable) -> ModelRegisters:
 
 
 def _rules(facts: ServoModel) -> dict[str, Rule]:
-    """Rules of the registers of the file; identity and goals follow from other facts."""
+    """Rules of the file's registers; initial identity and goals come from other facts."""
     known = {"Model Number": facts.model_number, "Firmware Version": facts.firmware}
     for goal in GOALS[:3]:
         if limit_of(goal) in facts.registers:

@@ -1,7 +1,6 @@
 """Work of the servos in every control cycle, as compiled loops over servos and bytes.
 
-Arguments are arrays and plain numbers: numba needs five times longer to unpack a tuple than an
-array.
+Arguments are arrays and numbers: numba needs five times longer to unpack a tuple.
 """
 
 import numpy as np
@@ -17,7 +16,7 @@ from snakewalk.drivers.protocol.frames import (
     read_plain,
 )
 
-# as numba writes them; read-only arguments may be read-only, and a register's column has gaps
+# numba's spelling; read-only arguments may be read-only, and a register's column has gaps
 _READ = readonly_array("uint8", layout="C")
 _TABLE = "uint8[:, ::1]"
 _PLACES = readonly_array("int64", layout="C")
@@ -46,7 +45,7 @@ def write_motion(
     current_units: Floats,
     units: Floats,
 ) -> None:
-    """Write Present Current (or Load), Velocity and Position of all servos into their ``table``.
+    """Write Present Current (or Load), Velocity and Position of all servos into ``table``.
 
     Args:
         table: (S, bytes) control tables.
@@ -55,8 +54,8 @@ def write_motion(
         velocity_rad_s: (S,)
         position_rad: (S,)
         frame: (2, S) sign of a servo's direction, and ticks at the shaft's zero.
-        current_units: (2, S) ampere of one unit of the first register, and its greatest reading.
-        units: (2, S) rad/s of one unit of velocity; ticks per rad.
+        current_units: (2, S) ampere per unit of the first register, and its greatest reading.
+        units: (2, S) rad/s per unit of velocity; ticks per rad.
 
     """
     at_current, at_velocity, at_position = places[0], places[1], places[2]
@@ -79,12 +78,12 @@ def fill_replies(
     rows: Indices,
     block: Ints,
 ) -> None:
-    """Fill the answers of ``rows`` to one group read into the template ``packet``.
+    """Fill the replies of ``rows`` to one group read into the template ``packet``.
 
     Args:
-        packet: the whole answer; IDs and all that is constant are there already.
-        shape: (4,) bytes before the first servo's share; bytes of a share; where in it the error
-            byte stands, and where the data. A packet with a head is one: its CRCs go on and on.
+        packet: the whole reply; IDs and constants are already there.
+        shape: (4,) bytes before the first servo's share; bytes of a share; offsets in it of the
+            error byte and the data. A packet with a head is one packet with running CRCs.
         table: (S, bytes) control tables.
         rows: servos, in the order of their shares.
         block: (3,) address and length of the data, and address of Hardware Error Status.
@@ -121,19 +120,11 @@ def answer(
     data: Bytes,
     error: Bytes,
 ) -> int:
-    """``fill_replies``, and what the host's frame reader finds in their bytes.
+    """``fill_replies``, then decode the bytes with the host's frame reader.
 
-    Args:
-        packet: of ``fill_replies``, as the four below.
-        shape: likewise.
-        table: likewise.
-        rows: likewise.
-        block: likewise.
-        heads: of ``read_plain``; (1, 8) where the answer is one packet, of ``read_fast``.
-        ids: (N,) of ``read_fast``.
-        data: (N, length) filled, unless the answer is irregular.
-        error: (N,) likewise.
-
+    The first five arguments are those of ``fill_replies``. ``heads`` are of ``read_plain``, or (1,
+    8) of ``read_fast`` for one packet, which also uses ``ids`` (N,). ``data`` (N, length) and
+    ``error`` (N,) are filled, unless the reply is irregular.
     """
     fill_replies(packet, shape, table, rows, block)
     if shape[0] > 0:
@@ -143,7 +134,7 @@ def answer(
 
 @compiled(f"boolean({_READ})", makes_arrays=False)
 def is_intact(raw: Bytes) -> bool:
-    """Whether an instruction packet is whole, and nothing in it is stuffed."""
+    """Whether an instruction packet is complete and unstuffed."""
     end = len(raw) - 2
     return bool(
         int(raw[5]) | int(raw[6]) << 8 == end - 5
@@ -169,7 +160,7 @@ def accept_goals(
     goal_rad: Floats,
     taken: NDArray[np.bool_],
 ) -> None:
-    """Goal Position of a sync write into the tables; values out of limits are refused.
+    """Write Goal Position of a sync write into the tables; values out of limits are rejected.
 
     Args:
         raw: the packet.
@@ -180,8 +171,8 @@ def accept_goals(
         limits: (2, S) least and greatest goal, ticks.
         frame: as in ``write_motion``.
         ticks_per_rad: (S,)
-        goal_rad: (S,) set to the goals in the shafts' frame, where taken.
-        taken: (S,) set to whether a servo has taken one.
+        goal_rad: (S,) set to the accepted goals in the shafts' frame.
+        taken: (S,) set to whether a servo has accepted one.
 
     """
     taken[:] = False
@@ -204,13 +195,8 @@ def warm_up(
 ) -> None:
     """Move each sensor towards the final temperature of its heat.
 
-    Args:
-        temperature_c: (S,)
-        heat_j: (S,) of a slice.
-        slice_s: its length.
-        ambient_c: of the air.
-        thermal: (2, S) kelvin per watt; share of the difference that a slice makes up for.
-
+    ``heat_j`` (S,) is that of a slice of ``slice_s``. ``thermal`` (2, S): kelvin per watt; share of
+    the difference per slice.
     """
     for row in range(len(heat_j)):
         target_c = ambient_c + thermal[0, row] * (heat_j[row] / slice_s)
@@ -229,7 +215,7 @@ def out_of_range(
     min_tenths: AnyInts,
     max_tenths: AnyInts,
 ) -> bool:
-    """Whether a sensor is too hot, or a servo's supply outside its limits (tenths of a volt)."""
+    """Whether a sensor is too hot, or a supply outside its limits (tenths of a volt)."""
     for row in range(len(temperature_c)):
         tenths = np.rint(supply_v[row] * 10.0)
         if tenths < min_tenths[row] or tenths > max_tenths[row]:
@@ -241,7 +227,7 @@ def out_of_range(
 
 @compiled(f"float64({_SEEN}, {_SEEN})", makes_arrays=False)
 def supply_current_a(pwm: Floats, current_a: Floats) -> float:
-    """Current of the bridges from the supply, A."""
+    """Supply current of the bridges, A."""
     sum_a = 0.0
     for row in range(len(pwm)):
         sum_a += abs(pwm[row] * current_a[row])
@@ -261,7 +247,7 @@ def count_blocked(
     velocity_rad_s: Floats,
     slow_rad_s: Floats,
 ) -> float:
-    """Add a slice to the time of each motor that pushes with all it may and does not turn.
+    """Add a slice to the time of each motor that pushes at its limit and does not turn.
 
     Returns:
         The longest such time, s.

@@ -29,7 +29,7 @@ def check_ids(ids: Sequence[int], model: str, most: int) -> None:
     """Check the IDs of new servos.
 
     Raises:
-        InputError: an ID is out of 0 to ``most`` or used twice.
+        InputError: an ID is outside 0 to ``most`` or used twice.
 
     """
     wrong = [f"ID {each}: an {model} has 0 to {most}" for each in ids if not 0 <= each <= most]
@@ -45,7 +45,7 @@ class SimulatedServos(ABC):
     protection: ServoAlarms
 
     def __init__(self, plant: Plant, drive: ServoDrive) -> None:
-        """Set up the servos' supply and time; the registers are the subclass's."""
+        """Set up supply and time; subclasses set up registers."""
         servos = len(drive.torque_on)
         self.plant, self.drive = plant, drive
         self.blocked_shaft = BlockedShaft(drive)
@@ -60,7 +60,7 @@ class SimulatedServos(ABC):
 
     @abstractmethod
     def __getitem__(self, name: str) -> NDArray[np.integer[Any]]:
-        """(S,) live view of a register of all servos."""
+        """(S,) live view of a register."""
 
     @abstractmethod
     def reboot(self, row: int) -> None:
@@ -78,11 +78,11 @@ class SimulatedServos(ABC):
         return len(self.powered)
 
     def cut_power(self, rows: Indices) -> None:
-        """Switch the supply off: shafts go limp, and only the EEPROM is kept."""
+        """Switch the supply off: shafts go limp, only the EEPROM remains."""
         self.powered[rows] = False
 
     def restore_power(self, rows: Indices) -> None:
-        """Give the supply back."""
+        """Restore the supply."""
         self.powered[rows] = True
         for row in rows:
             self.reboot(int(row))
@@ -98,7 +98,7 @@ class SimulatedServos(ABC):
             self.blocked_shaft.free(int(row))
 
     def cut_output(self, rows: Indices, on: bool) -> None:
-        """Cut the output stages of servos off their motors, or connect them again."""
+        """Disconnect output stages from their motors, or reconnect them."""
         self._no_output[rows] = on
 
     def set_reading(self, rows: Indices, name: str, value: int | None) -> None:

@@ -1,4 +1,4 @@
-"""The voltage that feeds the servos of a chain: source, leads, cables between neighbours."""
+"""Supply voltage of the servos of a chain: source, leads, cables between neighbours."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _ROW = readonly_array(layout="C")
 
 
 class Supply:
-    """Supply of S servos: ``usual_v`` (one, or (S,)) until it is changed."""
+    """Supply of S servos, by default ``usual_v`` (one, or (S,))."""
 
     def __init__(self, servos: int, usual_v: ArrayLike) -> None:
         self.usual_v: Floats = np.full(servos, usual_v, dtype=np.float64)
@@ -27,11 +27,11 @@ class Supply:
 
     @property
     def source_v(self) -> float:
-        """Voltage of the one source that feeds them all."""
+        """Voltage of the common source."""
         return float(self._volts[0])
 
     def change(self, volts: float | None, rows: Indices | None = None) -> None:
-        """Set another voltage for the chain, or for ``rows`` alone; None: the usual voltage."""
+        """Set another voltage for the chain, or for ``rows``; None: the usual voltage."""
         if rows is None:
             self._volts[:] = self.usual_v if volts is None else volts
             return
@@ -39,7 +39,7 @@ class Supply:
         self._overridden = not np.isnan(self._override_v).all()
 
     def feed(self, supply_v: Floats, drop_v: Floats | float = 0.0) -> None:
-        """Set ``supply_v`` (S,) to the chain's voltage without the drop ``drop_v`` of the cable."""
+        """Set ``supply_v`` (S,) to the chain's voltage minus the cable's drop ``drop_v``."""
         np.subtract(self._volts, drop_v, out=supply_v)
         if self._overridden:
             own = ~np.isnan(self._override_v)
@@ -48,9 +48,9 @@ class Supply:
 
 @dataclass(frozen=True, slots=True)
 class Cabling:
-    """How power reaches S servos in the order of the chain.
+    """Power cables of S servos in the order of the chain.
 
-    A cable's resistance is that of both its conductors and all contacts, there and back.
+    A cable's resistance is that of both conductors and all contacts.
     """
 
     cable_ohm: Floats
@@ -60,7 +60,7 @@ class Cabling:
 
     @staticmethod
     def of(robot: RobotConfig, power: PowerConfig) -> "Cabling":
-        """Cables and leads of a robot, as ``power`` describes them."""
+        """Cables and leads of a robot from ``power``."""
         ids = robot.servo_ids
         cables_ohm = power.cables_ohm or (power.cable_ohm,) * (len(ids) - 1)
         fed = power.inject_ids or ids[:1]
@@ -74,9 +74,9 @@ class Cabling:
 
         Args:
             source_v: of the source without load.
-            source_ohm: resistance that all leads share.
-            drawn_a: (S,) what each servo draws at 0 V, ampere, if it went on as its slope says.
-            slope_s: (S,) how much more it draws for each volt, siemens; 0: as much at any voltage.
+            source_ohm: common resistance of all leads.
+            drawn_a: (S,) current of each servo, linearly extrapolated to 0 V, A.
+            slope_s: (S,) additional current per volt, siemens; 0: a constant current.
 
         """
         servos = len(self.lead_ohm)
@@ -101,12 +101,11 @@ def servo_voltages(
     lead_ohm: Floats,
     out: Floats,
 ) -> None:
-    """Voltage at each servo of a ladder, into ``out``; arguments as of ``Cabling.servo_v``.
+    """Voltage at each servo of a ladder, into ``out``; arguments as ``Cabling.servo_v``.
 
-    Kirchhoff's law at each servo is a row of a tridiagonal system, which one sweep there and one
-    back solve (Thomas). The resistance that the leads share couples all rows by the one rail
-    voltage, and the servos' voltages are linear in it. The sweep therefore runs for a rail of 0 V
-    and for each volt of it.
+    Kirchhoff's law at each servo is a row of a tridiagonal system (Thomas algorithm). The common
+    resistance of the leads couples all rows by the rail voltage, in which the servos' voltages are
+    linear. So the sweep runs for a rail of 0 V and for each volt of it.
     """
     servos = len(out)
     upper = np.empty(servos)
@@ -124,7 +123,7 @@ def servo_voltages(
         upper[k] = behind_s / pivot
         out[k] = at_zero / pivot
         per_volt[k] = at_volt / pivot
-    drawn_0, drawn_v = 0.0, 0.0  # of all servos at a rail of 0 V, and for each volt of it
+    drawn_0, drawn_v = 0.0, 0.0  # of all servos at a rail of 0 V, and per volt
     for back in range(servos):
         k = servos - 1 - back
         if back > 0:

@@ -1,7 +1,7 @@
-"""Bus Watchdog(98): a servo that receives nothing for its time stops where it is.
+"""Bus Watchdog(98): a servo without packets for its time stops at its angle.
 
-While torque is on, any instruction packet feeds the watchdogs of all servos. A watchdog that has
-run out reads -1 until 0 is written. (e-manual, Bus Watchdog.)
+While torque is on, any instruction packet feeds the watchdogs of all servos. An expired watchdog
+reads -1 until 0 is written. (e-manual, Bus Watchdog.)
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ class Watchdog:
         """When the first of them runs out."""
 
     def arm(self, on: Bools) -> None:
-        """Read the register, and copy which servos (S,) have torque on."""
+        """Read the register; ``on`` (S,) marks servos with torque."""
         dog = self._bank["Bus Watchdog"]
         self._watched = (dog > 0) & (dog < WATCHDOG_TRIPPED) & on
         watched = self._watched
@@ -36,7 +36,7 @@ class Watchdog:
         self.due_s = self.fed_s + self.timeout_s
 
     def trip(self, time_s: float) -> Bools:
-        """Put those that have run out by ``time_s`` into the error state; which (S,) they are."""
+        """Put those expired by ``time_s`` into the error state; return them (S,)."""
         dog = self._bank["Bus Watchdog"]
         late = self._watched & (self.fed_s + WATCHDOG_UNIT_S * dog <= time_s + ROUNDING_S)
         dog[late] = WATCHDOG_TRIPPED

@@ -1,1 +1,1 @@
-"""Bytes of a bus in words: each packet decoded by the control tables of its servos."""
+"""Decoders of bus packets into text, by the control tables of the servos."""

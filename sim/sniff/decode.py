@@ -1,6 +1,6 @@
-"""Decoder of an exchange on the bus into words, packet by packet.
+"""Decoder of an exchange on the bus into text, packet by packet.
 
-Pings give the models of the servos; an instruction gives the meaning of its replies' bytes.
+Pings give the models of the servos; an instruction gives the meaning of its replies.
 """
 
 from collections.abc import Iterator, Mapping
@@ -49,18 +49,18 @@ class DecodedPacket:
     """Bytes in hexadecimal."""
 
     def to_dict(self) -> dict[str, object]:
-        """For JSON."""
+        """Fields for JSON."""
         return asdict(self)
 
     def text(self) -> str:
-        """For people."""
+        """Line for people."""
         arrow = {"question": "->", "answer": "<-", "noise": "??"}[self.kind]
         who = {BROADCAST_ID: "all", -1: "?"}.get(self.servo_id, str(self.servo_id))
         said = ", ".join(self._by_register())
         return f"{self.time_s:12.6f}  {arrow} {who:>3}  {self.name:<16} {said or self.raw}"
 
     def _by_register(self) -> Iterator[str]:
-        """Values in words; a register of several servos once, with its values in their order."""
+        """Values as text; a register of several servos once, with its values in order."""
         several: dict[str, dict[int, str]] = {}
         for key, value in self.values.items():
             servo_id, _, register = key.partition(": ")
@@ -75,7 +75,7 @@ class DecodedPacket:
 
 
 def _ranges(numbers: list[int]) -> str:
-    """Numbers in their order, those that follow each other by one as ``1-16``."""
+    """Numbers in order, consecutive ones as ``1-16``."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -86,7 +86,7 @@ def _ranges(numbers: list[int]) -> str:
 
 
 class Decoder:
-    """Bytes of a bus in, lines out; ``model`` is that of servos that no ping has identified.
+    """Converts bytes of a bus to decoded packets; ``model`` is that of unidentified servos.
 
     ``models`` are those known beforehand, by ID.
     """
@@ -105,7 +105,7 @@ class Decoder:
         self._last: int = Instruction.PING
 
     def feed(self, time_s: float, data: bytes) -> Iterator[DecodedPacket]:
-        """Lines of the packets that ``data`` completes."""
+        """Packets that ``data`` completes."""
         packets = self._reader.feed(data)
         damaged = self._reader.crc_errors - self._crc
         lost = self._reader.dropped_bytes - self._dropped

@@ -1,4 +1,4 @@
-"""Recorded exchanges: JSON lines that ``bus serve --record`` writes, hex text, or raw bytes."""
+"""Recorded exchanges: JSON lines of ``bus serve --record``, hex text, or raw bytes."""
 
 import json
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ _MOST_BYTES = 200_000_000
 
 
 class TraceWriter:
-    """A ``PacketTap`` that writes one JSON line a packet: ``t`` in s, ``from``, ``hex``."""
+    """A ``PacketTap`` that writes one JSON line per packet: ``t`` in s, ``from``, ``hex``."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -27,10 +27,10 @@ class TraceWriter:
 
 
 def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
-    """(time in s, whether the host sent it, bytes) of the file of a ``TraceWriter``.
+    """(time in s, whether the host sent it, bytes) of a ``TraceWriter``'s file.
 
     Raises:
-        InputError: the file is missing, or is something else, with the line that is wrong.
+        InputError: the file is missing, or has a wrong line.
 
     """
     try:
@@ -55,10 +55,10 @@ def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
 
 
 def read_trace(path: Path) -> Iterator[tuple[float, bytes]]:
-    """(time in s, bytes) of a recording; hex text and raw bytes have no times: 0.
+    """(time in s, bytes) of a recording; hex text and raw bytes have time 0.
 
     Raises:
-        InputError: the file is missing, or of another format, with the line that is wrong.
+        InputError: the file is missing, or has a wrong line.
 
     """
     try:

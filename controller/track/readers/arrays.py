@@ -38,7 +38,7 @@ ARRAYS = {*_BODIES, "t", "rate_hz", "length_m", "score", "name", "source", "lice
 
 
 def save_track(path: Path, track: Track) -> None:
-    """Write our own format: points (dropped frames as NaN), rate_hz, length_m (NaN: no scale)."""
+    """Write our format: points (dropped frames as NaN), rate_hz, length_m (NaN: no scale)."""
     number = np.rint(track.time_s * track.rate_hz).astype(int)
     points = np.full((number[-1] + 1, *track.points.shape[1:]), np.nan)
     points[number] = track.points
@@ -63,7 +63,7 @@ def save_track(path: Path, track: Track) -> None:
 
 
 def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
-    """Load the arrays of an .npz by ``track_from_arrays``; see ``load.load_file``."""
+    """Load an .npz with ``track_from_arrays``; see ``load.load_file``."""
     try:
         held, others = read_arrays(file, ARRAYS)
     except (ValueError, OSError) as error:
@@ -72,14 +72,14 @@ def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None
 
 
 def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
-    """Load the variables of a MATLAB file up to version 7 by ``track_from_arrays``; 7.3 is HDF5."""
+    """Load a MATLAB file up to version 7 with ``track_from_arrays``; 7.3 is HDF5."""
     from scipy.io import loadmat, whosmat  # noqa: PLC0415  slow to import
 
     size = file.stat().st_size
     check_expansion(file, size, _unpacked_mat(file.read_bytes()))
     try:
         said = 8 * sum(math.prod(shape) for _, shape, _ in whosmat(file))
-        check_expansion(file, size, said)  # of a cell or struct, too, whose fields may be none
+        check_expansion(file, size, said)  # also for cells and structs
         held = loadmat(file)
     except InputError:
         raise
@@ -93,7 +93,7 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
 
 
 def _unpacked_mat(data: bytes) -> int:
-    """Size of a MATLAB file's unpacked content in bytes; variables are packed one by one."""
+    """Size in bytes of a MATLAB file's unpacked content; each variable is packed separately."""
     order = "<" if data[126:128] == b"IM" else ">"
     at, size = _MAT_HEAD, 0
     while at + 8 <= len(data):
@@ -108,7 +108,7 @@ def _unpacked_mat(data: bytes) -> int:
 
 
 def _unpacked(packed: memoryview) -> int:
-    """Unpacked bytes of a zlib stream, counted piece by piece; stops where it is broken."""
+    """Unpacked bytes of a zlib stream, counted piece by piece up to a fault."""
     stream, size = zlib.decompressobj(), 0
     rest: bytes | memoryview = packed
     try:
@@ -127,13 +127,12 @@ def track_from_arrays(
     least_score: float | None = None,
     others: Sequence[str] = (),
 ) -> Track:
-    """Make a track of named arrays, as .npz and .mat hold them.
+    """Make a track from named arrays of an .npz or .mat.
 
-    ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P), in metres if ``length_m`` is a
-    number. ``angles_rad`` are the (T, P) directions of equally long pieces, and ``length_m`` is
-    then the body's length. Frames a second are ``rate_hz``, or ``time_s`` or ``t`` in seconds say
-    when each frame was taken, evenly or not. ``score`` (T, P) is how sure the tracker was.
-    ``skeletons`` are pixels, rows downwards.
+    ``points`` are (T, P, 2) head first, or ``x`` and ``y`` (T, P); in metres if ``length_m`` is a
+    number. ``angles_rad`` are the (T, P) directions of equal segments; ``length_m`` is then the
+    body's length. ``rate_hz``, or ``time_s`` or ``t`` in seconds, state the times. ``score`` (T, P)
+    is the tracker's confidence. ``skeletons`` are pixels, rows downwards.
     """
     time_s = None if rate_hz is not None else _times(file, held)
     given = rate_hz
@@ -178,21 +177,20 @@ def track_from_arrays(
 
 
 def _flag(held: dict[str, NDArray[np.generic]], name: str, *, default: bool) -> bool:
-    """A truth value that the file may hold."""
     if name not in held or not held[name].size:
         return default
     return bool(held[name].reshape(-1)[:1].astype(bool).all())
 
 
 def _status(held: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStatus]:
-    """The frames' verdicts, if these are ours."""
+    """The frames' verdicts, if all are of ``FrameStatus``."""
     words = [str(one) for one in held.get("verdict", np.array([])).reshape(-1)]
     known = {str(one) for one in FrameStatus}
     return list(map(FrameStatus, words)) if len(words) == frames and known >= set(words) else []
 
 
 def _times(file: Path, held: dict[str, NDArray[np.generic]]) -> Floats | None:
-    """When the frames were taken, s; None if the file does not say."""
+    """Times of the frames, s; None if the file has none."""
     key = next((name for name in ("time_s", "t") if name in held), None)
     if key is None:
         return None
@@ -204,7 +202,7 @@ def _times(file: Path, held: dict[str, NDArray[np.generic]]) -> Floats | None:
 
 
 def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> Floats:
-    """Points (T, P, 2) from whichever array there is."""
+    """Points (T, P, 2) from ``points``, ``angles_rad``, or ``x`` and ``y``."""
     if "points" in held:
         return _floats(file, "points", held["points"])
     if "angles_rad" in held:
@@ -237,11 +235,11 @@ def _without_unsure(
 def load_npy(file: Path, rate_hz: float | None) -> Track:
     """Load joint angles (T, J), rad, column 0 next to the head; see ``load.load_file``.
 
-    Positive bends the head side to the left. Where the body was and faced is not in such a file:
-    every frame faces along x in the mean, its head at the origin.
+    Positive angles bend the head side to the left. The file has no places: in every frame the head
+    is at the origin and the mean heading is x.
     """
     try:
-        held = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than is there
+        held = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than the file has
     except (ValueError, OSError, EOFError) as error:
         raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
     joints = _floats(file, "joint angles", np.asarray(held))

@@ -1,8 +1,8 @@
-"""BVH: a skeleton with offsets and joint rotations; its joints become keypoints by kinematics.
+"""BVH: a skeleton with offsets and joint rotations; forward kinematics gives keypoints.
 
-``HIERARCHY`` has joints with an OFFSET from their parent and CHANNELS; a rotation is the product of
-its channels' rotations in their order, in degrees. ``MOTION`` has the number of frames, the time of
-one, and a row of channel values for each. Up is y, and a unit of length is not stated, so the body
+In ``HIERARCHY`` each joint has an OFFSET from its parent and CHANNELS. Its rotation is the product
+of its channels' rotations in their order, degrees. ``MOTION`` has the number of frames, the frame
+time, and a row of channel values per frame. y is up. The unit of length is not stated, so the body
 has no scale.
 """
 
@@ -32,12 +32,12 @@ class _Joint:
 
 
 def is_bvh(head: bytes) -> bool:
-    """Whether a file that begins so is a BVH."""
+    """Whether a file with this head is a BVH."""
     return head.removeprefix(b"\xef\xbb\xbf").lstrip().upper().startswith(b"HIERARCHY")
 
 
 def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
-    """Load the joints of a BVH as keypoints; see ``load.load_file``."""
+    """Load the joints as keypoints; see ``load.load_file``."""
     try:
         words = file.read_text(encoding="utf-8-sig").split()
     except UnicodeDecodeError:
@@ -107,7 +107,7 @@ def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
 
 
 def _motion(file: Path, words: list[str], channels: int) -> tuple[int, float, Floats]:
-    """Frames, time of one, and all channel values."""
+    """Number of frames, frame time, and all channel values."""
     text = [word.rstrip(":").upper() for word in words[:5]]
     stated = [number_or_none(word) for word in words[1:5]]
     frames, step_s = stated[0] if stated else None, stated[3] if len(stated) > 3 else None
@@ -154,7 +154,6 @@ def _places(joints: list[_Joint], values: Floats) -> Floats:
 
 
 def _about(axis: int, angle: Floats) -> Floats:
-    """(T, 3, 3) rotations about an axis."""
     turn = np.zeros((len(angle), 3, 3))
     one, two = (axis + 1) % 3, (axis + 2) % 3
     turn[:, axis, axis] = 1.0
@@ -164,7 +163,7 @@ def _about(axis: int, angle: Floats) -> Floats:
 
 
 def _longest(joints: list[_Joint]) -> list[int]:
-    """Joints of the chain from the root to the end that is most joints away."""
+    """Joints of the longest chain from the root."""
     depth = [0] * len(joints)
     for k, joint in enumerate(joints):
         depth[k] = depth[joint.parent] + 1 if joint.parent >= 0 else 0

@@ -1,8 +1,8 @@
-"""DeepLabCut's files: a table whose column names are stacked in three or four rows.
+"""DeepLabCut's files: tables with column names in three or four stacked rows.
 
-``scorer``, ``individuals`` (only of several animals), ``bodyparts`` and ``coords`` (x, y,
+The rows are ``scorer``, ``individuals`` (several animals only), ``bodyparts`` and ``coords`` (x, y,
 likelihood; hand labels have no likelihood). The HDF5 file is the same table as pandas writes it: a
-group, usually ``df_with_missing``, with a ``table`` of ``values_block_0`` whose column names are a
+group, usually ``df_with_missing``, with a ``table`` of ``values_block_0``. Its column names are a
 pickle in the group's attribute ``non_index_axes``.
 """
 
@@ -30,7 +30,7 @@ Column = tuple[str, str, str]
 
 
 def is_deeplabcut(rows: list[list[str]]) -> bool:
-    """Whether these rows begin as DeepLabCut's CSV does."""
+    """Whether these rows begin like DeepLabCut's CSV."""
     return len(rows) > 3 and rows[0][0] == "scorer" and "coords" in (rows[2][0], rows[3][0])
 
 
@@ -51,7 +51,7 @@ def load_rows(
         )
     first = 1
     while first < len(level["coords"]) and not level["coords"][first]:
-        first += 1  # hand labels have folder, video and image where others have one number
+        first += 1  # hand labels have three columns: folder, video and image
     whose = level.get("individuals", [""] * len(level["coords"]))
     columns = list(zip(whose, level["bodyparts"], level["coords"], strict=False))[first:]
     values = np.full((len(rows) - depth, len(columns)), np.nan)
@@ -70,10 +70,10 @@ def load_rows(
 
 
 def _frames(file: Path, names: list[str]) -> Ints | None:
-    """(T,) frame numbers: of predictions the index, of hand labels that in the image's name.
+    """(T,) frame numbers: the index of predictions, or the number in a hand label's image name.
 
     Raises:
-        InputError: not rising, as where images of several films are in one table.
+        InputError: the numbers do not rise, as in a table of several films.
 
     """
     found = [_NUMBER.search(name) for name in names]
@@ -104,7 +104,7 @@ def load_group(
 
 
 class _OnlyPlain(pickle.Unpickler):
-    """Lists, tuples, numbers and text; a pickle that names a class or function is refused."""
+    """Unpickler of plain values; rejects a pickle that names a class or function."""
 
     def find_class(self, module: str, name: str) -> Any:
         raise pickle.UnpicklingError(f"names {module}.{name}")

@@ -1,4 +1,4 @@
-"""The file formats of recordings, recognised by their first bytes."""
+"""File formats of recordings, recognised by their first bytes."""
 
 from typing import Literal
 
@@ -25,7 +25,7 @@ HEAD_BYTES = 128
 
 
 def format_of(head: bytes) -> Format:
-    """Recognise a file by its first bytes."""
+    """Recognise a file by its first ``HEAD_BYTES``."""
     if head.startswith(b"PK\x03\x04"):
         return "zip"
     if head.startswith(b"\x93NUMPY"):

@@ -1,8 +1,8 @@
-"""Shipped recordings: tracks made by formula from figures of real animals (``config/recordings``).
+"""Shipped recordings: tracks computed from figures of real animals (``config/recordings``).
 
-The motion of the head at a moment runs down the body at pulse speed, scaled by the envelope
-measured on the animal. The angle is ``theta(s, t) = a(s) g(tau) sin(phase(tau)) + heading(tau)``,
-``tau = t - s / pulse``. Same figures, same numbers: nothing is random.
+The head's motion runs down the body at pulse speed, scaled by the envelope measured on the animal:
+``theta(s, t) = a(s) g(tau) sin(phase(tau)) + heading(tau)``, ``tau = t - s / pulse``. The result is
+deterministic.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ from snakewalk.controller.track.track import Track
 
 EMBEDDED = shipped("recordings")
 """Names of the shipped recordings."""
-_FINE = 64  # samples a cycle of the head's script
+_FINE = 64  # samples per cycle of the head's motion
 
 
 def generate(figures: RecordingConfig) -> Track:
-    """Make the track: 100 segments a frame, the head travelling along its own tangent."""
+    """Make the track: 100 segments, the head travelling along its own tangent."""
     s = (np.arange(SEGMENTS) + 0.5) / SEGMENTS
-    pulse = figures.frequency_hz / figures.waves  # body lengths a second
+    pulse = figures.frequency_hz / figures.waves  # body lengths per second
     seconds = sum(e.cycles for e in figures.episodes) / figures.frequency_hz
     time = np.arange(round(seconds * figures.rate_hz) + 1) / figures.rate_hz
     tau = time[:, None] - s / pulse
@@ -47,7 +47,7 @@ def generate(figures: RecordingConfig) -> Track:
 
 
 def embedded(name: str) -> Track:
-    """Make a shipped recording by name.
+    """Make a shipped recording.
 
     Raises:
         ConfigError: the name is unknown.
@@ -59,7 +59,7 @@ def embedded(name: str) -> Track:
 def _script(
     figures: RecordingConfig, start_s: float, stop_s: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Time, gain, phase and heading of the head, from before the start to the end."""
+    """Time, gain, phase and heading of the head from ``start_s`` to ``stop_s``."""
     count = int((stop_s - start_s) * figures.frequency_hz * _FINE) + 2
     at = np.linspace(start_s, stop_s, count)
     gain = np.full(count, figures.episodes[0].gain)

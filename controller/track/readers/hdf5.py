@@ -1,4 +1,4 @@
-"""HDF5 files of recordings: SLEAP's analysis and projects, DeepLabCut's table, MATLAB 7.3."""
+"""HDF5 recordings: SLEAP's analysis and projects, DeepLabCut's table, MATLAB 7.3."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from snakewalk.controller.track.track import Track
 def load_hdf5(
     file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
 ) -> Track | Keypoints:
-    """Load an HDF5 file of any of these kinds; see ``load.load_file``."""
+    """Load any of these kinds; see ``load.load_file``."""
     try:
         with h5py.File(file, "r") as held:
             sizes: list[int] = []
@@ -52,12 +52,12 @@ def load_hdf5(
 
 
 def _linked_file(name: str, link: object) -> str | None:
-    """Return which link leads to another file, of unknown size and owner."""
+    """Name of a link to another file, whose size and owner are unknown."""
     return f"{name} is in {link.filename}" if isinstance(link, h5py.ExternalLink) else None
 
 
 def _other_file(name: str, data: object) -> str | None:
-    """Return which array has its values in other files, by external storage or as a virtual one."""
+    """Name of an array whose values are in other files (external storage or virtual)."""
     if not isinstance(data, h5py.Dataset):
         return None
     if data.external:
@@ -70,7 +70,7 @@ def _holds_table(group: object) -> bool:
 
 
 def _from_matlab(data: h5py.Dataset) -> NDArray[np.generic]:
-    """One variable: MATLAB's axes are the other way round, and its text is numbers."""
+    """One variable: MATLAB's axes are reversed, and its text is numbers."""
     values = np.asarray(data[()])
     kind = data.attrs.get("MATLAB_class", b"")
     if kind == b"char":

@@ -1,6 +1,6 @@
-"""Keypoints of pose trackers: which animal, in which order, and what is done where one is missing.
+"""Keypoints of pose trackers: choice of animal and order, and repair of missing points.
 
-Rows of pixels count downwards. Points with a low score are missing.
+Pixel rows count downwards. Points with a low score are missing.
 """
 
 from collections.abc import Sequence
@@ -20,15 +20,15 @@ KEYPOINT_RATE_HZ = 30.0
 """Default where a file of keypoints holds no frame rate."""
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 """Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
-_MISSING = 0.25  # of the keypoints, at least one: this share may be missing in a frame
-FEWEST = 4  # points that a curve goes through
-_ZIGZAG = 1.5  # from which the order cannot be a body's
+_MISSING = 0.25  # share of the keypoints, at least one, that may be missing in a frame
+FEWEST = 4  # points for a curve
+_ZIGZAG = 1.5  # above it the order cannot be a body's
 _TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Used part of a file: the options ``--individual``, ``--keypoints`` and ``--plane``."""
+    """Selected part of a file: the options ``--individual``, ``--keypoints`` and ``--plane``."""
 
     individual: str | None = None
     keypoints: tuple[str, ...] | None = None
@@ -37,10 +37,10 @@ class Choice:
     """One of ``PLANES``; for markers in space. None is xy."""
 
     def only(self, file: Path, kind: str, *allowed: str) -> None:
-        """Refuse what a file of this kind does not have.
+        """Reject options that do not apply to a kind of file.
 
         Raises:
-            InputError: an option that is not allowed is given.
+            InputError: an option that is not ``allowed`` is given.
 
         """
         held = {"individual": "names no animals", "keypoints": "names no keypoints"}
@@ -50,15 +50,10 @@ class Choice:
                 raise InputError(f"{file}: --{name}: {kind} {reason}; leave it out")
 
     def animal(self, file: Path, names: Sequence[str], seen: Sequence[str]) -> str:
-        """Name of the animal that is taken.
-
-        Args:
-            file: for faults.
-            names: all that the file has.
-            seen: those of which it holds any point.
+        """Name of the selected animal; ``seen`` are those of ``names`` with any point.
 
         Raises:
-            InputError: none of that name, or several and none is said.
+            InputError: the name is unknown, or there are several animals and no choice.
 
         """
         listed = ", ".join(names)
@@ -80,7 +75,7 @@ class Choice:
         """Indices of the keypoints along the midline.
 
         Raises:
-            InputError: a name that the file does not have, one twice, or too few.
+            InputError: a name is unknown or repeated, or there are too few.
 
         """
         if self.keypoints is None:
@@ -103,10 +98,10 @@ ALL = Choice()
 
 
 def choice_of(individual: str | None, keypoints: str | None, plane: str | None) -> Choice:
-    """Make a choice of the words of the command line: ``keypoints`` is A,B,C.
+    """Make a choice from command line values; ``keypoints`` is A,B,C.
 
     Raises:
-        InputError: no such plane.
+        InputError: the plane is unknown.
 
     """
     if plane is not None and plane not in PLANES:
@@ -139,10 +134,10 @@ class Keypoints:
     """Lines about parts that the reader left out or changed."""
 
     def sure(self, order: Sequence[int]) -> Floats:
-        """(T, N, 2) keypoints by index, NaN where they are missing or not sure.
+        """(T, N, 2) keypoints by index, NaN if missing or below the least score.
 
         Raises:
-            InputError: no scores to compare with, or too little is left.
+            InputError: scores are missing, or too few points are left.
 
         """
         file, least = self.file, self.least_score
@@ -151,7 +146,7 @@ class Keypoints:
             raise InputError(f"{file}: holds no scores to compare with a least score of {least}")
         if self.scores is not None:
             scores = self.scores[:, order]
-            unsure = scores < least  # NaN means no score: points set by hand have none
+            unsure = scores < least  # NaN: points set by hand have no score
             bad = int(unsure.any(axis=1).sum())
             if least > 0.0 and bad > len(unsure) - 2:
                 worst = np.nanmedian(scores, axis=0)
@@ -171,10 +166,10 @@ class Keypoints:
         return np.asarray(places)
 
     def track(self, choice: Choice) -> Track:
-        """Make a track of those along the midline; an unknown rate is assumed, and marked as such.
+        """Make a track of the midline; an unknown rate is assumed, and marked as such.
 
         Raises:
-            InputError: as of ``sure``, an unknown keypoint, or an order that cannot be a body's.
+            InputError: as ``sure``, an unknown keypoint, or an order that cannot be a body's.
 
         """
         places = self.sure(choice.order(self.file, self.nodes))
@@ -198,7 +193,7 @@ class Keypoints:
 
 
 def zigzag(places: Floats) -> float:
-    """Way from point to point of (T, K, 2) over the least that joins them; 1 along a body."""
+    """Length of the polyline through (T, K, 2) over that of the shortest tree; 1 along a body."""
     apart = np.hypot(*(places[:, :, None] - places[:, None]).transpose(3, 0, 1, 2))
     seen = np.isfinite(apart).any(axis=0)
     if not seen.all():
@@ -211,12 +206,12 @@ def zigzag(places: Floats) -> float:
 def bridge(places: Floats) -> tuple[Floats, Bools]:
     """Set single missing points (T, K, 2) on the curve through the others of their frame.
 
-    A point between others is put on the cubic spline through them, as far along as it usually is;
-    one at an end is put at its usual distance, the body's last turn going on. At most a quarter of
-    the points, at least one, may be missing, no two neighbours, and four must be there.
+    An inner point goes on the cubic spline, at its usual arc length. An end point goes to its usual
+    distance, and half of the body's last turn continues. At most a quarter of the points, at least
+    one, may be missing, but no two neighbours; four must be seen.
 
     Returns:
-        The points, and (T,) in which frames one was set.
+        The points, and (T,) frames in which one was set.
 
     """
     lost = np.asarray(~np.isfinite(places).all(axis=2))
@@ -242,7 +237,7 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
 
 
 def _beyond(last: Floats, second: Floats, third: Floats, reach: float) -> Floats:
-    """The point beyond an end: half of the last turn goes on."""
+    """The point beyond an end: half of the last turn continues."""
     heading = np.arctan2(*(last - second)[::-1])
     turn = np.angle(np.exp(1j * (heading - np.arctan2(*(second - third)[::-1]))))
     way = heading + _TURN_ON * turn

@@ -1,4 +1,4 @@
-"""The one entry for recordings: a shipped name, figures of your own, or a file of bodies."""
+"""The entry for recordings: a shipped name, a file of figures, or a file of bodies."""
 
 import math
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ from snakewalk.controller.track.track import Track
 
 
 def check_rate(rate_hz: float | None, names: Sequence[str]) -> None:
-    """Check an option ``--rate`` that is given for the files among ``names``.
+    """Check an option ``--rate`` for the files among ``names``.
 
     Raises:
-        InputError: it is not a rate, or none of the names is a file.
+        InputError: the rate is invalid, or no name is a file.
 
     """
     if rate_hz is None:
@@ -44,14 +44,14 @@ def load_track(
     """Load a shipped recording by name, or a file by path.
 
     Args:
-        name_or_path: a name of ``EMBEDDED``; or figures in a ``.toml`` (``RecordingConfig``); or a
-            file of one of the formats of ``formats.KNOWN``.
-        rate_hz: frames a second of a file, used instead of the rate that it (or its format) states.
-        least_score: keypoints of a file whose score is below it count as missing.
-        choice: which animal, keypoints and plane of a file that has several.
+        name_or_path: a name of ``EMBEDDED``, figures in a ``.toml`` (``RecordingConfig``), or a
+            file in a format of ``formats.KNOWN``.
+        rate_hz: frames per second of a file; replaces its own or its format's rate.
+        least_score: keypoints with a lower score count as missing.
+        choice: animal, keypoints and plane of a file.
 
     Raises:
-        InputError: neither name nor file, no known format, or a fault inside it.
+        InputError: neither name nor file, an unknown format, or a fault inside it.
 
     """
     path = Path(name_or_path)
@@ -82,17 +82,16 @@ def load_file(
     least_score: float | None = None,
     choice: Choice = ALL,
 ) -> Track:
-    """Load a recording from a file; its content, not its name, says which format it has.
+    """Load a recording from a file, whose content decides its format.
 
     Args:
         path: of the file.
-        rate_hz: frames a second, used instead of the rate that the file (or its format) states.
-        least_score: keypoints whose score is below it count as missing; default 0, and for
-            DeepLabCut its own 0.6.
-        choice: which animal, keypoints and plane, where there are several.
+        rate_hz: frames per second; replaces the file's or its format's rate.
+        least_score: keypoints with a lower score count as missing; default 0, for DeepLabCut 0.6.
+        choice: animal, keypoints and plane.
 
     Raises:
-        InputError: no such file, none of the known formats, or a fault inside it.
+        InputError: no such file, an unknown format, or a fault inside it.
 
     """
     found = _loaded(Path(path), rate_hz, least_score, choice)
@@ -105,10 +104,10 @@ def load_keypoints(
     least_score: float | None = None,
     choice: Choice = ALL,
 ) -> Keypoints:
-    """Load all keypoints of one animal, also those off its midline; see ``load_file``.
+    """Load all keypoints of one animal, including those off its midline; see ``load_file``.
 
     Raises:
-        InputError: as of ``load_file``, or the file holds midlines.
+        InputError: as ``load_file``, or the file holds midlines.
 
     """
     found = _loaded(Path(path), rate_hz, least_score, choice)
@@ -171,7 +170,7 @@ def _loaded(
 
 
 def track_beside(name_or_path: str, folder: Path | None) -> str:
-    """Path of a recording named in a file in ``folder``: relative to it where it is there."""
+    """Path of a recording named in a file in ``folder``: relative to it if it exists there."""
     if folder is None or name_or_path in EMBEDDED or not (folder / name_or_path).is_file():
         return name_or_path
     return str(folder / name_or_path)

@@ -1,9 +1,9 @@
 """Marker trajectories as tables: Vicon's CSV and OpenSim's TRC.
 
-Vicon Nexus writes blocks. The block of the markers begins with ``Trajectories`` and the frame rate.
-Then come lines of marker names, of column names (Frame, Sub Frame, X, Y, Z, ...) and of units, then
-rows up to an empty line. A TRC has two lines of names and values (``DataRate``, ``Units``, ...),
-lines of marker and column names, then rows of frame, time and places.
+Vicon Nexus writes blocks. The marker block begins with ``Trajectories`` and the frame rate. Marker
+names, column names (Frame, Sub Frame, X, Y, Z, ...), units and rows follow, up to an empty line. A
+TRC has two lines of names and values (``DataRate``, ``Units``, ...), lines of marker and column
+names, then rows of frame, time and places.
 """
 
 import csv
@@ -28,7 +28,7 @@ _MOST_COLUMNS: Final = 30_000
 
 
 def is_trc(head: bytes) -> bool:
-    """Whether a file that begins so is a TRC."""
+    """Whether a file with this head is a TRC."""
     return head.removeprefix(b"\xef\xbb\xbf").startswith(b"PathFileType")
 
 
@@ -40,7 +40,7 @@ def is_vicon(rows: list[list[str]]) -> bool:
 def load_vicon(
     file: Path, rows: list[list[str]], rate_hz: float | None, choice: Choice
 ) -> Keypoints:
-    """Load the marker trajectories of Vicon's CSV; see ``load.load_file``."""
+    """Load Vicon's CSV; see ``load.load_file``."""
     begin = next(k for k, row in enumerate(rows) if row and row[0].strip() == VICON_HEAD)
     block = [(k + 1, row) for k, row in enumerate(rows)][begin + 1 :]
     if len(block) < 5:
@@ -110,7 +110,7 @@ def _check_count(file: Path, key: str, about: dict[str, str], rows: int) -> None
 
 
 def _frames(file: Path, data: list[tuple[int, list[str]]]) -> Ints:
-    """(T,) frame numbers of numbered rows."""
+    """(T,) frame numbers of rows."""
     if len(data) < 2:
         raise InputError(f"{file}: holds {len(data)} frames; a motion needs at least 2")
     numbers = []

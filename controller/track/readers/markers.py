@@ -1,9 +1,8 @@
-"""Markers in space, as motion capture has them, projected onto a plane: QTM's TSV, and C3D.
+"""Motion-capture markers, projected onto a plane: QTM's TSV, and C3D (by ezc3d).
 
 A TSV begins with lines of a name and its values (``FREQUENCY``, ``MARKER_NAMES``, ...). A line of
-column names may follow, then rows of x, y, z of each marker, mm. Some exports begin rows with frame
-and time. The values 0, 0, 0 and an empty cell mean a missing marker. C3D is read by ezc3d.
-``marker_tables`` reads Vicon's CSV and OpenSim's TRC.
+column names may follow, then rows of x, y, z per marker, mm. Some exports begin rows with frame and
+time. The values 0, 0, 0 or an empty cell mean a missing marker.
 """
 
 import csv
@@ -34,12 +33,12 @@ _FIRST_WORDS = {"NO_OF_FRAMES", "NO_OF_MARKERS", "FREQUENCY", "MARKER_NAMES", "D
 
 
 def is_qtm(head: bytes) -> bool:
-    """Whether a file that begins so is one of QTM's."""
+    """Whether a file with this head is QTM's."""
     return head.removeprefix(b"\xef\xbb\xbf").split(b"\t", 1)[0].decode("latin-1") in _FIRST_WORDS
 
 
 def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
-    """Load QTM's TSV of marker trajectories; see ``load.load_file``."""
+    """Load QTM's TSV; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             lines = [row for row in csv.reader(stream, delimiter="\t") if any(row)]
@@ -65,7 +64,7 @@ def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
 
 
 def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
-    """Load the markers of a C3D; see ``load.load_file``."""
+    """Load a C3D; see ``load.load_file``."""
     require_extra(f"{file}: C3D needs", "ezc3d")
     import ezc3d  # noqa: PLC0415  an extra
 
@@ -89,13 +88,9 @@ def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
 def marker_places(
     file: Path, rows: Sequence[Sequence[str]], markers: int, *, first_line: int | None
 ) -> Floats:
-    """(T, K, 3) cells of rows as places; NaN where a cell says that a marker was not seen.
+    """(T, K, 3) places from cells of x, y, z per marker; NaN where a marker was not seen.
 
-    Args:
-        file: for faults.
-        rows: of x, y, z of each marker.
-        markers: K.
-        first_line: line of the file in which the rows begin; None: rows are counted from 1.
+    ``first_line`` is the rows' first line in the file; None counts rows from 1.
 
     Raises:
         InputError: a cell is not a number.
@@ -124,10 +119,9 @@ def projected(
     choice: Choice,
     frame: Ints | None = None,
 ) -> Keypoints:
-    """Markers (T, K, 3) seen at right angles to a plane.
+    """Markers (T, K, 3) projected onto a plane.
 
-    Without a choice of keypoints, markers without a label and markers that do not move are left
-    out, and named in the notes.
+    Without chosen keypoints, unlabelled and static markers are left out, and named in the notes.
     """
     plane = choice.plane or "xy"
     if plane not in PLANES:
@@ -155,7 +149,7 @@ def projected(
 
 
 def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int], list[str]]:
-    """Markers with a label that move, and a line about each kind of the others."""
+    """Labelled markers that move, and a line about each kind of the others."""
     every = range(len(names))
     without = [k for k in every if is_unlabelled(names[k])]
     rest = [k for k in every if k not in without]
@@ -170,9 +164,9 @@ def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int
 
 
 def _still(places: Floats, seen: Sequence[int]) -> list[int]:
-    """Markers that do not move and keep a distance to none of those that do.
+    """Markers that neither move nor keep a distance to a moving one.
 
-    A body's head may be held in one place; the marker next to it then stays at one distance.
+    A body's head may be held in place; the marker next to it then keeps its distance.
     """
     if len(seen) < FEWEST:
         return []
@@ -192,12 +186,12 @@ def _still(places: Floats, seen: Sequence[int]) -> list[int]:
 
 
 def is_unlabelled(name: str) -> bool:
-    """Whether a program made this name for a marker that nobody named."""
+    """Whether a program generated this name for a marker without a label."""
     return not name.strip() or _UNLABELLED.fullmatch(name.strip().lower()) is not None
 
 
 def number_or_none(text: str) -> float | None:
-    """Return the finite number that a text is, or None."""
+    """The finite number in a text, or None."""
     try:
         value = float(text)
     except ValueError:

@@ -1,9 +1,9 @@
 """SLEAP's files: its table (CSV), its analysis HDF5, and its projects (``.slp``).
 
-The analysis HDF5 is written column-major for MATLAB, so h5py sees ``tracks`` as (tracks, 2, nodes,
-frames) and ``point_scores`` as (tracks, nodes, frames); ``node_names`` and ``track_names`` are
-bytes. A project holds ``frames``, ``instances`` and their ``points`` (set by hand) or
-``pred_points`` as tables that point into each other, and names as JSON. Pixel rows count downwards.
+The analysis HDF5 is column-major for MATLAB: h5py sees ``tracks`` as (tracks, 2, nodes, frames) and
+``point_scores`` as (tracks, nodes, frames); ``node_names`` and ``track_names`` are bytes. A project
+holds tables ``frames``, ``instances`` and ``points`` (set by hand) or ``pred_points`` that index
+each other, and names as JSON. Pixel rows count downwards.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.track.track import MOST_FRAMES, frame_numbers
 
 _DOWNWARDS = np.array([1.0, -1.0])
-_CENTRED = 1.1  # format from which a pixel's centre, not its corner, is whole
+_CENTRED = 1.1  # format from which whole numbers are pixel centres, not corners
 _PREDICTED = 1
 _NO_TRACK = "no track"
 
@@ -40,11 +40,11 @@ def load_table(
     Args:
         file: for faults and the name.
         nodes: names of the K keypoints.
-        whose: name of the track of each of T rows.
+        whose: track name of each of T rows.
         frame: (T,) frame numbers.
         xy: (T, K, 2) pixels.
         scores: (T, K), or None.
-        rate_hz: frames a second.
+        rate_hz: frames per second.
         least_score: keypoints below it are missing.
         choice: animal and order of the midline.
 
@@ -67,7 +67,7 @@ def load_table(
 
 
 def _one_a_frame(file: Path, frame: Floats, scores: Floats | None) -> Ints:
-    """Indices of rows, by frame: a row set by hand, without scores, replaces the prediction."""
+    """Indices of rows by frame: a row set by hand (without scores) replaces the prediction."""
     by_hand = np.zeros(len(frame), bool)
     if scores is not None:
         by_hand[:] = np.isnan(scores).all(axis=1)
@@ -117,7 +117,7 @@ def load_analysis(
 
 
 def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
-    """Array with its axes as SLEAP writes them; sleap-io names others in the attribute dims."""
+    """Array with SLEAP's order of axes; sleap-io states its own in the attribute dims."""
     values = np.asarray(stored[:], dtype=float)
     named = _stated(stored, "dims")
     if not isinstance(named, list) or {*map(str, named)} != {*axes} or values.ndim != len(named):
@@ -126,14 +126,14 @@ def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
 
 
 def _stated_rate(held: Any) -> float | None:
-    """Frames a second that sleap-io states of the video; SLEAP itself states none."""
+    """Frame rate of the video that sleap-io states; SLEAP itself states none."""
     about = _stated(held, "video_backend_metadata")
     rate = about.get("fps") if isinstance(about, dict) else None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
 
 
 def _stated(held: Any, name: str) -> Any:
-    """Content of an attribute as JSON; None if it is missing or cannot be parsed."""
+    """Content of a JSON attribute; None if it is missing or invalid."""
     try:
         return parse_json(_text(held.attrs[name]))
     except (KeyError, ValueError):
@@ -211,7 +211,7 @@ def load_project(
 
 
 def _rate(held: Any) -> float | None:
-    """Frames a second that a project states of its video; older ones state none."""
+    """Frame rate of a project's video; older projects state none."""
     for one in held["videos_json"][:] if "videos_json" in held else []:
         rate = parse_json(_text(one)).get("backend", {}).get("fps")
         if rate:
@@ -224,6 +224,5 @@ def _names(held: Any, what: str) -> list[str]:
 
 
 def _text(value: bytes | str | NDArray[np.generic]) -> str:
-    """Text of an HDF5 value."""
     plain = value.item() if isinstance(value, np.ndarray | np.generic) else value
     return plain.decode("utf-8", "replace") if isinstance(plain, bytes) else str(plain)

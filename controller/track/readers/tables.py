@@ -27,7 +27,7 @@ _WIDE = {"x_m": 1.0, "x_px": None, "x_lengths": None}
 def load_csv(
     file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
 ) -> Track | Keypoints:
-    """Load a CSV of any of these kinds; see ``load.load_file``."""
+    """Load any of these kinds of CSV; see ``load.load_file``."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             every = list(csv.reader(stream))
@@ -64,7 +64,7 @@ def load_csv(
 def _of_animal(
     file: Path, rows: list[list[str]], column: dict[str, int], choice: Choice
 ) -> list[list[str]]:
-    """Return the names of the columns and the rows of the chosen animal, if animals are named."""
+    """Header and rows of the chosen animal, if animals are named."""
     at = column.get("animal")
     if at is None:
         choice.only(file, "a CSV of midlines")
@@ -77,7 +77,7 @@ def _of_animal(
 
 
 def _long(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) -> Floats:
-    """Rows t, frame, point, x, y of rows that hold all points of a frame."""
+    """Rows t, frame, point, x, y from rows that hold all points of a frame."""
     count = 1
     while {f"x_{unit}_{count + 1}", f"y_{unit}_{count + 1}"} <= column.keys():
         count += 1
@@ -107,7 +107,7 @@ def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
 
 
 def _midline(file: Path, table: Floats, scale_m: float | None, rate_hz: float | None) -> Track:
-    """Rows of t (s), frame, point, x, y; point 1 is the head."""
+    """Track from rows of t (s), frame, point (1 is the head), x, y."""
     if not np.isfinite(table[:, :3]).all():
         lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())
         raise InputError(
@@ -155,7 +155,7 @@ def _sleap(
     least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
-    """One row an animal and frame, keypoints in the table's order, head first, in pixels."""
+    """Keypoints in pixels, from one row per animal and frame, in the table's order."""
     columns = [column["frame_idx"], *(column[f"{k}.{axis}"] for k in keypoints for axis in "xy")]
     table = _numbers(file, rows, columns)
     score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]

@@ -1,9 +1,8 @@
-"""WCON, the worm trackers' JSON: midlines with their units, one or more records of an animal.
+"""WCON, the worm trackers' JSON: midlines with units, in one or more records per animal.
 
-The format's text defines: ``units`` of t, x, y; ``data`` is one record or a list of them, each with
-an ``id``, one or more times ``t`` and as many lists ``x`` and ``y``. The ``head`` "L" is the first
-point and "R" the last. The value of ``ox, oy`` (else ``cx, cy``) is added to the points; null is
-missing.
+``units`` state those of t, x, y. ``data`` is one record or a list of them, each with an ``id``, one
+or more times ``t`` and equally many lists ``x`` and ``y``. ``head`` "L" is the first point, "R" the
+last. ``ox, oy`` (else ``cx, cy``) are added to the points; null is missing.
 """
 
 import math
@@ -71,7 +70,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
     if not (np.diff(time) > 0.0).all():
         raise InputError(f"{file}: a time twice: more than one body at a time")
     frame = frame_numbers(str(file), np.rint((time - time[0]) / step))
-    if (np.diff(frame) == 0).any():  # so uneven that the times alone count
+    if (np.diff(frame) == 0).any():  # too uneven to count frames
         frame = np.arange(len(time))
     track = track_from_points(
         file.stem,
@@ -88,7 +87,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
 
 
 def zipped_text(file: Path) -> str | None:
-    """Text of the one JSON in an archive; None if it holds arrays (.npz) instead."""
+    """Text of the JSON in an archive; None if it holds arrays (.npz)."""
     try:
         with zipfile.ZipFile(file) as archive:
             names = archive.namelist()
@@ -103,7 +102,7 @@ def zipped_text(file: Path) -> str | None:
 
 
 def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, Floats]]:
-    """Times and head-first points (P, 2) of one record, in metres where the units are lengths."""
+    """Times and head-first points (P, 2) of a record, in metres if its units are lengths."""
     many = isinstance(record["t"], list)
     times, xs, ys = (record[k] if many else [record[k]] for k in ("t", "x", "y"))
     if not len(times) == len(xs) == len(ys):
@@ -123,7 +122,7 @@ def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, F
 
 
 def _at(value: Any, k: int) -> Any:
-    """One value for all times, or the k-th of one for each."""
+    """The common value, or the k-th of a list."""
     return value[k] if isinstance(value, list) else value
 
 
@@ -133,7 +132,7 @@ def _floats(values: Any) -> Floats:
 
 
 def _alike(bodies: list[Floats]) -> Floats:
-    """Bodies (T, P, 2): where counts of points differ, all get the largest by equal arcs."""
+    """Bodies (T, P, 2); bodies with different point counts are resampled to the largest."""
     counts = {len(points) for points in bodies}
     if len(counts) == 1:
         return np.stack(bodies)
@@ -169,10 +168,10 @@ _LONG = {"metre": ("m", 1.0), "meter": ("m", 1.0), "inch": ("m", 0.0254)} | {
 
 
 def si_value(unit: str, dimension: str) -> float | None:
-    """How many metres ("m") or seconds ("s") a unit is; None if it is of another kind.
+    """Factor from a unit to metres ("m") or seconds ("s"); None for another dimension.
 
-    Prefixes and names as in the WCON format: short (``um``) or in full (``micrometres``), numbers
-    as factors. Capitals matter.
+    Accepts the WCON prefixes and names, short (``um``) or in full (``micrometres``), and numbers as
+    factors. Case matters.
     """
     value = 1.0
     kinds: list[str] = []
@@ -187,13 +186,13 @@ def si_value(unit: str, dimension: str) -> float | None:
 
 
 def _word(word: str) -> tuple[str, float]:
-    """Kind ("m", "s", "1" for a number, "?") and SI value of one factor of a unit."""
+    """Kind ("m", "s", "1" for a number, "?") and SI value of a factor of a unit."""
     try:
         return "1", float(word)
     except ValueError:
         singular = word.removesuffix("s")
     if word in _SHORT:
-        return _SHORT[word]  # "min" is a minute, not a thousandth of an inch
+        return _SHORT[word]  # "min" is a minute, not a milli-inch
     for base, (kind, factor) in _LONG.items():
         for name in (word, singular, "inch" if word == "inches" else word):
             if name.endswith(base) and name.removesuffix(base) in _WORDS:

@@ -1,4 +1,4 @@
-"""Tracks as tables and WCON, for other programs; the readers of this package read both back."""
+"""Writers of tracks as tables and WCON; the readers read both back."""
 
 import csv
 import json
@@ -20,7 +20,7 @@ def write_track(path: Path, track: Track, suffix: str) -> None:
     """Write a track in the format of a suffix.
 
     Raises:
-        InputError: none of ``SUFFIXES``.
+        InputError: the suffix is not in ``SUFFIXES``.
 
     """
     if suffix.lower() == ".npz":
@@ -41,10 +41,10 @@ def write_tracks(
 
     Args:
         path: of the file.
-        tracks: one for each animal; their names are different.
+        tracks: one per animal, with different names.
         suffix: ``.csv`` or ``.wcon``.
         wide: a row of the table holds all points of a frame; else one point.
-        unit: of the points: ``m``, ``px`` or ``lengths``; None: as the tracks have it.
+        unit: of the points: ``m``, ``px`` or ``lengths``; None: that of the tracks.
 
     Raises:
         InputError: another suffix, or a table of a recording without places.
@@ -62,11 +62,10 @@ def write_tracks(
 
 
 def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) -> None:
-    """Write rows of t, frame, point (1 is the head) and place, for R, MATLAB and others.
+    """Write rows of t, frame, point (1 is the head) and place.
 
-    Columns are ``x_m, y_m``, or ``x_lengths`` or ``x_px`` where the recording has no scale. Wide
-    rows have ``x_m_1, y_m_1, x_m_2`` and so on. A column ``animal`` names the animal where there
-    are several. Frames that are missing have no rows.
+    Columns are ``x_m, y_m``; without a scale ``x_lengths`` or ``x_px``. Wide rows have ``x_m_1,
+    y_m_1, x_m_2`` and so on. Several animals add a column ``animal``. Missing frames have no rows.
     """
     if not all(one.places_recorded for one in tracks):
         raise InputError(
@@ -96,7 +95,7 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
 
 
 def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
-    """Write a WCON for Tierpsy and others; bodies without a scale have unit 1."""
+    """Write a WCON; bodies without a scale have unit 1."""
     first = tracks[0]
     about = {
         "software": {"name": "snakewalk"},
