@@ -87,7 +87,7 @@ class WaypointTurns:
         return SplinePath.tabulated(np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]))
 
     def arrive_in_steps(self, leg: SplinePath, onward_m: Floats) -> Steps[SplinePath | None]:
-        """Join a leg to a waypoint and the points (n, 2) after it by a safe turn, or return None."""
+        """Join a leg to a waypoint and the points (n, 2) after it by a safe turn, or None."""
         back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
         to_m, backs = leg.piece_m(0.0, leg.length_m), np.array([back])
         found = yield from self._turned(to_m, None, backs, backs - np.pi)
