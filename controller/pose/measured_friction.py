@@ -39,8 +39,8 @@ ROUGH_M: Final = 0.005
 """Root mean square distance of the ground under the links from a plane, above which the motion does
 not count (ours): a link is 7 cm long."""
 SPREAD: Final = 3.0
-"""On a slope, the largest factor between the ends of an interval with which the estimate is used
-(ours)."""
+"""On a slope, the largest factor between the ends of an interval with which the use of an estimate
+begins (ours). It goes on until the estimate agrees with the file again."""
 
 
 class _Cycle(NamedTuple):
@@ -124,8 +124,9 @@ class MeasuredFriction(FrictionEstimator):
         yield self._filter.absorb(evidence, WINDOW_S)
 
     def accept(self, found: FoundFriction) -> None:
-        """Use a finding as ``FrictionEstimator``; on a slope only if its intervals are narrow."""
-        if self._ground is not None and found.spread > SPREAD:
+        """As ``FrictionEstimator``; on a slope the use begins only with narrow intervals."""
+        is_used = self._used != self._file
+        if self._ground is not None and not is_used and found.spread > SPREAD:
             found = replace(found, differs=False)
         super().accept(found)
 

@@ -245,7 +245,8 @@ class _Execution:
         ):
             source = prepared.make_source(log_event)
             friction = second_body(prepared, source, backend, pose)
-            if self.port is not None and pose_evidence(prepared, backend).is_measured:
+            evidence = pose_evidence(prepared, backend)
+            if self.port is not None and evidence.is_measured:
                 now_s = None if self.rehearsed is None else clock.now_s
                 use_worker(prepared, source, now_s, workers)
             if self.waypoint_commands is not None:
@@ -265,7 +266,10 @@ class _Execution:
             drive = Drive(
                 link=link,
                 clock=clock,
-                sensors=Sensors(mapped.measure, backend.wire_busy_s, backend.energy, pose.health),
+                sensors=Sensors(
+                    *(mapped.measure, backend.wire_busy_s, backend.energy, pose.health),
+                    evidence.position_m or 0.0,
+                ),
                 motion=source,
                 log=log,
                 robot=prepared.robot,

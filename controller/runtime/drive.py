@@ -154,6 +154,8 @@ class Sensors:
     """Energy that the motors have drawn and delivered so far."""
     pose_health: PoseHealth | None = None
     """Whether the pose can be trusted; None of a source that is always believed."""
+    pose_sd_m: float = 0.0
+    """Standard deviation of a measured position."""
 
 
 class Drive:
@@ -184,7 +186,9 @@ class Drive:
         self._waypoints_m = None if self._open is None else self._open.waypoints_m
         self._log, self._robot, self._run = log, robot, run
         self._gain = gain
-        self._slip_monitor = SlipMonitor(robot.length_m, gain, run.safety.advance_fraction)
+        self._slip_monitor = SlipMonitor(
+            robot.length_m, gain, run.safety.advance_fraction, sensors.pose_sd_m
+        )
         self._roll_monitor = RollMonitor()
         self._friction_monitor = friction
         self._load = link.load if isinstance(link, LoadedLink) else None

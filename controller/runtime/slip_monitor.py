@@ -1,6 +1,11 @@
 """Slip monitor: an alarm where the shape travels and the body does not (docs/method.md)."""
 
+import math
 from dataclasses import dataclass
+from typing import Final
+
+NOISE_SD: Final = 3.0
+"""Standard deviations of its noise by which a displacement must be too small (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,18 +25,22 @@ class SlipWindow:
 class SlipMonitor:
     """Compares displacements of the body and of its shape, a body length of the shape at a time."""
 
-    def __init__(self, length_m: float, gain: float, fraction: float) -> None:
+    def __init__(
+        self, length_m: float, gain: float, fraction: float, pose_sd_m: float = 0.0
+    ) -> None:
         """Set what is expected.
 
         Args:
             length_m: body length; a window closes when the shape has travelled so far.
             gain: predicted body speed over pulse speed, eta_q.
             fraction: share of the predicted displacement below which the alarm is raised.
+            pose_sd_m: standard deviation of a measured position. Two of them are in a displacement.
 
         """
         self._length_m = length_m
         self._gain = gain
         self._fraction = fraction
+        self._margin_m = NOISE_SD * math.sqrt(2.0) * pose_sd_m
         self._pulse_m = 0.0
         self._displacement_m = 0.0
         self.window: SlipWindow | None = None
@@ -45,4 +54,5 @@ class SlipMonitor:
             return False
         self.window = SlipWindow(self._displacement_m, self._gain * self._pulse_m)
         self._pulse_m = self._displacement_m = 0.0
-        return bool(self.window.share < self._fraction)
+        least_m = self._fraction * self.window.predicted_m - self._margin_m
+        return bool(self.window.measured_m < least_m)

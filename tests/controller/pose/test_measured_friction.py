@@ -119,8 +119,8 @@ def test_motion_on_rough_ground_shows_nothing() -> None:
     assert found[-1].friction == FILE
 
 
-def test_a_wide_interval_is_not_used() -> None:
-    """A contradiction counts on a slope only when both intervals are narrow."""
+def test_use_begins_with_narrow_intervals() -> None:
+    """A contradiction counts on a slope when both intervals are narrow, and then until it ends."""
     used = list[FrictionConfig]()
     monitor = MeasuredFriction(FILE, lambda: MeasuredHeads(0.0, []), used.append, slope(5.0))
     other = FrictionConfig(along=0.05, across=0.35)
@@ -129,3 +129,7 @@ def test_a_wide_interval_is_not_used() -> None:
     assert used == []
     monitor.accept(replace(wide, along_95=(0.04, 0.06)))
     assert used == [other]
+    monitor.accept(wide)
+    assert used == [other]
+    monitor.accept(replace(wide, differs=False))
+    assert used == [other, FILE]

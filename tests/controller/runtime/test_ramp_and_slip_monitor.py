@@ -36,3 +36,15 @@ def test_the_alarm_sounds_below_half_of_the_prediction(gain: float, alarm: bool)
     assert any(sounded) is alarm
     assert watch.window is not None
     assert watch.window.share == pytest.approx(gain / 0.7, abs=0.01)
+
+
+@pytest.mark.parametrize(("share", "alarm"), [(0.51, 0), (0.35, 20)])
+def test_noise_of_the_pose_raises_no_alarm(share: float, alarm: int) -> None:
+    """A body just above the limit, seen at 1 cm, is not reported; one that slips always is."""
+    rng = np.random.default_rng(4)
+    watch = SlipMonitor(length_m=1.2, gain=0.7, fraction=0.5, pose_sd_m=0.01)
+    sounded = 0
+    for _ in range(20):
+        begin_m, end_m = 0.01 * rng.standard_normal(2)
+        sounded += watch.update(1.2, share * 0.7 * 1.2 + end_m - begin_m)
+    assert sounded == alarm
