@@ -12,6 +12,7 @@ python -m benchmarks.walkthrough --positions 2      # the first step alone
 import argparse
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -207,14 +208,15 @@ def main() -> None:
     print(provenance("python -m benchmarks.walkthrough"))
     stations = [station(x_m) for x_m in PLACES_M[: chosen.positions]]
     known = [truth(*stations[k : k + 2]) for k in range(len(stations) - 1)]
-    for title, table in (
+    tables: list[tuple[str, Callable[[], None]]] = [
         ("Matches", lambda: matches_table(walk, known)),
         ("Poses", lambda: pose_table(walk)),
         ("Flow, estimated pose", lambda: flow_table(walk, known, 0.0)),
         ("Flow, pose 40 mm off", lambda: flow_table(walk, known, 0.04)),
-    ):
+    ]
+    for title, table in tables:
         print(f"\n{title}\n", flush=True)
-        table()  # type: ignore[no-untyped-call]
+        table()
     camera = picture_camera(walk, (640, 480))
     took = []
     for view in views_along(walk, 3):

@@ -215,11 +215,12 @@ def mosaic_truth(found: Mosaic) -> Floats:
         seen = rays @ at.axes
         forward = np.maximum(seen[..., 2], 1e-6)
         k = CAMERA.matrix
-        across, down = (
+        column, row = (
             (seen[..., axis] / forward * k[axis, axis] + k[axis, 2]).astype(np.float32)
             for axis in (0, 1)
         )
-        met = cv2.remap(depth, across, down, cv2.INTER_LINEAR, borderValue=np.nan) / forward
+        there = cv2.remap(depth, column, row, cv2.INTER_LINEAR, borderValue=np.nan)
+        met = np.asarray(there) / forward
         truth = np.where(np.isfinite(truth) | (seen[..., 2] < 0.1), truth, met)
     return truth
 

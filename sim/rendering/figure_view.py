@@ -10,8 +10,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
-from snakewalk.sim.rendering.shade import LIFT_M, SUN_DIRECTION
-from snakewalk.sim.rendering.soft_shadow import SHAPE_RGBA, soft_shadow
+from snakewalk.sim.rendering.shade import SoftShade, add_sheet, surface_points_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +39,14 @@ class FigureView:
         ``look`` gives faces and texture and replaces the robot; its free bones are not used.
         ``world`` is level ground.
         """
-        self._model = dressed_model(robot, world, None, look=look, fine=True)
+        self._model = dressed_model(
+            robot, world, None, look=look, fine=True, additions=(add_sheet,)
+        )
+        self._shade = SoftShade(self._model, None)
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         self._faces = look.faces
-        self._skin = int(self._model.skin_matid[0]), self._model.skin_rgba[0].copy()
         room = self._model.ngeom + self._model.nbody + 11
         self._scene = mujoco.MjvScene(self._model, maxgeom=room)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
@@ -54,29 +55,22 @@ class FigureView:
         self._screen = Offscreen(self._model, *size_px)
 
     def draw(self, corners_m: Floats, camera: OrbitCamera, caption: str = "") -> Image:
-        """Draw the mesh with corners (V, 3), (height, width, 3); a new array."""
-        shadow_m = corners_m - corners_m[:, 2:] / SUN_DIRECTION[2] * SUN_DIRECTION
-        shadow_m[:, 2] = LIFT_M
-        below = corners_m - [0.0, 0.0, 1e3]
-        empty = self._pass(below, camera, "", shape=True)
-        shape = self._pass(shadow_m, camera, "", shape=True)
-        return soft_shadow(empty, shape, self._pass(corners_m, camera, caption, shape=False))
-
-    def close(self) -> None:
-        """Free the frame buffer; safe to call twice."""
-        self._screen.close()
-
-    def _pass(self, corners_m: Floats, camera: OrbitCamera, caption: str, *, shape: bool) -> Image:
+        """Draw the mesh with corners (V, 3), (height, width, 3); a new array each time."""
         model, view, scene = self._model, self._camera, self._scene
-        material, rgba = (-1, SHAPE_RGBA) if shape else self._skin
-        model.skin_matid[0], model.skin_rgba[0] = material, rgba
         view.lookat[:], view.distance = camera.lookat_m, camera.distance_m
         view.azimuth, view.elevation = camera.azimuth_deg, camera.elevation_deg
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, self._data, self._option, None, view, every, scene)
-        scene.skinvert[:] = corners_m.ravel()
-        scene.skinnormal[:] = _normals(corners_m, self._faces).ravel()
+        count = len(corners_m)  # the mesh is the first skin
+        scene.skinvert.reshape(-1, 3)[:count] = corners_m
+        scene.skinnormal.reshape(-1, 3)[:count] = _normals(corners_m, self._faces)
+        self._shade.lay(scene, surface_points_m(corners_m, self._faces))
+        self._screen.reload(model, self._shade.texture)
         return self._screen.draw(scene, caption).copy()
+
+    def close(self) -> None:
+        """Free the frame buffer; safe to call twice."""
+        self._screen.close()
 
 
 def _normals(corners_m: Floats, faces: Ints) -> Floats:

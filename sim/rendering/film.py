@@ -17,7 +17,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
-from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m
+from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m, surface_points_m
 from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
 
 SMOOTHING_S = 1.2
@@ -188,7 +188,7 @@ class _Stage:
             links = np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])
             return link_surface_m(*links, self._robot)
         corners = np.array(scene.skinvert, float).reshape(-1, 3)[: int(self._faces.max()) + 1]
-        return np.concatenate([corners, corners[self._faces].mean(axis=1)])
+        return surface_points_m(corners, self._faces)
 
 
 def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Floats:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.ndimage import binary_closing, gaussian_filter
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 
@@ -111,6 +111,11 @@ def under_sun(points_m: Floats, ground: HeightField | None) -> Floats:
         level = ground.elevation_m(points_m[:, 0], points_m[:, 1])
     height = np.clip(points_m[:, 2] - level, 0.0, None)
     return np.asarray(points_m[:, :2] + height[:, None] * slide)
+
+
+def surface_points_m(corners_m: Floats, faces: Ints) -> Floats:
+    """Points (P, 3) of a mesh that cover its surface: corners (V, 3) and middles of the faces."""
+    return np.concatenate([corners_m, corners_m[faces].mean(axis=1)])
 
 
 def link_surface_m(links_m: Floats, forward: Floats, robot: RobotConfig) -> Floats:

@@ -50,4 +50,5 @@ def _foot(axes: Axes, found: Stride, k: int) -> None:
         found.phase % 1.0, found.ahead[:, k], ".", color=BLUE, markersize=3.0, label="tracked"
     )
     axes.plot(cycle, model_ahead(found, k, cycle), color=INK, linewidth=1.2, label="model")
-    axes.set_title(f"{LEGS[k]}: {100.0 * foot.duty:.0f} % on the ground, down at {foot.down:.2f}")
+    down = round(foot.down, 2) % 1.0  # 0.998 is 0.00, not 1.00
+    axes.set_title(f"{LEGS[k]}: {100.0 * foot.duty:.0f} % on the ground, down at {down:.2f}")
