@@ -57,7 +57,7 @@ def profile_ends(
     if last - first > 2:
         usual = float(np.median(_sums(even[first:last], level, wide, step)))
     if usual <= 0.0:
-        return NO_ENDS
+        return NO_ENDS.copy()
     round_px = max(_LEAST_PX, _ROUND_PX + _BY_BLUR * max(blur_px, _LEAST_BLUR_PX))
     ends = [_end(way, level, wide, step, usual, round_px) for way in (even[::-1], even)]
     return np.stack(ends)
