@@ -37,7 +37,7 @@ class Detections:
     faint_error_px: dict[int, float] = field(default_factory=dict)
     """By frame: least expected error of bodies with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
-    """(2, 2) by frame: where the profile of the body ends; NaN where it is not known."""
+    """(2, 3) by frame: where the profile of the body ends, and the doubt; NaN if not known."""
     store: FrameStore = field(default_factory=FrameStore)
     """The surroundings of the body in every frame."""
     crops: dict[int, Crop] = field(default_factory=dict)
@@ -61,7 +61,8 @@ class Detections:
             axis_px = axis_error_px(blur_px, body.length_px)
             first = np.asarray(silhouette.origin_px)
             line = body.points_px - first
-            ends_px = first + profile_ends(line, body.radius_px, silhouette.level, blur_px)
+            ends_px = profile_ends(line, body.radius_px, silhouette.level, blur_px)
+            ends_px[:, :2] += first
             if detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)

@@ -167,11 +167,12 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
     """The film with the error of the tips in its expected errors.
 
     The profile across the body shows where a body ends below the noise or the blur. A length that
-    all frames share is wrong alike in all of them, so the median over the frames counts.
+    all frames share is wrong alike in all of them, so the median over the frames counts. It is
+    fitted to the pixels of both tips, so only a body that goes on beyond them counts.
 
     Args:
         film: the fitted film, the same end first in all frames.
-        ends_px: (T) (2, 2) where the profiles end, NaN where they are not known.
+        ends_px: (T) (2, 3) by ``profile_ends``, NaN where they are not known.
         solved: (T,) frames of coils, whose error is known.
 
     """
@@ -179,7 +180,10 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
     known = [
         k
         for k, ends in enumerate(ends_px)
-        if np.isfinite(expected[k]) and np.isfinite(ends).all() and not solved[k]
+        if out[k].status.has_points
+        and np.isfinite(expected[k])
+        and np.isfinite(ends).all()
+        and not solved[k]
     ]
     if not known:
         return film
@@ -187,10 +191,11 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
     usual = np.median(beyond, axis=0)
     for k, own in zip(known, beyond, strict=True):
         if film.body is not None:
-            expected[k] = np.hypot(expected[k], tips_error_px(usual))
+            tips = tips_error_px(np.maximum(usual, 0.0))
+            expected[k] = np.hypot(expected[k], tips)
         else:
-            far = np.where(np.abs(own) > np.abs(usual), own, usual)
-            expected[k] = np.hypot(_WITHOUT_TIPS * expected[k], tips_error_px(far))
+            tips = tips_error_px(np.where(np.abs(own) > np.abs(usual), own, usual))
+            expected[k] = np.hypot(_WITHOUT_TIPS * expected[k], tips)
         out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
     return replace(film, skeletons=tuple(out), expected_px=expected)
 

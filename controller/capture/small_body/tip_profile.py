@@ -25,17 +25,20 @@ _CALM = 95.0  # percentile of the ground: more is no noise
 _USUAL = (0.3, 0.6)  # of the length: where the sum is the usual one
 _ROUND_PX, _BY_BLUR, _LEAST_PX = 1.5, 2.0, 3.0  # so far the profile of a round tip goes beyond it
 _LEAST_BLUR_PX = 0.7
+_MOST_DOUBT_PX = 2.0
 _INNER = 4  # chords from a tip: its direction
 _SURE = 0.7  # standard deviation of a tip, of its distance from the end of its profile
 # (constants measured on rendered films)
-NO_ENDS: Final = np.full((2, 2), np.nan)
+NO_ENDS: Final = np.full((2, 3), np.nan)
 """Ends of a frame without a body."""
 
 
 def profile_ends(
     line: Floats, radius_px: Floats, level: NDArray[np.float32], blur_px: float
 ) -> Floats:
-    """(2, 2) x, y where the profile of a body ends, next to its first and its last point.
+    """(2, 3) x, y where the profile of a body ends at its first and its last point, and the doubt.
+
+    The doubt, in px, is the part of the profile that is not seen, less that of a round tip.
 
     Args:
         line: (P, 2) the body in pixels of ``level``.
@@ -54,32 +57,29 @@ def profile_ends(
     if last - first > 2:
         usual = float(np.median(_sums(even[first:last], level, wide, step)))
     if usual <= 0.0:
-        return NO_ENDS
+        return NO_ENDS.copy()
     round_px = max(_LEAST_PX, _ROUND_PX + _BY_BLUR * max(blur_px, _LEAST_BLUR_PX))
     ends = [_end(way, level, wide, step, usual, round_px) for way in (even[::-1], even)]
     return np.stack(ends)
 
 
 def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
-    """(2,) distances of profile ends (2, 2) beyond the tips of a body (P, 2); below 0 before them.
+    """(2, 2) for each tip of a body (P, 2): how far its profile goes on beyond it, and the doubt.
 
-    The ends may be in the other order.
+    The distance is below 0 if the profile ends before the tip. The ends (2, 3) may be in the other
+    order.
     """
     tips = points_px[[0, -1]]
     ahead = tips - points_px[[_INNER, -1 - _INNER]]
     ahead = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
-    other = ends_px[::-1]
-    near = (
-        other
-        if np.hypot(*(other - tips).T).sum() < np.hypot(*(ends_px - tips).T).sum()
-        else ends_px
-    )
-    return np.asarray(((near - tips) * ahead).sum(axis=1))
+    ways = (ends_px, ends_px[::-1])
+    near = min(ways, key=lambda way: float(np.hypot(*(way[:, :2] - tips).T).sum()))
+    return np.column_stack([((near[:, :2] - tips) * ahead).sum(axis=1), near[:, 2]])
 
 
 def tips_error_px(beyond_px: Floats) -> float:
-    """Expected mean error of the points of a body whose profile ends (2,) beyond its tips."""
-    return 0.5 * _SURE * float(np.hypot(*beyond_px))
+    """Expected mean error of the points of a body, from ``beyond_tips_px`` (2, 2)."""
+    return 0.5 * _SURE * float(np.linalg.norm(beyond_px))
 
 
 def _end(
@@ -90,7 +90,7 @@ def _end(
     usual: float,
     round_px: float,
 ) -> Floats:
-    """Where the profile of a line of equal steps comes to 0, less that of a round tip."""
+    """Where the profile of a line of equal steps comes to 0, less a round tip, and the doubt."""
     back = min(max(2, round(max(0.5 * wide, 3.0) / step)), len(line) - 1)
     ahead = line[-1] - line[-1 - back]
     ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)
@@ -104,8 +104,10 @@ def _end(
     noise = 1.4826 * float(np.median(np.abs(rest[apart:] - rest[:-apart]))) / np.sqrt(2.0)
     low = float(np.clip(_NOISE * noise, _LOW, _MOST_LOW))
     from_px, to_px = (_crossing(profile, share) * step for share in (_HIGH, low))
-    far_px = to_px - end * step + (to_px - from_px) * low / (_HIGH - low)
-    return np.asarray(line[-1] + (far_px - round_px) * ahead)
+    hidden_px = (to_px - from_px) * low / (_HIGH - low)
+    far_px = to_px - end * step + hidden_px - round_px
+    doubt_px = np.clip(hidden_px - round_px * _LOW / (_HIGH - _LOW), 0.0, _MOST_DOUBT_PX)
+    return np.append(line[-1] + far_px * ahead, doubt_px)
 
 
 def _crossing(profile: Floats, share: float) -> float:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.small_body.film_fit import FittedFilm, with_tip_errors
 from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
@@ -50,3 +52,16 @@ def test_tips_that_are_seen_leave_frames_good(kind: str) -> None:
     assert seen.good.all()
     assert (off < 2.0 * seen.expected_px).all()
     assert np.median(seen.expected_px) < 0.007 * SCENE.length_px
+
+
+def test_a_frame_without_points_leaves_the_errors_of_the_others_known() -> None:
+    line = np.column_stack([np.linspace(10.0, 110.0, 101), np.full(101, 20.0)])
+    body = Skeleton(line, np.full(101, 3.0), 100.0, FrameStatus.GOOD)
+    ends = np.array([[10.0, 20.0, 0.0], [116.0, 20.0, 0.0]])
+    lost = no_skeleton(FrameStatus.SHORT)
+    film_of_two = FittedFilm((body, lost), np.array([0.5, 0.5]), None)
+    seen = with_tip_errors(film_of_two, [ends, ends], np.zeros(2, dtype=bool))
+    assert seen.expected_px[0] == pytest.approx(np.hypot(0.85 * 0.5, 0.5 * 0.7 * 6.0))
+    assert seen.skeletons[0].status is FrameStatus.ROUGH
+    reversed_ends = with_tip_errors(film_of_two, [ends[::-1]] * 2, np.zeros(2, dtype=bool))
+    assert reversed_ends.expected_px[0] == pytest.approx(seen.expected_px[0])
