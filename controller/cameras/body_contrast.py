@@ -88,7 +88,7 @@ class BodyContrast:
         )
 
     def standing_out(self, shade: float) -> StandingOut:
-        """Return each pixel's difference from the floor; a shadow removes at most ``shade`` of light."""
+        """Return each pixel's difference from the floor; a shadow removes ``shade`` of light."""
         now = _smooth(self.frame)
         apart = np.full(now.shape[:2], np.inf, dtype=np.float32)
         for floor in self.floors:

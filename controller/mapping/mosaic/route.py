@@ -142,7 +142,7 @@ def film(
 
 
 def picture_camera(walk: StereoWalk, size_px: tuple[int, int]) -> Floats:
-    """(3, 3) camera whose picture covers that of the first position."""
+    """(3, 3) camera whose picture lies within that of the first position."""
     model = walk.models[0]
     tall, wide = model.valid.shape
     scale = max(size_px[1] / tall, size_px[0] / wide)
