@@ -1,6 +1,6 @@
-"""Descriptions of robot, ground, motion and run.
+"""Schemas of robot, ground, motion and run, their loader, and the shipped files.
 
-Schemas (pydantic, unknown keys refused), one strict loader that reports every fault of a file at
-once, the height-field type, and the shipped TOML files and recordings. Data flows out of here and
-never back in: nothing of ours is imported.
+The schemas (pydantic) reject unknown keys, and the loader reports every fault of a file at once.
+The package also has the height-field type and the recordings. It imports no other package of
+snakewalk.
 """

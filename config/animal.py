@@ -36,7 +36,7 @@ class FinConfig(Strict):
 
     @property
     def mirrored(self) -> Self:
-        """The one on the other side."""
+        """The fin on the other side."""
         return self.model_copy(update={"around_deg": 180.0 - self.around_deg})
 
 
@@ -64,7 +64,7 @@ class SkinConfig(Strict):
 
     @property
     def all_fins(self) -> tuple[FinConfig, ...]:
-        """Each fin, paired ones twice."""
+        """All fins, paired ones twice."""
         return (*self.fins, *(fin.mirrored for fin in self.fins if fin.paired))
 
 
@@ -134,13 +134,13 @@ class LegPairConfig(Strict):
 
     @property
     def segments(self) -> tuple[float, ...]:
-        """Lengths from the root to the ankle or fetlock, then the foot; missing ones left out."""
+        """Lengths from the root to the ankle or fetlock, then the foot, without missing ones."""
         parts = (self.blade, self.upper, self.lower, self.cannon, self.foot)
         return tuple(part for part in parts if part > 0.0)
 
     @property
     def sole_height(self) -> float:
-        """Height of the foot's axis above the ground: toes lie on it."""
+        """Height of the foot's axis above the ground; toes lie on it."""
         thin = 0.5 * self.thick if self.thin is None else self.thin
         return thin if self.sole == "toes" and self.foot > 0.0 else 0.0
 
@@ -159,7 +159,7 @@ class OrnamentConfig(Strict):
 
     @property
     def mirrored(self) -> Self:
-        """The one on the other side."""
+        """The ornament on the other side."""
         ends = {"root": self.root, "tip": self.tip, "bow": self.bow}
         return self.model_copy(update={name: (x, -y, z) for name, (x, y, z) in ends.items()})
 
@@ -197,7 +197,7 @@ class AnimalConfig(Strict):
 
     @property
     def all_ornaments(self) -> tuple[OrnamentConfig, ...]:
-        """Each ornament, paired ones twice."""
+        """All ornaments, paired ones twice."""
         return (*self.ornaments, *(one.mirrored for one in self.ornaments if one.paired))
 
     @property

@@ -1,8 +1,8 @@
-"""Files that come from outside: how much of them is read, and how far they may expand.
+"""Foreign files: limits of their size and expansion.
 
-A few kilobytes of zeros, well packed, fill the memory of a robot's computer. The size that a file
-states is compared with its own size before it is unpacked, and no more than that is unpacked. A
-device has no end, so text is read up to a limit.
+A few kilobytes of packed zeros can fill a robot's memory. The size that a file states is compared
+with its own size before unpacking, and no more is unpacked. A device has no end, so text is read up
+to a limit.
 """
 
 import json
@@ -50,7 +50,7 @@ DAMAGE: Final = (
 
 
 def why_no_file(path: Path, missing: str = "no such file") -> str:
-    """Say why a path is not one of a file that can be read more than once."""
+    """Reason why a path is not a file that can be read repeatedly."""
     if path.is_dir():
         return f"{path}: is a folder"
     if path.exists():
@@ -59,7 +59,7 @@ def why_no_file(path: Path, missing: str = "no such file") -> str:
 
 
 def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
-    """Bytes of a file, which may be a device or a pipe, up to a size.
+    """Bytes of a file (or device or pipe), up to a size.
 
     Raises:
         InputError: it is larger.
@@ -74,12 +74,12 @@ def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
 
 
 def read_text(file: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
-    """Text of a UTF-8 file, up to a size, without an editor's byte order mark.
+    """Text of a UTF-8 file, up to a size, without byte order mark.
 
     Raises:
         InputError: it is larger.
         OSError: it cannot be read.
-        UnicodeDecodeError: it is no UTF-8.
+        UnicodeDecodeError: it is not UTF-8.
 
     """
     return read_bytes(file, most_bytes).decode("utf-8-sig")
@@ -101,10 +101,10 @@ def parse_json(text: str | bytes) -> Any:
 def check_matrices(file: Path) -> None:
     """Check a file of OpenCV's FileStorage before OpenCV reads it.
 
-    OpenCV allocates the memory that a matrix states, and deep nesting ends the process.
+    OpenCV allocates the stated memory of a matrix, and deep nesting ends the process.
 
     Raises:
-        InputError: it is too large, holds too many or too large matrices, or is nested too deeply.
+        InputError: it is too large, has too many or too large matrices, or is nested too deeply.
         OSError: it cannot be read.
 
     """
@@ -131,16 +131,16 @@ def check_matrices(file: Path) -> None:
 
 
 def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = False) -> None:
-    """Check how many bytes a file would expand to, before it does.
+    """Check the unpacked size of a file before unpacking.
 
     Args:
         file: for the fault.
         packed: bytes of the file.
-        unpacked: size of its unpacked content in bytes, as the file states it.
+        unpacked: stated bytes of its content.
         text: whether the content is JSON.
 
     Raises:
-        InputError: more than ``FREE_BYTES``, and more than the ratio or the size allowed.
+        InputError: more than ``FREE_BYTES``, and more than the permitted ratio or size.
 
     """
     ratio, most = (MOST_TEXT_RATIO, MOST_TEXT_BYTES) if text else (MOST_RATIO, MOST_BYTES)
@@ -153,11 +153,11 @@ def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = Fals
 
 
 def check_members(file: Path, members: Sequence[zipfile.ZipInfo], *, text: bool = False) -> None:
-    """Check what members of a zip say they expand to.
+    """Check the stated sizes of zip members.
 
     Raises:
         InputError: too much (``check_expansion``).
-        ValueError: a packing other than deflate, whose output nothing bounds.
+        ValueError: another packing than deflate, which is not bounded.
 
     """
     if any(m.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for m in members):
@@ -168,16 +168,14 @@ def check_members(file: Path, members: Sequence[zipfile.ZipInfo], *, text: bool 
 def read_arrays(
     file: Path, names: Collection[str] | None = None
 ) -> tuple[dict[str, Any], list[str]]:
-    """Read arrays of numbers and text from an .npz, and name the arrays that were not asked for.
+    """Read arrays of numbers and text from an .npz, and list the names of other arrays.
 
-    Args:
-        file: the .npz.
-        names: of the arrays wanted, as far as they are there; None wants all.
+    ``names`` are those to read, if present; None reads all.
 
     Raises:
         InputError: it would expand too far.
         OSError: it cannot be opened.
-        ValueError: it is no .npz of plain arrays, or is damaged.
+        ValueError: it is not an .npz of plain arrays, or is damaged.
 
     """
     try:
@@ -196,7 +194,7 @@ def read_arrays(
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> "NDArray[Any]":
-    """One array; its header may not promise more than the archive holds."""
+    """One array; its header must not promise more than the archive has."""
     import numpy as np  # noqa: PLC0415  a TOML file needs none
 
     with archive.open(member) as stream:

@@ -1,4 +1,4 @@
-"""The strict base of every schema: unknown keys are faults, values never change after loading."""
+"""The strict base of every schema: unknown keys are faults, values are frozen."""
 
 from typing import Annotated
 

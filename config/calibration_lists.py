@@ -1,4 +1,4 @@
-"""Calibrations of cameras as plain lists in JSON."""
+"""Camera calibrations as plain lists in JSON."""
 
 from pathlib import Path
 from typing import Any
@@ -10,14 +10,14 @@ from snakewalk.config.errors import InputError
 
 
 def read_json_lists(file: Path) -> dict[str, Any] | None:
-    """Values of a JSON file of plain lists and numbers, such as ``json.dump`` writes.
+    """Values of a JSON file of plain lists and numbers, as from ``json.dump``.
 
     Returns:
-        Arrays and numbers by name; None if the file has another ending or holds a matrix of OpenCV,
-        which is an object with ``type_id``.
+        Arrays and numbers by name; None for another ending, or a matrix of OpenCV, which is an
+        object with ``type_id``.
 
     Raises:
-        InputError: it is too large, or holds a value that is neither numbers nor text.
+        InputError: it is too large, or has a value that is neither numbers nor text.
         OSError: it cannot be read.
 
     """
@@ -26,7 +26,7 @@ def read_json_lists(file: Path) -> dict[str, Any] | None:
     try:
         held = parse_json(read_text(file, MOST_STORAGE_BYTES))
     except ValueError:
-        return None  # OpenCV also reads comments and states the line of a fault
+        return None  # OpenCV also reads comments, and states the line of a fault
     if not isinstance(held, dict) or any(isinstance(value, dict) for value in held.values()):
         return None
     lists: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""Schemas of cameras: one above a level floor, and a stereo pair on the robot."""
+"""Schemas of cameras: one above a floor, and a stereo pair on the robot."""
 
 from typing import Annotated, Self
 
@@ -113,7 +113,7 @@ class CameraConfig(Strict):
 
     @property
     def marker_places_m(self) -> dict[int, Place]:
-        """``markers_m`` by number; empty without markers."""
+        """``markers_m`` by number."""
         return {int(name): place for name, place in (self.markers_m or {}).items()}
 
 

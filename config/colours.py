@@ -1,7 +1,7 @@
-"""One colour for each quantity, in figures, report, live page and film.
+"""One colour per quantity, in figures, report, live page and film.
 
-The palette is that of M. Okabe and K. Ito (Color Universal Design, 2008) with a dark and two grey
-tones. Colour-blind readers can distinguish its colours.
+The colour-blind safe palette of M. Okabe and K. Ito (Color Universal Design, 2008) with a dark and
+two grey tones.
 """
 
 from typing import Final

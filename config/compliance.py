@@ -1,4 +1,4 @@
-"""Lets the goals of joints yield to the load that the measured current indicates."""
+"""Joint goals that yield to the load in the measured current."""
 
 from typing import Literal
 

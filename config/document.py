@@ -1,6 +1,6 @@
-"""The configuration's reference, from the schema: ``python -m snakewalk.config.document``.
+"""The configuration reference, from the schema: ``python -m snakewalk.config.document``.
 
-The same as JSON Schema: with it editors complete and check files while one writes.
+It also makes the JSON Schema, with which editors complete and check files.
 """
 
 from collections.abc import Mapping
@@ -118,10 +118,10 @@ def reference() -> str:
 
 
 def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a kind of file: keys, types, ranges, words on each.
+    """JSON Schema (draft 2020-12) of a kind of file: keys, types, ranges, descriptions.
 
-    The loader alone checks rules that involve several keys (waypoints of a walk, distinct IDs).
-    ``model`` is the schema of a file that only a package above reads.
+    Only the loader checks rules that involve several keys. ``model`` is the schema of a file that a
+    higher package reads.
     """
     model = model or SCHEMAS[kind]
     schema = model.model_json_schema()
@@ -141,7 +141,7 @@ def _shipped(kind: Kind) -> list[str]:
 
 
 def _comment(kind: Kind, name: str) -> str:
-    """The words that a shipped file begins with."""
+    """Head comment of a shipped file."""
     lines = locate(kind, name).read_text(encoding="utf-8").splitlines()
     return " ".join(line.removeprefix("# ") for line in takewhile(_is_comment, lines))
 
@@ -179,7 +179,7 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
 
 
 def row_model(annotation: Any) -> type[BaseModel] | None:
-    """Return the schema of the rows where a key is a list of tables."""
+    """Row schema of a key that is a list of tables, or None."""
     if get_origin(annotation) is not tuple:
         return None
     return next(iter(table_models(get_args(annotation)[0])), None)
@@ -199,7 +199,7 @@ def _sentence(model: type[BaseModel]) -> str:
 
 
 def table_models(annotation: Any) -> list[type[BaseModel]]:
-    """Schemas of the tables that a key may hold."""
+    """Schemas of the tables of a key."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     if get_origin(annotation) is Annotated:
@@ -232,7 +232,7 @@ def _kind(annotation: Any) -> str:
 
 
 def value_kind(field: FieldInfo) -> str:
-    """Kind of value that a key accepts, in words, with its bounds."""
+    """Kind and bounds of a key's value, as text."""
     return f"{_kind(field.annotation)}{_bounds(field)}"
 
 

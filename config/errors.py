@@ -1,8 +1,7 @@
-"""Faults of input, reported all at once.
+"""Faults of input, all reported at once.
 
-``ConfigError`` carries one line per fault, with its place, the fault and the remedy. The command
-line prints the lines and ends with exit code 2. ``Assumptions`` holds the answers to questions
-about a file.
+``ConfigError`` has one line per fault: place, fault, remedy. The command line prints them and exits
+with code 2. ``Assumptions`` has the answers to questions about a file.
 """
 
 import math
@@ -10,7 +9,7 @@ from collections.abc import Iterable, Sequence
 
 
 class InputError(Exception):
-    """A user's input cannot be used; ``faults`` holds one line each."""
+    """Unusable user input; ``faults`` has one line each."""
 
     def __init__(self, faults: str | Sequence[str]) -> None:
         self.faults: tuple[str, ...] = (faults,) if isinstance(faults, str) else tuple(faults)
@@ -22,18 +21,17 @@ class ConfigError(InputError):
 
 
 class Assumptions:
-    """Values that a user gives if a foreign file does not state them: ``--assume KEY=VALUE``.
+    """Values of a user for facts that a foreign file does not state: ``--assume KEY=VALUE``.
 
-    A reader asks for a value with ``number``. If it is not given, the question is an ``InputError``
-    that names the option and the likely value. Values that are used are listed in ``lines``, which
-    belongs into the output.
+    A reader asks for a value with ``number``. If it is missing, the question is an ``InputError``
+    with the option and the likely value. ``lines`` lists the used values, for the output.
     """
 
     def __init__(self, given: Iterable[str] = ()) -> None:
         """Read ``KEY=VALUE`` words.
 
         Raises:
-            InputError: a word is not of that form, or a key is given twice.
+            InputError: a word has another form, or a key is repeated.
 
         """
         self._values: dict[str, str] = {}
@@ -47,10 +45,10 @@ class Assumptions:
             self._values[key.strip()] = value.strip()
 
     def given(self, key: str, low: float, high: float) -> float | None:
-        """Value of a key as a number between two limits; None if it is not given.
+        """Value of a key as a number within limits, or None.
 
         Raises:
-            InputError: the value is not a number, or is beyond the limits.
+            InputError: the value is not a number, or beyond the limits.
 
         """
         text = self._values.get(key)
@@ -74,11 +72,11 @@ class Assumptions:
             key: of the option.
             low: smallest value.
             high: largest value.
-            missing: the missing value, with the place: ``link l4: states no mass``.
+            missing: the missing value, with its place: ``link l4: states no mass``.
             likely: value to suggest.
 
         Raises:
-            InputError: the value is not given (the question), or is not usable.
+            InputError: the value is missing (the question), or unusable.
 
         """
         value = self.given(key, low, high)
@@ -88,10 +86,10 @@ class Assumptions:
         return value
 
     def check_used(self, known: str) -> None:
-        """Reject values that nothing asked for.
+        """Reject unused values.
 
         Raises:
-            InputError: there is one; ``known`` says which keys this command knows.
+            InputError: a value is unused; ``known`` describes the command's keys.
 
         """
         unused = [key for key in self._values if key not in self._used]
@@ -103,5 +101,5 @@ class Assumptions:
 
     @property
     def lines(self) -> list[str]:
-        """One line per value that was used, for the output."""
+        """One line per used value, for the output."""
         return [f"assumed by option: {key} = {value}" for key, value in self._used.items()]

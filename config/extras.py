@@ -1,4 +1,4 @@
-"""The optional parts of the installation: which extra brings which package, asked before work."""
+"""Optional packages: the extra that installs each, checked before work."""
 
 from importlib.util import find_spec
 from typing import Final
@@ -41,14 +41,13 @@ BASE: Final = frozenset(
 
 
 def require_extra(purpose: str, *modules: str) -> None:
-    """Refuse what cannot be done without packages that are not installed.
+    """Reject work that needs missing packages.
 
-    Args:
-        purpose: beginning of the sentence, with its verb: ``films need``.
-        modules: keys of ``EXTRAS``.
+    ``purpose`` begins the sentence, with its verb: ``films need``. ``modules`` are keys of
+    ``EXTRAS``.
 
     Raises:
-        InputError: one is not installed; says which extra to install.
+        InputError: a package is missing; names the extra to install.
 
     """
     missing = [EXTRAS[module] for module in modules if find_spec(module) is None]
@@ -59,7 +58,7 @@ def require_extra(purpose: str, *modules: str) -> None:
 
 
 def missing_extra(error: ModuleNotFoundError) -> str | None:
-    """Return what to install after a failed import; None if we do not bring the module."""
+    """Advice after a failed import; None for a module outside snakewalk's extras."""
     module = (error.name or "").partition(".")[0]
     if module in BASE:
         return f"this needs {module}, which a light install leaves out: pip install snakewalk"

@@ -1,7 +1,7 @@
 """Schema of a fault file: faults of a simulated bus, and their times.
 
-A file has a ``seed`` and any number of ``[[fault]]`` tables. Every fault has a ``kind``, begins
-``at_s`` seconds after the start, and most last ``for_s`` seconds (to the end, if not given).
+A file has a ``seed`` and ``[[fault]]`` tables. Every fault has a ``kind``, begins ``at_s`` seconds
+after the start, and most last ``for_s`` seconds (by default to the end).
 """
 
 from typing import Annotated, Literal, Self

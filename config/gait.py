@@ -1,4 +1,4 @@
-"""Schemas of gaits: a run's table, and the shipped sets of parameters."""
+"""Schemas of gaits: a run's table, and shipped parameter sets."""
 
 from typing import Literal, Self
 

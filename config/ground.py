@@ -1,4 +1,4 @@
-"""From a world's description to its height field: a real elevation model, or a made shape."""
+"""Height field of a world: a real elevation model, or a generated shape."""
 
 import math
 from dataclasses import replace
@@ -28,9 +28,9 @@ from snakewalk.config.world import (
 
 
 def build_ground(world: WorldConfig) -> HeightField | None:
-    """Height field of ``world``, its lowest point at 0; None on a flat floor.
+    """Height field of ``world``, its lowest point at 0; None for a flat floor.
 
-    It is centred on (0, 0), but for a map, which lies where its file says, and a shore.
+    It is centred on (0, 0), except for a map, whose file states its place, and a shore.
 
     Raises:
         ConfigError: the source is missing or unreadable, or the crop leaves it.
@@ -58,9 +58,9 @@ def build_ground(world: WorldConfig) -> HeightField | None:
 
 
 def water_surface_m(world: WorldConfig, ground: HeightField | None) -> tuple[Floats, Floats] | None:
-    """Middle (3,) and size (2,) of the surface of the water; None if it is dry.
+    """Centre (3,) and size (2,) of the water surface; None if dry.
 
-    A shore's reaches to the waterline.
+    A shore's extends to the waterline.
     """
     water = world.ground
     if isinstance(water, WaterGround):
@@ -82,7 +82,7 @@ def _mapped(world: str, ground: MapGround) -> HeightField:
 
 
 def _ramp(ground: RampGround) -> Floats:
-    """Exact where the kinks lie on samples; elsewhere a kink is blunt by less than one spacing."""
+    """Exact if the kinks are on samples; else a kink is blunted by less than one spacing."""
     cells = _cells(2.0 * ground.level_m + ground.length_m, ground.spacing_m)
     x = (np.arange(cells + 1) - cells / 2) * ground.spacing_m
     rise = np.clip(x + ground.length_m / 2, 0.0, ground.length_m)
@@ -90,7 +90,7 @@ def _ramp(ground: RampGround) -> Floats:
 
 
 def _shore(ground: ShoreGround) -> HeightField:
-    """Place the waterline at x = 0; kinks as those of a ramp."""
+    """Place the waterline at x = 0; kinks as for a ramp."""
     steep = math.tan(ground.slope_rad)
     under_m, over_m = ground.depth_m / steep, ground.rise_m / steep
     cells = _cells(ground.pool_m + under_m + over_m + ground.land_m, ground.spacing_m)
@@ -102,15 +102,14 @@ def _shore(ground: ShoreGround) -> HeightField:
 
 
 def _random(ground: RandomGround) -> Floats:
-    """White noise, smoothed: a kernel's autocorrelation is twice its variance wide."""
+    """Smoothed white noise: a kernel's autocorrelation has twice its variance."""
     samples = _cells(ground.size_m, ground.spacing_m) + 1
     noise = np.random.default_rng(ground.seed).normal(size=(samples, samples))
     width = ground.correlation_m / 2.0 / ground.spacing_m
     z = gaussian_filter(noise, width, mode="wrap", truncate=5.0)
     along_x, along_y = np.diff(z, axis=1), np.diff(z, axis=0)
     # Each cell has two triangles: one has the gradient of its lower and right edge, the other that
-    # of
-    # its left and upper edge.
+    # of its left and upper edge.
     square = (along_x[:-1] ** 2 + along_x[1:] ** 2).mean()
     square += (along_y[:, :-1] ** 2 + along_y[:, 1:] ** 2).mean()
     rms = np.sqrt(square / 2.0) / ground.spacing_m
@@ -118,7 +117,7 @@ def _random(ground: RandomGround) -> Floats:
 
 
 def _steps(ground: StepsGround) -> Floats:
-    """Riser k lies between the samples ``ends + k * tread - 1`` and the next one."""
+    """Riser k is between the samples ``ends + k * tread - 1`` and the next one."""
     ends, tread = (_cells(m, ground.spacing_m) for m in (ground.level_m, ground.tread_m))
     column = np.arange(2 * ends + (ground.count - 1) * tread)
     risers = np.clip((column - ends) // tread + 1, 0, ground.count)
@@ -141,14 +140,14 @@ def _cells(length_m: float, spacing_m: float) -> int:
 
 
 def _drawn_out(profile_m: Floats, width_m: float, spacing_m: float) -> Floats:
-    """(rows, columns) of a profile along x, the same for every y."""
+    """(rows, columns) of a profile along x, repeated along y."""
     return np.tile(profile_m, (_cells(width_m, spacing_m) + 1, 1))
 
 
 def _cropped(world: str, ground: ElevationGround) -> Floats:
     """Crop, scale and refine a real elevation model.
 
-    The crop counts rows from the north, as elevation models are stored; here y grows to the north.
+    The crop counts rows from the north, like stored elevation models; here y grows to the north.
     Cubic refinement keeps the samples of the crop.
     """
     elevation = _elevation_m(world, ground.source)
@@ -173,7 +172,7 @@ def _cropped(world: str, ground: ElevationGround) -> Floats:
 
 
 def _elevation_m(world: str, source: str) -> Floats:
-    """Read samples (rows, columns), row 0 in the north, as the file's ``elevation`` holds them."""
+    """Samples (rows, columns) of the file's ``elevation``, row 0 in the north."""
     where = f"world {world}: ground: source {source}"
     path = _jacksboro(where) if source == "jacksboro" else Path(source)
     try:
@@ -195,7 +194,7 @@ def _elevation_m(world: str, source: str) -> Floats:
 
 
 def _jacksboro(where: str) -> Path:
-    """Find the Jacksboro fault (3 arc seconds); its ymin and ymax are swapped in the file."""
+    """Path of the Jacksboro fault (3 arc seconds); the file's ymin and ymax are swapped."""
     package = find_spec("matplotlib")  # finds the folder without importing it
     if package is None or package.origin is None:
         raise ConfigError(

@@ -1,8 +1,8 @@
-"""The height field: elevation over a regular grid in the world's horizontal plane; a map's file.
+"""The height field: elevation over a regular horizontal grid; a map's file.
 
 A map's file is an ``.npz`` with ``z_m`` (rows, columns), row 0 with the smallest y, ``known`` of
-the same shape, and the numbers ``spacing_m``, ``x0_m``, ``y0_m``. It may hold ``colour`` (rows,
-columns, 3), which pictures of the world show.
+the same shape, and the numbers ``spacing_m``, ``x0_m``, ``y0_m``. Optional: ``colour`` (rows,
+columns, 3) for pictures.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ _NUMBERS: Final = ("spacing_m", "x0_m", "y0_m")
 class HeightField:
     """Elevation ``z_m[row, column]`` at ``x0_m + column * spacing_m, y0_m + row * spacing_m``.
 
-    Between samples the surface is two triangles a cell, split from the low-x-low-y corner to the
-    high one, as MuJoCo splits it, so that planner, ground step and physics see the same ground.
+    A cell is two triangles, split from the low-x-low-y corner to the high one as in MuJoCo, so
+    planner, ground step and physics use the same ground.
     """
 
     z_m: Floats
@@ -60,7 +60,7 @@ class HeightField:
         return (columns - 1) * self.spacing_m, (rows - 1) * self.spacing_m
 
     def contains(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
-        """Whether points lie on the field."""
+        """Whether points are on the field."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         w, h = self.size_m
         inside = (x >= self.x0_m) & (x <= self.x0_m + w) & (y >= self.y0_m) & (y <= self.y0_m + h)
@@ -90,7 +90,7 @@ class HeightField:
         fu, fv = u - i, v - j
         corner = j * columns + i
         z00, z11 = self.z_m.take(corner), self.z_m.take(corner + (columns + 1))
-        lower = fu >= fv  # the triangle that holds the (high x, low y) corner
+        lower = fu >= fv  # the triangle with the (high x, low y) corner
         third = self.z_m.take(corner + np.where(lower, 1, columns))
         first, second = third - z00, z11 - third
         gx, gy = np.where(lower, first, second), np.where(lower, second, first)
@@ -98,7 +98,7 @@ class HeightField:
 
 
 def surface(field: HeightField) -> tuple[Floats, Ints]:
-    """Corners (n, 3), in m, and triangles (k, 3), by numbers of corners, of a field's surface."""
+    """Corners (n, 3), m, and triangles (k, 3) of a field's surface."""
     rows, columns = field.z_m.shape
     x, y = np.meshgrid(
         field.x0_m + field.spacing_m * np.arange(columns),

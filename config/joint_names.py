@@ -1,4 +1,4 @@
-"""Names of joints, and the text by which every message calls a joint.
+"""Names of joints, and their labels in messages.
 
 A name identifies one joint in messages, tables, ROS, URDF and MJCF. Names follow ROS: letters,
 digits and underscores, a letter first.
@@ -12,9 +12,9 @@ _AXES: Final = {"y": "yaw", "p": "pitch", "r": "roll"}
 
 
 def default_joint_names(axes: str, sides: Sequence[str]) -> tuple[str, ...]:
-    """Names such as ``yaw_03`` or ``left_roll_12``: axis, and place counted from 1 at the head.
+    """Names such as ``yaw_03`` or ``left_roll_12``: axis, and place from 1 at the head.
 
-    ``sides`` are the sides of the leg that the last joints belong to.
+    ``sides`` are the legs' sides of the last joints.
     """
     digits = max(2, len(str(len(axes))))
     spine = len(axes) - len(sides)
@@ -26,11 +26,11 @@ def default_joint_names(axes: str, sides: Sequence[str]) -> tuple[str, ...]:
 
 
 def numbered_joint_names(count: int) -> tuple[str, ...]:
-    """Names of older versions: ``joint0`` is next to the head."""
+    """Names of older versions; ``joint0`` is next to the head."""
     return tuple(f"joint{k}" for k in range(count))
 
 
 def joint_label(name: str, servo_id: int, port: str | None = None) -> str:
-    """Text by which messages call a joint: name and servo ID, and the port if there are several."""
+    """Label of a joint in messages: name and servo ID, and the port if there are several."""
     on = "" if port is None else f" on {port}"
     return f"joint {name} (ID {servo_id}{on})"

@@ -1,4 +1,4 @@
-"""Configurations by shipped name or by path: robots, worlds, runs, gaits."""
+"""Configurations by shipped name or path: robots, worlds, runs, gaits."""
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
@@ -29,7 +29,7 @@ _ONE_OF: Final = {"policies": "policy"}
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:
-    """Names of the shipped configurations of a kind, sorted."""
+    """Sorted names of the shipped configurations of a kind."""
     return tuple(sorted(p.name[:-5] for p in _folder(kind).iterdir() if p.name.endswith(".toml")))
 
 
@@ -55,7 +55,7 @@ def load(path: Path, model: type[M]) -> M:
     """Read one TOML file into ``model``.
 
     Raises:
-        ConfigError: missing file, broken TOML, or schema faults, all of them, one line each.
+        ConfigError: missing file, broken TOML, or all schema faults, one line each.
 
     """
     data, text = read_toml(path)
@@ -63,28 +63,28 @@ def load(path: Path, model: type[M]) -> M:
 
 
 def checked(model: type[M], data: dict[str, Any], source: str, text: str = "") -> M:
-    """Validate ``data``; ``source`` starts each line of the faults, with the line in ``text``.
+    """Validate ``data``; each fault begins with ``source`` and the line in ``text``.
 
     A value of another type is a fault: text is not a number, and true is not 1.
 
     Raises:
-        ConfigError: schema faults, all of them, one line each.
+        ConfigError: all schema faults, one line each.
 
     """
     return strict_toml.checked(model, data, source, text, _files)
 
 
 def place_of(path: Path, key: str) -> str:
-    """Return file, line and name of a key, as messages about a file begin."""
+    """File, line and name of a key, to begin a message."""
     number = strict_toml.line_number(path.read_text(encoding="utf-8"), key.split("."))
     return f"{path}: {key}" if number is None else f"{path}:{number}: {key}"
 
 
 def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
-    """Return ``config`` with the values of dotted ``keys`` replaced, as strict as a file.
+    """Return ``config`` with the values of dotted ``keys`` replaced, as strictly as a file.
 
     Raises:
-        ConfigError: unknown keys and values out of range, all of them, one line each.
+        ConfigError: all unknown keys and values out of range, one line each.
 
     """
     data = config.model_dump()
@@ -92,7 +92,7 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
         *tables, last = key.split(".")
         table = data
         for name in tables:
-            if table.get(name) is None:  # a table left out, or an unknown one: the schema says
+            if table.get(name) is None:  # a missing or unknown table: the schema reports it
                 table[name] = {}
             if not isinstance(table[name], dict):
                 raise ConfigError(
@@ -113,11 +113,10 @@ def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
 
 
 def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Data of a robot with the records of the models that its file describes by files.
+    """Data of a robot with the records of models that its file describes by files.
 
-    A `model` may name a file, or a model of the folder `servos` next to the robot's file. It is
-    replaced by the name of the model, and its record goes into `described_models`, so that a log is
-    complete without the file.
+    A `model` may name a file, or a model of the folder `servos` next to the robot's file. Its name
+    replaces it, and its record goes into `described_models`, so that a log is complete.
 
     Raises:
         ConfigError: the faults of such a file.
@@ -144,10 +143,10 @@ def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
 
 
 def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
-    """Load a world by shipped name or path; its ground's file is searched in the world's folder.
+    """Load a world by shipped name or path; searches its ground's file in the world's folder.
 
     Raises:
-        ConfigError: no such file, world or ground; each fault of it.
+        ConfigError: no such file, world or ground, or each fault of it.
 
     """
     from snakewalk.config.world import ElevationGround, MapGround, WorldConfig  # noqa: PLC0415  slow to build
@@ -179,13 +178,13 @@ def load_gait(name_or_path: str) -> GaitSetConfig:
 
 
 def known_keys() -> list[str]:
-    """Keys of a run, a robot and a world, dotted behind the name of their file."""
+    """Dotted keys of a run, a robot and a world, after the name of their file."""
     found = [key for name, model in _files().items() for key in _dotted(name, model)]
     return list(dict.fromkeys(found))
 
 
 def digest(*models: BaseModel) -> str:
-    """SHA-256 (16 hex digits) over the canonical JSON of the models: the configuration hash."""
+    """Configuration hash: SHA-256 (16 hex digits) of the models' canonical JSON."""
     text = "\n".join(model.model_dump_json() for model in models)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -215,13 +214,13 @@ def _schemas() -> _Schemas:
 
 
 def _files() -> dict[str, type[BaseModel]]:
-    """Schemas of the three files of a run, by their names."""
+    """Schemas of the three files of a run, by name."""
     found = _schemas()
     return {"run": found.run, "robot": found.robot, "world": found.world}
 
 
 def _dotted(path: str, kind: Any) -> Iterator[str]:
-    """Keys of a table and of the tables in it that hold a single value, dotted behind ``path``."""
+    """Dotted keys of a table and of its single-valued tables, after ``path``."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         for name, field in kind.model_fields.items():
             below = list(_dotted(f"{path}.{name}", field.annotation))

@@ -1,4 +1,4 @@
-"""Constants of a chain's motors and gears, where they are known better than from the catalogue."""
+"""Constants of a chain's motors and gears, if better known than from the catalogue."""
 
 from pydantic import Field
 

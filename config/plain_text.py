@@ -1,6 +1,6 @@
-"""Text without the characters that steer a terminal or reorder what a reader sees.
+"""Text without characters that control the terminal or reorder the display.
 
-Names come from files of other people: a robot's model, a log, a recording.
+Names come from foreign files: a robot's model, a log, a recording.
 """
 
 import re
@@ -13,5 +13,5 @@ _CONTROL: Final = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x9f{DIRECTION}{LINE_ENDS
 
 
 def plain(text: str) -> str:
-    """Return a text in which a question mark stands for each such character."""
+    """Return a text with a question mark in place of each such character."""
     return _CONTROL.sub("?", text)

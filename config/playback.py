@@ -1,4 +1,4 @@
-"""How recordings (table ``playback`` of a run) and recorded actions (``repertoire``) are played."""
+"""Playback of recordings (table ``playback`` of a run) and of recorded actions (``repertoire``)."""
 
 from typing import Annotated, Literal
 

@@ -206,12 +206,12 @@ class SafetyConfig(Strict):
     )
 
     def following_limits_rad(self, robot: RobotConfig) -> tuple[float, ...]:
-        """How far each joint may be from its goal, rad, head first.
+        """Largest distance of each joint from its goal, rad, head first.
 
-        A yaw joint may lag by the error at which its P gain gives full output, which is the largest
-        lag without a fault. Twice of it is the limit, but at least ``following_limit_rad``; the
-        same holds for a leg's joint. A pitch joint has ``following_limit_rad``: its current shows
-        whether the ground holds it off.
+        A yaw joint or a leg's joint may lag by the error at which its P gain gives full output, the
+        largest lag without a fault. The limit is twice that, but at least ``following_limit_rad``.
+        A pitch joint has ``following_limit_rad``: its current shows whether the ground holds it
+        off.
         """
         most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
         columns = robot.all_axes, robot.position_p_gains, robot.servo_records
@@ -225,7 +225,7 @@ class SafetyConfig(Strict):
         return robot.over_current_a if self.current_limit_a is None else self.current_limit_a
 
     def voltage_limits_v(self, servo: ServoConfig) -> tuple[float, float]:
-        """Least and greatest supply of servos of this kind: the run's, else the robot's."""
+        """Least and greatest supply of these servos: the run's, else the robot's."""
         low_v, high_v = servo.supply_limits_v
         return (
             low_v if self.voltage_min_v is None else self.voltage_min_v,
@@ -304,7 +304,7 @@ class RunConfig(Strict):
 
     @property
     def pose_is_true(self) -> bool:
-        """Whether in a simulated run the simulator measures the head, without error."""
+        """Whether the simulator gives the head's pose, without error."""
         return self.pose in (None, "simulator")
 
     @model_validator(mode="after")

@@ -23,17 +23,15 @@ def printed_name(name: str) -> str:
 
 @cache
 def shipped_models() -> tuple[str, ...]:
-    """Names of the shipped models, sorted."""
+    """Sorted names of the shipped models."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
 def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
     """Model of a shipped name, in any case, or of a ``.toml`` file.
 
-    Args:
-        name_or_path: ``XM430-W350``, or a path, relative to ``beside`` if the file is there.
-        beside: folder of the file that names the model. A name that is not shipped is looked up in
-            its folder ``servos``.
+    A path is relative to ``beside`` (the folder of the naming file) if the file is there. A name
+    that is not shipped is searched in its folder ``servos``.
 
     Raises:
         ConfigError: the model is unknown; or the faults of its file, one line each.
@@ -50,7 +48,7 @@ def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
 
 
 def model_file(name_or_path: str, beside: Path | None = None) -> Path | None:
-    """File of a model, as ``servo_model`` finds it; None if it does not exist."""
+    """File of a model by the rules of ``servo_model``, or None."""
     folders = [] if beside is None else [beside]
     if name_or_path.endswith(".toml"):
         found = [folder / name_or_path for folder in folders] + [Path(name_or_path)]
@@ -61,7 +59,7 @@ def model_file(name_or_path: str, beside: Path | None = None) -> Path | None:
 
 
 def described_model(name_or_path: str, beside: Path | None) -> ServoModel | None:
-    """Model of a file that is not shipped; None for the name of another model.
+    """Model of a file that is not shipped; None for a shipped model's name.
 
     Raises:
         ConfigError: the faults of the file.
@@ -76,8 +74,8 @@ def described_model(name_or_path: str, beside: Path | None) -> ServoModel | None
 def models_by_number(folder: Path | None = None, protocol: int | str = 2) -> Mapping[int, str]:
     """Names of the known models of a protocol by model number.
 
-    With a ``folder``, also those whose files are in its folder ``servos``. If shipped models
-    share a number, the first by name is listed.
+    ``folder`` adds those in its folder ``servos``. If shipped models share a number, the first by
+    name is listed.
 
     Raises:
         ConfigError: the faults of such a file.
@@ -109,7 +107,7 @@ def _shipped(name: str) -> ServoModel:
 
 @cache
 def _shipped_data(name: str) -> tuple[dict[str, Any], str]:
-    """Data of a shipped model, together with those of the model that it is like, and its text."""
+    """Merged data of a shipped model, and its text."""
     path = FOLDER / f"{name}.toml"
     data, text = read_toml(path)
     return _merged(path, data, 1), text
@@ -121,7 +119,7 @@ def _read(path: Path) -> ServoModel:
 
 
 def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
-    """Data of a file together with those of the model that it is like.
+    """Data of a file over those of the model in ``like``.
 
     Raises:
         ConfigError: the other model does not exist, or lacks a register of ``without``.
@@ -150,7 +148,7 @@ def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
     if unknown:
         raise ConfigError(f"{path}: without: {like} has no register {unknown[0]}")
     base["registers"] = {name: row for name, row in registers.items() if name not in without}
-    for key in ("source", "friction"):  # they were found out for the other model
+    for key in ("source", "friction"):  # they belong to the other model
         base.pop(key, None)
     return _over(base, own)
 

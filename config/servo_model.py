@@ -1,6 +1,6 @@
 """A servo model: control table, units and motor, one record for host and simulator.
 
-Each model has one file in `config/servos`; a robot may bring files of its own
+Each model has one file in `config/servos`; a robot may have its own
 (docs/how-to/add-a-servo-model.md).
 """
 
@@ -252,7 +252,7 @@ class ServoModel(Strict):
         return self
 
     def missing_for_a_run(self) -> list[str]:
-        """Names of registers and keys without which a run cannot use the model."""
+        """Names of the registers and keys that a run needs and the model lacks."""
         is_feetech = self.protocol == "feetech"
         missing = [] if is_feetech else self._missing(_FOR_A_RUN)
         if not {"Present Current", "Present Load"} & set(self.registers):
@@ -282,7 +282,7 @@ class ServoModel(Strict):
 
     @property
     def stall_current_a(self) -> float | None:
-        """Current of a blocked motor at the recommended voltage; None: not known."""
+        """Current of a blocked motor at the recommended voltage, or None."""
         return None if self.motor is None else self.motor.stall_current_a
 
     @property
@@ -309,7 +309,7 @@ class ServoModel(Strict):
 
     @property
     def rad_s2_per_acceleration(self) -> float:
-        """Acceleration of one unit of Profile Acceleration; NaN if it is not known."""
+        """Acceleration of one unit of Profile Acceleration, or NaN."""
         rpm2 = self.units.acceleration_rpm2
         return math.nan if rpm2 is None else rpm2 * 2.0 * math.pi / 3600.0
 

@@ -1,4 +1,4 @@
-"""TOML to schema, strictly: every fault of a file at once, each with its path inside the file."""
+"""TOML to schema, strictly: every fault of a file at once, each with its path in the file."""
 
 import re
 import tomllib
@@ -51,12 +51,12 @@ def checked(
     text: str = "",
     others: Schemas = dict,
 ) -> M:
-    """Validate ``data``; ``source`` starts each line of the faults, with the line in ``text``.
+    """Validate ``data``; each fault begins with ``source`` and the line in ``text``.
 
     A value of another type is a fault: text is not a number, and true is not 1.
 
     Raises:
-        ConfigError: schema faults, all of them, one line each.
+        ConfigError: all schema faults, one line each.
 
     """
     try:
@@ -71,7 +71,7 @@ def checked(
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers of numpy, or arrays of them, as Python's own.
+    """Convert numpy's numbers and arrays to Python's.
 
     Raises:
         TypeError: it is something else.
@@ -89,7 +89,7 @@ def _check_keys(text: str) -> None:
     """Reject keys of hundreds of tables: ``tomllib`` needs minutes for them.
 
     Raises:
-        ValueError: there is one.
+        ValueError: a key has too many.
 
     """
     for number, line in enumerate(text.splitlines(), start=1):
@@ -109,7 +109,7 @@ _KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
 
 
 def line_number(text: str, loc: Sequence[str | int]) -> int | None:
-    """Line on which a TOML text sets the innermost key of ``loc`` that it has; None if none."""
+    """Line that sets the innermost existing key of ``loc`` in a TOML text, or None."""
     wanted = [str(part) for part in loc if isinstance(part, str)]
     places = [part for part in loc if isinstance(part, int)]
     table: list[str] = []
@@ -135,7 +135,7 @@ def _parts(key: str) -> list[str]:
 
 
 def _keys(kind: Any) -> Iterator[str]:
-    """Keys of a schema and of all tables in it."""
+    """Keys of a schema and of all its tables."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         for name, field in kind.model_fields.items():
             yield name
@@ -146,7 +146,7 @@ def _keys(kind: Any) -> Iterator[str]:
 
 
 def _meant(model: type[BaseModel], key: str, others: Schemas) -> str:
-    """The key of the schema that an unknown one is like, or the file that has such a key."""
+    """Hint on an unknown key: a similar key, or the file that has it."""
     near = get_close_matches(key, set(_keys(model)) - {key}, 1, 0.78)
     if near:
         return f"; did you mean {near[0]}?"

@@ -1,4 +1,4 @@
-"""How a motion is synthesised without a robot ([PT] 2.6): rate, speed law, behaviour over time."""
+"""Synthesis of a motion without a robot ([PT] 2.6): rate, speed law, behaviour over time."""
 
 from itertools import pairwise
 from typing import Annotated, Self
@@ -77,7 +77,7 @@ class WavesConfig(Strict):
 
     @property
     def parts(self) -> dict[tuple[int, int], float]:
-        """First and last coefficient of each kind that is wanted, and its share of the library."""
+        """First and last coefficient of each wanted kind, and its share of the library."""
         bands = {(1, 2): self.long, (3, 4): self.medium, (5, 7): self.short}
         total = sum(bands.values())
         return {band: part / total for band, part in bands.items() if part > 0.0}

@@ -1,4 +1,4 @@
-"""Configurations as TOML: a file to begin with, every key in it, or a robot's, without defaults."""
+"""Configurations as TOML: a template with every key, or a robot without defaults."""
 
 import json
 import re
@@ -22,10 +22,9 @@ _COLUMN: Final = 42
 
 
 def template(config: BaseModel, comment: str, without: Collection[str] = ()) -> str:
-    """Text of a TOML file that reads back to ``config`` and shows what else could be said.
+    """Text of a TOML file that reads back to ``config`` and shows all other keys.
 
-    Keys with their default stand as comments; ``comment`` is the head of the file; the tables
-    ``without`` are left out.
+    Keys with defaults are comments. ``comment`` is the head; the tables ``without`` are omitted.
     """
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     values = config.model_dump()
@@ -41,7 +40,7 @@ def _table(
     place: str,
     without: Collection[str] = (),
 ) -> Iterator[str]:
-    """Lines of a table, then of the tables in it; all are comments where nothing is given."""
+    """Lines of a table, then of its tables; all comments if nothing is given."""
     inner: list[str] = []
     for key, field in model.model_fields.items():
         where = f"{place}.{key}".removeprefix(".")
@@ -64,7 +63,7 @@ def _table(
 def _inner(
     field: FieldInfo, choices: list[type[BaseModel]], values: Any, given: Any, where: str
 ) -> Iterator[str]:
-    """A table in a table; of several kinds the one that is there, else the first, as comments."""
+    """A table in a table; of several kinds the present one, else the first as comments."""
     kinds = [str(one.model_fields["kind"].default) for one in choices if "kind" in one.model_fields]
     model = choices[0] if values is None else _kind_of(choices, values)
     yield ""
@@ -74,13 +73,13 @@ def _inner(
         yield f"# {model.__doc__.splitlines()[0]}"
     is_there = (
         values is not None
-    )  # an empty table then, so that its keys are not taken for another's
+    )  # an empty table, so that its keys are not read as another table's
     yield f"[{where}]" if is_there else f"# [{where}]"
     yield from _table(model, values or {}, (given or {}) if is_there else None, where)
 
 
 def _kind_of(choices: list[type[BaseModel]], values: Mapping[str, Any]) -> type[BaseModel]:
-    """The schema whose ``kind`` a table has."""
+    """Schema with the ``kind`` of a table."""
     return next(
         one
         for one in choices
@@ -105,14 +104,14 @@ def _line(key: str, value: Any, field: FieldInfo, is_given: bool) -> str:
 
 
 def robot_toml(robot: RobotConfig, comment: str = "") -> str:
-    """Text of a robot's file without values that equal the defaults; ``comment`` is at the head."""
+    """Text of a robot's file without default values, with a head ``comment``."""
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     lines += _plain_table(robot.model_dump(exclude_defaults=True), "")
     return "\n".join(lines) + "\n"
 
 
 def _plain_table(data: Mapping[str, Any], place: str) -> Iterator[str]:
-    """Lines of a table's values, then of the tables in it, then of its rows of tables."""
+    """Lines of a table's values, then of its tables, then of its rows of tables."""
     tables = {key: value for key, value in data.items() if isinstance(value, Mapping)}
     rows = {key: value for key, value in data.items() if _is_rows(value)}
     for key, value in data.items():
@@ -131,7 +130,7 @@ def _is_rows(value: Any) -> bool:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML writes it: text, numbers and lists as JSON does."""
+    """A value in TOML; text, numbers and lists as in JSON."""
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, tuple | list):

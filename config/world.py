@@ -48,7 +48,7 @@ class ElevationGround(Strict):
     refine: int = Field(1, ge=1, le=8, description="cubic subdivision of each cell")
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
 
 
@@ -60,7 +60,7 @@ class MapGround(Strict):
     vertical_scale: float = Field(1.0, gt=0.0, le=100.0, description="of the file's heights")
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
 
 
@@ -75,7 +75,7 @@ class RampGround(Strict):
     spacing_m: float = Field(0.1, ge=0.005, le=0.5, description="distance between samples")
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         slope_rad = math.atan(factor * math.tan(self.slope_rad))
         return self.model_copy(update={"slope_rad": slope_rad})
 
@@ -103,7 +103,7 @@ class RandomGround(Strict):
         return self
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         slope_rad = math.atan(factor * math.tan(self.rms_slope_rad))
         return self.model_copy(update={"rms_slope_rad": slope_rad})
 
@@ -133,7 +133,7 @@ class StepsGround(Strict):
         return self
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         return self.model_copy(update={"height_m": self.height_m * factor})
 
 
@@ -162,7 +162,7 @@ class GapsGround(Strict):
         return self
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         return self.model_copy(update={"depth_m": self.depth_m * factor})
 
 
@@ -201,7 +201,7 @@ class ShoreGround(Water):
     spacing_m: float = Field(0.05, ge=0.005, le=0.5, description="distance between samples")
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``."""
+        """Return the ground with its heights times ``factor``."""
         heights = {"depth_m": factor * self.depth_m, "rise_m": factor * self.rise_m}
         slope_rad = math.atan(factor * math.tan(self.slope_rad))
         return self.model_copy(update={"slope_rad": slope_rad, **heights})
@@ -233,7 +233,7 @@ class PipeObstacle(Strict):
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
 
     def stands_at(self, x_m: float, y_m: float) -> bool:
-        """Whether no body comes to this place of the floor: from outside nothing comes in."""
+        """Whether this place is unreachable: nothing enters the pipe from outside."""
         return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
 
 
@@ -359,9 +359,9 @@ class WorldConfig(Strict):
     planner: PlannerConfig = PlannerConfig()
 
     def with_relief(self, factor: float) -> Self:
-        """Return the same ground with its heights times ``factor``, and limits that scale along.
+        """Return the world with its heights times ``factor``, and scaled limits.
 
-        A planner then lays the same paths, so that steepness alone is compared.
+        A planner then plans the same paths, so that only the steepness differs.
         """
         if isinstance(self.ground, FlatGround | WaterGround):
             return self

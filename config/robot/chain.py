@@ -257,7 +257,7 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _ranges_are_within_a_turn(self) -> Self:
-        """Check that each joint's range is within one turn of its servo, which is all it knows."""
+        """Check that each joint's range is within one turn of its servo."""
         for joint, (limit_rad, facts) in enumerate(
             zip(self.limit_rad, self.servo_records, strict=True)
         ):
@@ -288,7 +288,7 @@ class RobotConfig(JointValues):
 
     @model_serializer(mode="wrap")
     def _without_empty_records(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out the keys that most robots lack, in files and logs."""
+        """Omit keys that most robots lack, in files and logs."""
         data: dict[str, Any] = handler(self)
         if not self.described_models:
             data.pop("described_models", None)
@@ -309,13 +309,13 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _is_spelled_canonically(self) -> Self:
-        """Spell the same robot the same way, whatever its file looks like."""
+        """Give the same robot the same spelling, whatever its file."""
         for keys in (canonical_links(self), canonical_joints(self)):
             self.__dict__.update(keys)  # frozen from here on
         return self
 
     def with_link_masses(self, masses_kg: Sequence[float]) -> "RobotConfig":
-        """Return the robot with other masses (L,) of its links, without a stereo head's mast.
+        """Return the robot with other link masses (L,), without a stereo head's mast.
 
         Raises:
             ValidationError: a mass is out of range.

@@ -37,7 +37,7 @@ class JointValues(LinkValues):
         """Record of each servo's model.
 
         Raises:
-            ConfigError: a model is not known.
+            ConfigError: a model is unknown.
 
         """
         known = self.records_by_model
@@ -68,12 +68,12 @@ class JointValues(LinkValues):
 
     @property
     def signs(self) -> tuple[int, ...]:
-        """-1 for each servo that is mounted the other way round, else 1."""
+        """-1 for each reversed servo, else 1."""
         return tuple(j.sign for j in self.joints) or (1,) * self.joint_count
 
     @property
     def zeros_rad(self) -> tuple[float, ...]:
-        """Angle of each servo, from its own zero, when its joint is straight."""
+        """Servo angle of each straight joint, from the servo's zero."""
         return tuple(j.zero_rad for j in self.joints) or (0.0,) * self.joint_count
 
     @property
@@ -111,7 +111,7 @@ class JointValues(LinkValues):
         return self._own("gear_drag_n_m_s", (self.servo.gear_drag_n_m_s,) * self.joint_count)
 
     def _own(self, key: str, usual: tuple[N, ...]) -> tuple[N, ...]:
-        """Value of a key for each joint; ``usual`` for a joint without one."""
+        """Value of a key for each joint, by default ``usual``."""
         if not self.joints:
             return usual
         own = (getattr(joint, key) for joint in self.joints)
@@ -119,18 +119,18 @@ class JointValues(LinkValues):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Name of each joint, in the order of the bus; names are unique and valid in ROS."""
+        """Unique name of each joint, in the order of the bus; valid in ROS."""
         usual = default_joint_names(self.all_axes, [each.side for each in self.limb_joints])
         return self._own("name", usual)
 
     def joint_label(self, joint: int) -> str:
-        """Text by which every message calls a joint: name, servo ID, and port of a segment."""
+        """Label of a joint in messages: name, servo ID, and port of a segment."""
         servo_id = self.servo_ids[joint]
         port = next((each.port for each in self.ports if servo_id in each.ids), None)
         return joint_label(self.joint_names[joint], servo_id, port)
 
     def label_of_servo(self, servo_id: int) -> str:
-        """Text of ``joint_label`` for the joint of a servo."""
+        """``joint_label`` of a servo's joint."""
         return self.joint_label(self.servo_ids.index(servo_id))
 
     @property
@@ -158,5 +158,5 @@ class JointValues(LinkValues):
 
 @cache
 def _joints_about(axes: str, axis: str) -> tuple[int, ...]:
-    """Indices of the joints with this axis; cached because gaits ask in every cycle."""
+    """Indices of the joints with this axis; cached for the control cycle."""
     return tuple(i for i, other in enumerate(axes) if other == axis)

@@ -1,4 +1,4 @@
-"""Joints, as a robot's file gives them."""
+"""Joints in a robot's file."""
 
 import math
 from typing import Literal
@@ -59,7 +59,7 @@ class JointConfig(Strict):
 
     @model_serializer(mode="wrap")
     def _without_a_default_name(self, handler: SerializerFunctionWrapHandler) -> dict[str, object]:
-        """Leave out a name that is not set: the configuration in a log keeps its bytes."""
+        """Omit an unset name, so that logs keep their bytes."""
         keys: dict[str, object] = handler(self)
         if self.name is None:
             keys.pop("name", None)

@@ -1,6 +1,6 @@
 """Top-level keys of a robot's file.
 
-A key that `[[links]]` or `[[joints]]` may replace holds for only some of them, so code cannot read
+A key that `[[links]]` or `[[joints]]` may replace is not valid for all of them, so code cannot read
 it: `robot.link_length_m` raises. `link_values` and `joint_values` give the value of each link and
 joint.
 """
@@ -102,7 +102,7 @@ READ_INSTEAD: Final = {
 
 
 class Unreadable:
-    """Data descriptor in front of a parsed key: it has no value, and pydantic still stores one."""
+    """Data descriptor of a parsed key that hides its value; pydantic still stores it."""
 
     def __get__(self, robot: object, owner: type) -> NoReturn:
         """Raise AttributeError; Python then calls ``RobotConfig.__getattr__``."""
@@ -114,5 +114,5 @@ class Unreadable:
 
 
 def parsed(robot: RobotKeys, key: str) -> Any:
-    """Value of a key as it was parsed; for this package only."""
+    """Parsed value of a key; for this package only."""
     return robot.__dict__[key]

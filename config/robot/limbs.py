@@ -1,4 +1,4 @@
-"""Legs, as a robot's file gives them."""
+"""Legs in a robot's file."""
 
 from typing import Literal, NamedTuple, Self
 
@@ -50,7 +50,7 @@ SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 
 class LimbJoint(NamedTuple):
-    """One joint of a leg; it moves the link with the joint's index plus one."""
+    """One joint of a leg; it moves the link with its index plus one."""
 
     pair: int
     """Index in ``limbs``."""

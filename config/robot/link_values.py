@@ -14,22 +14,22 @@ class LinkValues(RobotKeys):
 
     @property
     def joint_count(self) -> int:
-        """Number of servos J, including those of the legs; there are J + 1 links."""
+        """Number of servos J, legs included; there are J + 1 links."""
         return len(self.all_axes)
 
     @property
     def link_count(self) -> int:
-        """Number of links L of the spine, which come before those of the legs."""
+        """Number of links L of the spine, before those of the legs."""
         return len(self.joint_axes) + 1
 
     @property
     def limb_joints(self) -> tuple[LimbJoint, ...]:
-        """Joints of the legs in the order of the bus; those of the spine come before them."""
+        """Joints of the legs in the order of the bus, after those of the spine."""
         return _limb_joints(tuple(pair.joint_axes for pair in self.limbs))
 
     @property
     def all_axes(self) -> str:
-        """One letter for each servo, first the spine, then the legs."""
+        """One letter per servo, first the spine, then the legs."""
         return self.joint_axes + "".join(2 * pair.joint_axes for pair in self.limbs)
 
     @property
@@ -62,7 +62,7 @@ class LinkValues(RobotKeys):
 
     @property
     def mean_link_length_m(self) -> float:
-        """Length of the spine over the number of its links."""
+        """Mean link length of the spine."""
         if not self.links:
             return float(parsed(self, "link_length_m"))
         lengths_m = self.link_lengths_m
@@ -72,7 +72,7 @@ class LinkValues(RobotKeys):
 
     @property
     def mean_link_mass_kg(self) -> float:
-        """Mass of the spine over the number of its links."""
+        """Mean link mass of the spine."""
         masses_kg = self.link_masses_kg
         if len(set(masses_kg)) > 1:
             return math.fsum(masses_kg) / self.link_count
@@ -85,7 +85,7 @@ class LinkValues(RobotKeys):
 
     @property
     def link_masses_kg(self) -> tuple[float, ...]:
-        """Mass of each link of the spine, head first, including the mast of a stereo head."""
+        """Mass of each link of the spine, head first, with a stereo head's mast."""
         masses_kg = self.bare_link_masses_kg
         if self.stereo_head is None:
             return masses_kg
@@ -95,12 +95,12 @@ class LinkValues(RobotKeys):
 
     @property
     def bare_link_masses_kg(self) -> tuple[float, ...]:
-        """Mass of each link of the spine, head first, without the mast of a stereo head."""
+        """Mass of each link of the spine, head first, without a stereo head's mast."""
         return self._of_links("mass_kg", parsed(self, "link_mass_kg"))
 
     @property
     def middles_apart_m(self) -> float:
-        """Distance along the spine from the middle of the first link to that of the last."""
+        """Distance along the spine between the middles of the first and the last link."""
         lengths_m = self.link_lengths_m
         if len(set(lengths_m)) == 1:
             return lengths_m[0] * (self.link_count - 1)
@@ -113,7 +113,7 @@ class LinkValues(RobotKeys):
 
     @property
     def link_shapes(self) -> tuple[LinkShape, ...]:
-        """Shape with which each link of the spine meets the ground, head first."""
+        """Ground contact shape of each link of the spine, head first."""
         if not self.links:
             return (self.belly.shape,) * self.link_count
         return tuple(
@@ -123,9 +123,9 @@ class LinkValues(RobotKeys):
 
     @property
     def link_ends(self) -> tuple[float, ...]:
-        """(L + 1,) places of the head's tip, the spine's joints and the tail's end along the body.
+        """(L + 1,) places of the head's tip, the spine's joints and the tail's end.
 
-        The unit is the mean link length: 0, 1, 2 ... if all links have the same length.
+        The unit is the mean link length: 0, 1, 2 ... for equal links.
         """
         if not self.links:
             return _even_ends(self.link_count)
@@ -136,14 +136,14 @@ class LinkValues(RobotKeys):
         return (0.0, *inner, float(self.link_count))
 
     def _of_links(self, key: str, usual: float) -> tuple[float, ...]:
-        """Value of a key for each link; ``usual`` for a link without one."""
+        """Value of a key for each link, by default ``usual``."""
         if not self.links:
             return (usual,) * self.link_count
         own = (getattr(link, key) for link in self.links)
         return tuple(usual if o is None else o for o in own)
 
     def radii_m(self, stations: int) -> tuple[float, ...]:
-        """Body radius at ``stations`` (1 or more) equidistant places from head tip to tail tip."""
+        """Body radius at ``stations`` (1 or more) equidistant places from tip to tip."""
         return self.radii_at_m(tuple(k / max(stations - 1, 1) for k in range(stations)))
 
     def radii_at_m(self, shares: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""Links of the spine, as a robot's file gives them."""
+"""Links of the spine in a robot's file."""
 
 from typing import Literal, Self
 

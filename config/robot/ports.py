@@ -1,4 +1,4 @@
-"""Adapters of a chain whose segments are on several ports."""
+"""Adapters of a chain with segments on several ports."""
 
 from pydantic import Field
 

@@ -1,4 +1,4 @@
-"""Settings of the servos of a chain, as its file gives them."""
+"""Settings of the servos in a robot's file."""
 
 from typing import Literal, Self
 
@@ -71,7 +71,7 @@ class ServoConfig(Strict):
 
     @property
     def supply_limits_v(self) -> tuple[float, float]:
-        """Lowest and highest supply of a run, unless the run gives its own limits."""
+        """Lowest and highest supply of a run without its own limits."""
         low_v, high_v = self.supply_min_v, self.supply_max_v
         return (
             self.supply_v * 10.0 / 12.0 if low_v is None else low_v,

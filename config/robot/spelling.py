@@ -1,7 +1,7 @@
-"""The canonical spelling of a robot: two files of the same robot give equal configurations.
+"""The canonical spelling of a robot: files of the same robot give equal configurations.
 
-A value that most links or joints have becomes the key of the chain; only those that differ keep
-their own. So a command cannot depend on the way in which a file says something.
+The most frequent value of links or joints becomes the key of the chain; only different ones keep
+their own. So a command cannot depend on the spelling of a file.
 """
 
 from collections import Counter
@@ -27,7 +27,7 @@ _OF_EVERY_JOINT = {
 
 
 def canonical_links(robot: JointValues) -> dict[str, Any]:
-    """Keys that spell the links canonically."""
+    """Canonical keys of the links."""
     if not robot.links:
         return {}
     lengths_m, masses_kg, radii_m = (
@@ -61,7 +61,7 @@ def canonical_links(robot: JointValues) -> dict[str, Any]:
 
 
 def canonical_joints(robot: JointValues) -> dict[str, Any]:
-    """Keys that spell the joints canonically."""
+    """Canonical keys of the joints."""
     if not robot.joints:
         return {}
     axes, spine = robot.all_axes, len(robot.joint_axes)
@@ -103,7 +103,7 @@ def _belly(robot: JointValues) -> BellyConfig:
 
 
 def _servo(robot: JointValues, rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Fold IDs and models; the constants of a motor hold for the model of `[servo]` only."""
+    """Fold IDs and models; motor constants are those of the model of `[servo]` only."""
     ids, models = robot.servo_ids, robot.servo_models
     first = _commonest(i - k for k, i in enumerate(ids) if 0 <= i - k <= LAST_ID)
     model, motor = robot.servo.model, robot.servo.motor
@@ -138,7 +138,7 @@ def _fold(
     values: tuple[V, ...],
     name: str,
 ) -> Mapping[str, V]:
-    """Write ``key`` into the rows of a group that differ; return the value of the others."""
+    """Write ``key`` into the differing rows of a group; return the common value."""
     joints = list(group)
     if not joints:
         return {}
@@ -149,5 +149,5 @@ def _fold(
 
 
 def _commonest(values: Iterable[V]) -> V:
-    """Most frequent value; of several the one that comes first."""
+    """Most frequent value, the first of several."""
     return Counter(values).most_common(1)[0][0]

@@ -1,1 +1,1 @@
-"""Localization: the head's pose from an overhead camera, or by dead reckoning from the joints."""
+"""Localization: the head's pose from an overhead camera and dead reckoning, or from tags."""

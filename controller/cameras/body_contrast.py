@@ -1,8 +1,7 @@
-"""Contrast of a body with its floor in a frame, near to where the body is expected.
+"""Contrast of a body with its floor in a frame, near the expected body.
 
-Three conditions of a frame need another way of comparison, and are recognised in the frame itself:
-a flickering lamp (bands of rows), strong compression (blocks of 8 px), a hard shadow. Frames
-without them are compared as they are.
+Three conditions need another comparison, and are recognised in the frame itself: a flickering lamp
+(bands of rows), strong compression (blocks of 8 px), a hard shadow.
 """
 
 from collections.abc import Sequence
@@ -24,21 +23,21 @@ from snakewalk.controller.cameras.pose_tracking import (
     TrackedPose,
 )
 
-_CALM_PX: Final = 200  # fewest pixels away from the body that give the noise
+_CALM_PX: Final = 200  # fewest pixels away from the body for the noise
 _BLOCK_PX: Final = 8  # of JPEG and of MJPEG
 _BLOCKS: Final = 1.3  # steps between blocks over those within: more is compression (ours)
-_STEP: Final = 4  # grey levels: a larger step is an edge of the scene, not of a block (ours)
-_CLEAR: Final = 0.4  # of the body's contrast: halos of compression have less (ours)
+_STEP: Final = 4  # grey levels: a larger step is an edge of the scene (ours)
+_CLEAR: Final = 0.4  # of the body's contrast; halos of compression have less (ours)
 DEEP_SHADE: Final = 0.9
 """Share of the light that a hard shadow may remove (ours)."""
 _COLOURLESS: Final = 0.08  # largest spread of a shadow's light over the channels (ours)
-_BRIGHT: Final = 40.0  # grey levels of a floor on which a shadow shows (ours)
+_BRIGHT: Final = 40.0  # grey levels of a floor that shows a shadow (ours)
 _BODY: Final = 1.25  # radii to each side of the axis that may belong to the body (ours)
 
 
 @dataclass(frozen=True, slots=True)
 class BodyContrast:
-    """The part of a frame around an expected body, and the same part of its floor."""
+    """The part of a frame around an expected body, and of its floor."""
 
     frame: Image
     """(h, w[, 3])."""
@@ -63,7 +62,7 @@ class BodyContrast:
         prior: BodyPrior,
         robot: RobotConfig,
     ) -> Self:
-        """Cut the part around an expected body out of a frame (H, W[, 3]) and its floors."""
+        """Cut the surroundings of an expected body out of a frame (H, W[, 3]) and its floors."""
         reach_m = REACH_M + 3.0 * robot.body_radius_m
         around = reach_m * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
         px = to_px((prior.links_m[:, None] + around).reshape(-1, 2))
@@ -89,7 +88,7 @@ class BodyContrast:
         )
 
     def standing_out(self, shade: float) -> StandingOut:
-        """Return how much each pixel stands out; shadows may remove ``shade`` of the light."""
+        """Return each pixel's difference from the floor; a shadow removes ``shade`` of light."""
         now = _smooth(self.frame)
         apart = np.full(now.shape[:2], np.inf, dtype=np.float32)
         for floor in self.floors:
@@ -115,10 +114,9 @@ class BodyContrast:
         return StandingOut(share.astype(np.float32), self.origin_px, self.to_px, self.is_compressed)
 
     def hard_shadow(self, links_m: Floats, shade: float) -> float:
-        """Return the area of dark colourless pixels next to a body with its links (L, 2) there.
+        """Area of dark colourless pixels next to a body at links (L, 2), in body areas.
 
-        They are darker than a shadow that removes ``shade`` of the light. The unit is the area of
-        the body.
+        They are darker than a shadow that removes ``shade`` of the light.
         """
         if self.frame.ndim == 2:
             return 0.0
@@ -135,7 +133,7 @@ class BodyContrast:
         return int((dark & (body == 0)).sum()) / self.area_px
 
     def _lit(self, floor: Image) -> Image:
-        """(h, w[, 3]) the floor in the light of the frame, smoothed as the frame."""
+        """(h, w[, 3]) the floor in the light of the frame, smoothed."""
         ground = np.ascontiguousarray(floor)
         if not self.is_compressed or self.frame.ndim == 2:
             return _smooth(lit_floor(self.frame, ground, self.area_px))
@@ -150,7 +148,7 @@ class BodyContrast:
 
 
 def links_at(prior: BodyPrior, found: TrackedPose) -> Floats:
-    """(L, 2) centres of the links of an expected body at the pose that was found."""
+    """(L, 2) centres of the links of an expected body at the found pose."""
     ahead = prior.forward[0]
     turn = found.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
     c, s = np.cos(turn), np.sin(turn)
@@ -168,7 +166,7 @@ def _draw(mask: NDArray[np.uint8], line_px: Floats, wide_px: float) -> None:
 
 
 def _is_compressed(image: Image) -> bool:
-    """Whether the steps at every eighth column of a frame are the largest."""
+    """Whether every eighth column of a frame has the largest steps."""
     grey = grey_of(image[::3]).astype(np.int16)
     step = np.minimum(np.abs(np.diff(grey, axis=1)), _STEP).mean(axis=0)
     step = step[: len(step) // _BLOCK_PX * _BLOCK_PX].reshape(-1, _BLOCK_PX)

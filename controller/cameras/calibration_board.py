@@ -1,4 +1,4 @@
-"""The printed board of a calibration: a chessboard, or a ChArUco board, which may be cut off."""
+"""The printed board of a calibration: a chessboard, or a ChArUco board that may be cut off."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -26,7 +26,7 @@ class BoardPattern(StrEnum):
 
 
 def read_pattern(text: str) -> BoardPattern:
-    """Return the pattern of this name.
+    """Return a pattern by name.
 
     Raises:
         InputError: the pattern is unknown.
@@ -85,11 +85,11 @@ class CalibrationBoard:
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Width and height of the squares together."""
+        """Width and height of all squares."""
         return self.squares[0] * self.square_m, self.squares[1] * self.square_m
 
     def picture(self, dots_per_inch: float) -> Image:
-        """(H, W) the board without a margin, as it is printed."""
+        """(H, W) the printed board without a margin."""
         side = max(8, round(self.square_m / _INCH_M * dots_per_inch))
         across, down = self.squares
         if self.pattern is BoardPattern.CHARUCO:
@@ -99,7 +99,7 @@ class CalibrationBoard:
         return np.where((x + y) % 2, 255, 0).astype(np.uint8)
 
     def find(self, picture: Image) -> BoardView | None:
-        """Find the corners in a picture (H, W[, 3]); None where there are too few."""
+        """Find the corners in a picture (H, W[, 3]); None if there are too few."""
         grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         places = np.asarray(self._charuco.getChessboardCorners(), dtype=float)[:, :2]
         if self.pattern is BoardPattern.CHARUCO:
@@ -119,5 +119,5 @@ class CalibrationBoard:
 
 
 def _on_a_line(places: Floats) -> bool:
-    """Corners of one row fix no plane."""
+    """Whether corners are on one line and fix no plane."""
     return bool(np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[1] < 1e-6)

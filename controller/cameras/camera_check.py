@@ -30,7 +30,7 @@ _LINE_S: Final = 0.05
 """Between two frames in which the body is looked for."""
 _LINES, _READS = 400, 1000
 """The latest samples for the latency: 20 s."""
-_SPARSE: Final = 8  # step between the pixels that count for the light
+_SPARSE: Final = 8  # pixel step for the light
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,19 +64,14 @@ class CameraReport:
 
 
 class CameraCheck:
-    """Receives frames and joint angles in the order of time."""
+    """Receives frames and joint angles in order of time."""
 
     def __init__(
         self, camera: CameraConfig, robot: RobotConfig, detector: OverheadDetector | None
     ) -> None:
-        """Begin.
+        """Begin; ``camera`` names the markers.
 
-        Args:
-            camera: names the markers.
-            robot: the robot that the camera looks at.
-            detector: with a picture of the empty floor; None without such a picture: then neither
-                latency nor a bump is reported.
-
+        ``detector`` has a picture of the empty floor; None: neither latency nor bumps are reported.
         """
         self._camera, self._robot, self._detector = camera, robot, detector
         self._frame_s: list[float] = []
@@ -92,10 +87,10 @@ class CameraCheck:
         """Markers of the last picture in which they were searched."""
 
     def add_frame(self, image: Image, time_s: float) -> None:
-        """Process a frame (H, W, 3) that was handed over at this time.
+        """Process a frame (H, W, 3) received at this time.
 
         Raises:
-            InputError: it is not as large as the picture of the empty floor.
+            InputError: its size differs from the picture of the empty floor.
 
         """
         self._frame_s.append(time_s)
@@ -113,7 +108,7 @@ class CameraCheck:
             self._found[name] += name in self.markers
 
     def _add_line(self, image: Image, time_s: float) -> None:
-        """Find the body where it was in the frame before, else anywhere."""
+        """Find the body near its last place, else anywhere."""
         whole = self._detector
         if whole is None:
             return
@@ -136,15 +131,15 @@ class CameraCheck:
         self._window = slice(int(top), int(below)), slice(int(left), int(right))
 
     def add_joints(self, time_s: float, joint_rad: Floats) -> None:
-        """Store joint angles (J,) that were read at this time."""
+        """Store joint angles (J,) read at this time."""
         self._joint_s.append(time_s)
         self._joint_rad.append(np.array(joint_rad, dtype=float))
 
     def report(self) -> CameraReport:
-        """Return what has been seen so far.
+        """Return the observations so far.
 
         Raises:
-            InputError: nothing was.
+            InputError: there was no frame.
 
         """
         if self._latest is None:

@@ -1,4 +1,4 @@
-"""Results of a check of the overhead camera as findings, like those of the doctor."""
+"""Results of a camera check as findings, like those of the doctor."""
 
 from collections.abc import Mapping
 from typing import Final, Literal
@@ -12,25 +12,21 @@ from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
 from snakewalk.controller.console.finding import Finding
 
 Lock = Literal["locked", "automatic", "not told"]
-_SLOW: Final = 0.8  # of the rate that was asked for
+_SLOW: Final = 0.8  # of the requested rate
 _GAP: Final = 3.0  # periods of a frame
-_SEEN: Final = 0.9  # of the pictures: a marker that is seen less comes and goes
+_SEEN: Final = 0.9  # of the pictures: a marker with less is unreliable
 _SIDE: Final = 0.05  # of a marker's side: more is a wrong print, or wrong places
-_LIGHT: Final = 0.03  # of the brightness: more is flicker, or a camera that regulates
-_RIGHT_S: Final = 0.01  # by which latency_s may be off
+_LIGHT: Final = 0.03  # of the brightness: more is flicker, or automatic exposure
+_RIGHT_S: Final = 0.01  # largest error of latency_s
 _MOVED_PX: Final = 0.5
 
 
 def camera_findings(
     report: CameraReport, camera: CameraConfig, locks: Mapping[str, Lock]
 ) -> list[Finding]:
-    """Grade a report.
+    """Grade a report of a check against the camera's settings.
 
-    Args:
-        report: of the check.
-        camera: the requested camera settings.
-        locks: of ``exposure`` and ``white balance``.
-
+    ``locks`` are those of ``exposure`` and ``white balance``.
     """
     return [
         _frames(report, camera),

@@ -1,4 +1,4 @@
-"""Facts that the simulated and the real overhead camera share."""
+"""Common facts of the simulated and the real overhead camera."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ CHECK_FRAMES = 15
 
 
 def centre_of(run: RunConfig) -> tuple[float, float]:
-    """Floor under the lens: as given, or the middle of start and waypoints."""
+    """Floor below the lens: as configured, or the middle of start and waypoints."""
     if run.camera.centre_m is not None:
         return run.camera.centre_m
     places = np.array([run.start_m, *run.waypoints_m])
@@ -26,10 +26,10 @@ def centre_of(run: RunConfig) -> tuple[float, float]:
 
 
 def require_whole_body(detection: LineDetection, camera: str) -> LineDetection:
-    """Return the detection.
+    """Return a detection of the whole body.
 
     Raises:
-        InputError: it does not show the whole body.
+        InputError: it is incomplete.
 
     """
     if detection.status is not FrameStatus.GOOD:

@@ -1,8 +1,7 @@
-"""How late a camera's frames are, from the joints' own motion.
+"""Latency of a camera's frames, from the joints' motion.
 
-The body's shape in a frame is compared with the shape that the joints had at earlier times: at the
-camera's latency they go together. The shape is that of the headings along the body, less their
-mean; so it does not matter where the body slides meanwhile.
+The body's shape in a frame is compared with the joints' shape at earlier times. The shape is that
+of the headings along the body, minus their mean, so sliding does not matter.
 """
 
 from collections.abc import Sequence
@@ -18,16 +17,14 @@ from snakewalk.controller.kinematics.links import body_in_world, pose_at
 
 _EARLIEST_S, _LATEST_S, _STEP_S = -0.1, 0.6, 0.005
 _PARTS: Final = 4  # of the record, whose latencies give the error
-_LEAST: Final = 30  # frames, and reads of the joints
-_LEAST_MOVED_RAD: Final = (
-    0.03  # standard deviation of a heading: less is the picture's noise (ours)
-)
-_LIKE: Final = 0.7  # least correlation that is believed (ours)
+_LEAST: Final = 30  # frames, and joint reads
+_LEAST_MOVED_RAD: Final = 0.03  # standard deviation of a heading: less is picture noise (ours)
+_LIKE: Final = 0.7  # least credible correlation (ours)
 
 
 @dataclass(frozen=True, slots=True)
 class LatencyFit:
-    """How late frames are handed over."""
+    """Latency of frames."""
 
     latency_s: float
     error_s: float
@@ -44,13 +41,13 @@ _NONE: Final = LatencyFit(float("nan"), float("nan"), float("nan"))
 def fit_latency(
     robot: RobotConfig, lines: Sequence[LineDetection], joint_s: Floats, joint_rad: Floats
 ) -> LatencyFit:
-    """Find the delay under which the body that is seen has the shape of the joints.
+    """Find the delay at which the visible body has the shape of the joints.
 
     Args:
         robot: its links.
-        lines: the body's line in frames, dated with their handing over.
-        joint_s: (T,) when the joints were read.
-        joint_rad: (T, J) their angles; rows with NaN are left out.
+        lines: the body's line in frames, with times of receipt.
+        joint_s: (T,) times of the joint reads.
+        joint_rad: (T, J) their angles; rows with NaN are dropped.
 
     """
     whole = np.isfinite(joint_rad).all(axis=1)
@@ -99,7 +96,7 @@ def fit_latency(
 
 
 def _same_end_first(lines_m: Sequence[Floats]) -> list[Floats]:
-    """Lines (P, 2) that all begin with the end with which the first does: tips move little."""
+    """Lines (P, 2) that begin at the same end as the first: tips move little."""
     found = [lines_m[0]]
     for line in lines_m[1:]:
         off = [np.hypot(*(one[[0, -1]] - found[-1][[0, -1]]).T).sum() for one in (line, line[::-1])]
@@ -108,7 +105,7 @@ def _same_end_first(lines_m: Sequence[Floats]) -> list[Floats]:
 
 
 def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
-    """(F, L) headings of the links along lines (P, 2) that begin at the head, less their mean."""
+    """(F, L) headings of the links along lines (P, 2) from the head, minus their mean."""
     share = np.array(robot.link_ends) / robot.link_ends[-1]
     shapes = []
     for line in lines_m:
@@ -121,7 +118,7 @@ def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
 
 
 def _best(delays: Floats, expected: Floats, shown: Floats) -> tuple[float, float]:
-    """Delay with the best correlation of the changes, to a part of a step, and it."""
+    """Delay with the best correlation of the changes (to a fraction of a step), and that."""
     one = (expected - expected.mean(axis=1, keepdims=True)).reshape(len(delays), -1)
     two = (shown - shown.mean(axis=0)).ravel()
     size = np.sqrt((one**2).sum(axis=1) * (two**2).sum())

@@ -1,4 +1,4 @@
-"""The page of a camera's check: its picture with the markers in it, and what is found so far."""
+"""The page of a camera check: its picture with the markers, and the findings so far."""
 
 import sys
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class CameraPage:
         self._ahead_s: float | None = None
 
     def on_frame(self, image: Image, check: CameraCheck, time_s: float) -> None:
-        """Process a frame; a simulated camera is held to the pace of a person's clock."""
+        """Process a frame; a simulated camera is slowed to real time."""
         now_s = self._clock.now_s()
         if self._ahead_s is None:
             self._ahead_s = now_s - time_s
@@ -56,7 +56,7 @@ class CameraPage:
         if now_s - self._shown_s < _EVERY_S:
             return
         self._shown_s = now_s
-        blue_first = self._camera.device is not None  # as OpenCV hands them over
+        blue_first = self._camera.device is not None  # OpenCV's order
         seen = image[..., ::-1] if blue_first else image
         self._picture.image = with_markers(seen, check.markers)
         if now_s - self._told_s < _REPORT_S:
@@ -75,7 +75,7 @@ class CameraPage:
         )
 
     def stop(self) -> None:
-        """Serve it no more."""
+        """Stop serving."""
         self._server.stop()
 
 
@@ -84,7 +84,7 @@ def open_camera_page(at: str, camera: CameraConfig, watch: CameraWatch) -> Itera
     """Serve the page and print its address.
 
     Raises:
-        InputError: viser is not installed, or nothing can be served there.
+        InputError: viser is not installed, or the address cannot be used.
 
     """
     host, port = host_and_port(at)
@@ -100,7 +100,7 @@ def open_camera_page(at: str, camera: CameraConfig, watch: CameraWatch) -> Itera
 
 
 def with_markers(image: Image, markers: Markers) -> Image:
-    """(H, W, 3) a picture with its markers outlined and numbered."""
+    """(H, W, 3) a picture with outlined, numbered markers."""
     shown = np.ascontiguousarray(image).copy()
     for name, px in markers.items():
         corners = np.rint(px).astype(np.int32).reshape(-1, 1, 2)

@@ -1,7 +1,7 @@
-"""The head's pose from an overhead camera, carried from frame to frame by dead reckoning.
+"""The head's pose from an overhead camera, continued by dead reckoning.
 
-A frame shows where the body was when it was taken; the joints' motion since then is added by dead
-reckoning. So the pose is a frame that drifts, and each image sets its place in the world again.
+A frame shows the body at an earlier time; dead reckoning adds the motion since then. So the pose is
+given in a drifting frame, whose place in the world each image updates.
 """
 
 from collections import deque
@@ -39,23 +39,23 @@ PriorAt = Callable[[float], BodyPrior | None]
 
 
 class Camera(Protocol):
-    """Where frames come from, as detections."""
+    """Source of frames, as detections."""
 
     def first(self) -> LineDetection:
-        """Capture a frame and wait for its detection; the body lies still."""
+        """Capture a frame and wait for its detection; the body is at rest."""
         ...
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> Sequence[LineDetection | TrackedPose]:
-        """Return what has come in since the last call, in order of time.
+        """Return the detections since the last call, in order of time.
 
-        With a prior the body is looked for only near to it.
+        With a prior the body is searched only near it.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """The estimate at one read of the joints, in the drifting frame."""
+    """The estimate at one joint read, in the drifting frame."""
 
     time_s: float
     place: Floats
@@ -64,7 +64,7 @@ class _Moment:
 
 
 class CameraPose:
-    """Call with each joint state, in order of time; returns the estimated pose."""
+    """Callable with each joint state, in order of time; returns the estimated pose."""
 
     def __init__(
         self,
@@ -96,14 +96,14 @@ class CameraPose:
         self._sigma_m: list[float] = []
 
     def facts(self) -> dict[str, float | int]:
-        """Return the numbers of frames, and the usual uncertainty of the head's place in them."""
+        """Return the numbers of frames, and the median uncertainty of the head's place."""
         facts: dict[str, float | int] = {"frames": self.frames, "frames_used": self.used}
         if self._sigma_m:
             facts["head_sigma_median_m"] = round(float(np.median(self._sigma_m)), 4)
         return facts
 
     def __call__(self, state: JointState) -> BodyPose:
-        """Advance to the state's time, and process the frames that have arrived."""
+        """Advance to the state's time, and process arrived frames."""
         odometry = self._reckoning(state)
         place = np.array([*odometry.head_in_world_m[:2], odometry.heading_rad])
         self._history.append(_Moment(state.time_s, place, np.array(state.position_rad)))
@@ -141,7 +141,7 @@ class CameraPose:
         self._place(found, found.time_s)
 
     def _place(self, found: PoseFit | TrackedPose, time_s: float) -> None:
-        """Put the drifting frame where a camera saw the head."""
+        """Move the drifting frame to the head's place in a frame."""
         head_m, heading_rad = found.head_m, found.heading_rad
         self.covariance = found.covariance
         self._sigma_m.append(float(np.sqrt(np.linalg.eigvalsh(found.covariance[:2, :2])[-1])))
@@ -164,7 +164,7 @@ class CameraPose:
         self._place(fit, detection.time_s)
 
     def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
-        """Which end is the head: by the joints' shape; where both fit, by the last estimate."""
+        """Choose the head's end by the joints' shape; if both fit, by the last estimate."""
         better, worse = sorted(fits, key=lambda fit: fit.error_m)
         apart = worse.error_m > MISFIT * self._robot.mean_link_length_m
         if apart and better.error_m < DECISIVE * worse.error_m:
@@ -174,7 +174,7 @@ class CameraPose:
         return max(fits, key=lambda fit: np.cos(fit.heading_rad) * c + np.sin(fit.heading_rad) * s)
 
     def _at(self, time_s: float) -> _Moment:
-        """Joints and drifting pose at the time of a frame, between two reads."""
+        """Joints and drifting pose at the time of a frame, interpolated."""
         if len(self._history) == 1:
             return self._history[0]
         times = np.array([moment.time_s for moment in self._history])
@@ -187,7 +187,7 @@ class CameraPose:
         return _Moment(time_s, one.place + part * change, joints)
 
     def _report_gap(self, now_s: float) -> None:
-        """Report when the camera has lost the body, and when it has it again."""
+        """Report the loss and the return of the body."""
         blind_s = now_s - (self._fixed_s or 0.0)
         if self._gap != (blind_s > GAP_S):
             self._gap = not self._gap
@@ -204,5 +204,5 @@ def _turned(point: Floats, by_rad: float) -> Floats:
 
 
 def _in_world(frame: Floats, place: Floats) -> Floats:
-    """(3,) a place of the drifting frame in the world."""
+    """(3,) world place of a place in the drifting frame."""
     return np.append(frame[:2] + _turned(place[:2], frame[2]), frame[2] + place[2])

@@ -57,10 +57,10 @@ class OverheadCameraPose:
 
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:
-        """Open the camera for the time of a run.
+        """Open the camera for a run.
 
         Raises:
-            InputError: the camera is not there, or does not show the robot.
+            InputError: the camera is missing, or does not show the robot.
 
         """
         robot = context.prepared.robot

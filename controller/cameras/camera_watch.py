@@ -1,7 +1,7 @@
 """Frames of the overhead camera, and the joints at the same time, during a check.
 
-On a port the joints are only read: torque stays as it is, and a person turns a joint. The simulated
-robot wiggles by itself.
+On a port the joints are only read: torque stays unchanged, and a person turns a joint. The
+simulated robot wiggles by itself.
 """
 
 import queue
@@ -30,8 +30,8 @@ from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.types import JointCommand
 
 _WIGGLE_RAD: Final = 0.25
-_WIGGLE_HZ: Final = 0.6, 0.97  # two that never come together: one delay fits, not a period later
-_JOINTS: Final = 3  # at the head, that wiggle
+_WIGGLE_HZ: Final = 0.6, 0.97  # incommensurable: one delay fits, not a period later
+_JOINTS: Final = 3  # number of wiggling joints at the head
 _RAMP_S: Final = 0.5
 _READS_HZ: Final = 50.0  # of the joints, with a real camera
 
@@ -44,14 +44,12 @@ def nobody(image: Image, check: CameraCheck, time_s: float) -> None:
 
 
 class CameraWatch:
-    """A run's camera; ``check`` looks through it for a while."""
+    """A run's camera; ``check`` measures for a while."""
 
     def __init__(self, prepared: PreparedRun, port: str | None) -> None:
-        """Prepare; nothing is opened yet.
+        """Prepare; opens nothing.
 
-        Args:
-            prepared: names camera and robot.
-            port: of the servos whose joints are read; None for none, or with a simulated camera.
+        ``port`` is that of the servos to read; None without servos, or with a simulated camera.
 
         Raises:
             InputError: a port for a simulated camera.
@@ -65,15 +63,15 @@ class CameraWatch:
 
     @property
     def name(self) -> str:
-        """Which camera."""
+        """Name of the camera."""
         device = self._camera.device
         return "simulated" if device is None else device
 
     def check(self, seconds: float, on_frame: OnFrame = nobody) -> CameraCheck:
-        """Look.
+        """Measure.
 
         Raises:
-            InputError: no camera, no frame, or a lens, a background or markers that do not fit.
+            InputError: no camera, no frame, or an unsuitable lens, background or marker.
 
         """
         if self._camera.device is None:
@@ -81,7 +79,7 @@ class CameraWatch:
         return self._real(seconds, on_frame)
 
     def _simulated(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
-        """Hand over each frame a period after it was taken: the latency to be found."""
+        """Deliver each frame a period after it was taken: the latency to be found."""
         from snakewalk.controller.cameras.rendered_camera import (  # noqa: PLC0415  simulator: an extra
             rendered_detector,
             top_view,
@@ -103,7 +101,7 @@ class CameraWatch:
             goal, begin_s, cycles = begin.position_rad, clock.now_s(), 0
             next_s, coming = begin_s, list[tuple[float, Image]]()
             while clock.now_s() < begin_s + seconds:
-                state = chain.read()  # the simulated body stands where it did in this read
+                state = chain.read()  # the simulated body has the pose of this read
                 now_s = state.time_s
                 check.add_joints(now_s - float(state.age_s.mean()), state.position_rad)
                 if now_s >= next_s - 1e-9:

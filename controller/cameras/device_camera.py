@@ -1,6 +1,6 @@
-"""A real overhead camera: a thread captures frames, processes them, and keeps the results.
+"""A real overhead camera: a thread captures and processes frames.
 
-Processing is longer than a cycle of the loop may be, so it runs in parallel.
+Processing needs longer than a cycle of the loop, so it runs in parallel.
 """
 
 import queue
@@ -44,9 +44,9 @@ ANSWER_S = 0.1
 
 
 class DeviceCamera:
-    """The camera that OpenCV opens under ``camera.device``; ``close`` it.
+    """The camera that OpenCV opens as ``camera.device``; ``close`` it.
 
-    A frame is dated ``latency_s`` before it has been handed over.
+    A frame is dated ``latency_s`` before its receipt.
 
     Raises:
         InputError: no such camera, no background, another size, no frame, or no robot in it.
@@ -61,7 +61,7 @@ class DeviceCamera:
         on_picture: OnPicture = lambda picture, time_s: None,
         ground: HeightField | None = None,
     ) -> None:
-        """Open it; ``on_picture`` is called from the thread that captures the frames."""
+        """Open it; ``on_picture`` is called from the capture thread."""
         camera = run.camera
         self._clock, self._on_picture = clock, on_picture
         self.detector = overhead_detector(run, robot, ground)
@@ -90,7 +90,7 @@ class DeviceCamera:
         """Wait for the next frame.
 
         Raises:
-            InputError: none comes.
+            InputError: no frame arrives.
 
         """
         self._collect(self._clock.now_s())
@@ -108,7 +108,7 @@ class DeviceCamera:
         return found
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
-        """Return what has been seen since the last call, up to ``now_s``."""
+        """Return the detections since the last call, up to ``now_s``."""
         while not self._asked.empty():
             self._answers.put(prior_at(self._asked.get_nowait()))
         return self._collect(now_s)
@@ -124,14 +124,14 @@ class DeviceCamera:
         return found
 
     def close(self) -> None:
-        """Stop the thread and let the camera go."""
+        """Stop the thread and release the camera."""
         self._stop.set()
         self._thread.join(timeout=PATIENCE_S)
         self._device.release()
 
     def _look(self, frame: Image, time_s: float) -> LineDetection | TrackedPose:
-        """Look near to where the loop believes the body; anywhere while no loop answers."""
-        while not self._answers.empty():  # to a frame that was given up
+        """Search near the loop's estimate; anywhere while no loop answers."""
+        while not self._answers.empty():  # for an abandoned frame
             self._answers.get_nowait()
         self._asked.put(time_s)
         try:
@@ -166,10 +166,10 @@ class DeviceCamera:
 def overhead_detector(
     run: RunConfig, robot: RobotConfig, ground: HeightField | None = None
 ) -> OverheadDetector:
-    """Build the detector of a real camera from its table in the run, above known ground.
+    """Build the detector of a real camera from the run's table, above known ground.
 
     Raises:
-        InputError: no background image, of another size, no lens in its file, or corners or
+        InputError: no background image, or of another size, no lens in its file, or corners or
             markers that fix no plane.
 
     """
@@ -195,7 +195,7 @@ def overhead_detector(
 
 
 def open_device(camera: CameraConfig) -> cv2.VideoCapture:
-    """Open the camera in the wanted size and rate.
+    """Open the camera with the configured size and rate.
 
     Raises:
         InputError: the camera does not exist.
@@ -213,6 +213,6 @@ def open_device(camera: CameraConfig) -> cv2.VideoCapture:
 
 
 def in_colour(image: NDArray[np.generic]) -> Image:
-    """(H, W, 3) whatever the number of channels."""
+    """(H, W, 3) for any number of channels."""
     out = np.asarray(image, dtype=np.uint8)
     return np.dstack([out] * 3) if out.ndim == 2 else out

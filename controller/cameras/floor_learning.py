@@ -1,8 +1,8 @@
 """Learning of the floor: an object that stays next to the robot becomes floor after a while.
 
-A running estimate outside of the body, of frames whose pose is used and fits well. At the body and
-near to it nothing is learnt however long it stays there. Nothing is learnt either while it is lost
-or badly seen, so that a wrong pose cannot make the robot a part of the floor.
+A running estimate from frames with a well-fitting pose. It excludes the body and its surroundings,
+and frames with a lost or badly visible body, so that a wrong pose cannot make the robot a part of
+the floor.
 """
 
 from dataclasses import replace
@@ -20,13 +20,13 @@ from snakewalk.controller.cameras.overhead_camera import OverheadDetector
 from snakewalk.controller.cameras.pose_tracking import REACH_M, BodyPrior, TrackedPose
 
 LEARN_EVERY_S: Final = 1.0
-_LONGEST_S: Final = 5.0  # that one frame counts for: a gap teaches no more than that
-_FITS: Final = 0.15  # of the radius: largest residual of a pose that is learnt from
-_BLEACHED: Final = 249.0  # grey levels: a brighter pixel may be anything
+_LONGEST_S: Final = 5.0  # longest time that one frame counts for, s
+_FITS: Final = 0.15  # of the radius: largest residual of a pose to learn from
+_BLEACHED: Final = 249.0  # grey levels: a brighter pixel is saturated
 
 
 class FloorLearning:
-    """Call ``after`` with each tracked frame, in order of time."""
+    """Learner; call ``after`` with each tracked frame, in order of time."""
 
     def __init__(self, robot: RobotConfig, learn_s: float) -> None:
         """Learn with the time constant ``learn_s``; 0: never."""
@@ -38,13 +38,13 @@ class FloorLearning:
     def after(
         self, detector: OverheadDetector, image: Image, prior: BodyPrior, found: TrackedPose
     ) -> OverheadDetector:
-        """Return the detector of the next frames.
+        """Return the detector for the next frames.
 
         Args:
-            detector: with which the frame was looked at.
+            detector: that of this frame.
             image: (H, W[, 3]) the frame.
-            prior: the body's shape, and where it was believed.
-            found: where it was found.
+            prior: the body's shape, and its expected place.
+            found: its found place.
 
         """
         if self._learn_s == 0.0:
@@ -73,7 +73,7 @@ class FloorLearning:
 def _body(
     detector: OverheadDetector, prior: BodyPrior, found: TrackedPose, robot: RobotConfig
 ) -> Image:
-    """(H, W) 255 where the body and its neighbourhood are."""
+    """(H, W) 255 at the body and its surroundings."""
     links_px = detector.model.in_image(links_at(prior, found), detector.axis_height_m)
     length_px = float(np.hypot(*np.diff(links_px, axis=0).T).sum())
     metre = length_px / robot.middles_apart_m

@@ -1,8 +1,8 @@
-"""The light on a floor, and what is not explained by it.
+"""The light on a floor, and the differences that it does not explain.
 
-The ratio of a frame to the picture of the empty floor is smooth or has edges (gain, a gradient, a
-patch of sun), and the robot is thin. So the median of the ratio over a square of twice the body's
-area never shows the body.
+The ratio of a frame to the empty floor is smooth or has edges (gain, a gradient, a patch of sun),
+and the robot is thin. So the median of the ratio over a square of twice the body's area never shows
+the body.
 """
 
 from typing import Final
@@ -13,33 +13,30 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Image
 
-_ONE: Final = 100.0  # of 255: a ratio of 1; up to 2.5 times the light is measured
-_DARKEST: Final = np.uint8(8)  # grey levels: a ratio to less than this says nothing
-_GLARE: Final = 0.3  # by how much light may grow beyond that of the surroundings: soft edges (ours)
-_COARSE: Final = 4  # pixels of a frame a pixel of its wide light
-_COLUMNS: Final = 4  # step between the columns that give the light of a row
-_ROWS: Final = 4  # distance of the rows between which an edge of a band is measured
-_BANDS: Final = 0.06  # change of the light there that is a band's edge (ours)
+_ONE: Final = 100.0  # of 255: a ratio of 1; the largest ratio is 2.5
+_DARKEST: Final = np.uint8(8)  # grey levels: a ratio to a darker level is meaningless
+_GLARE: Final = 0.3  # by which light may exceed that of the surroundings: soft edges (ours)
+_COARSE: Final = 4  # frame pixels per pixel of its wide light
+_COLUMNS: Final = 4  # column step for the light of a row
+_ROWS: Final = 4  # row distance for an edge of a band
+_BANDS: Final = 0.06  # change of the light at a band's edge (ours)
 
 
 def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
     """(H, W[, 3]) the empty floor in the light of a frame.
 
-    Args:
-        image: (H, W[, 3]) the frame.
-        floor: (H, W[, 3]) the same without the robot, in another light.
-        body_area_px: that the robot covers.
-
+    ``floor`` is the same view without the robot, in another light; the robot covers
+    ``body_area_px``.
     """
     light = _light(image, floor, int(np.sqrt(2.0 * body_area_px)) + 1)
     return np.asarray(cv2.multiply(floor, light, scale=1.0 / _ONE), dtype=np.uint8)
 
 
 def banded_floor(image: Image, floor: Image) -> Image:
-    """(H, W[, 3]) the empty floor with the bands of rows that a flickering lamp leaves in a frame.
+    """(H, W[, 3]) the empty floor with the row bands of a flickering lamp in a frame.
 
-    The rows must be complete: the median of each row is its light. The floor itself where the
-    light has no steps.
+    The rows must be complete: the median of each row is its light. Without steps the floor is
+    returned.
     """
     ratio = grey_of(image[:, ::_COLUMNS]) / np.maximum(grey_of(floor[:, ::_COLUMNS]), _DARKEST)
     light = np.median(ratio, axis=1).astype(np.float32)
@@ -51,10 +48,10 @@ def banded_floor(image: Image, floor: Image) -> Image:
 
 
 def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
-    """(H, W[, 3]) a frame as the light of its floor's picture would show it.
+    """(H, W[, 3]) a frame converted to the light of its floor's picture.
 
-    Light here means the common change of a square of a third of the picture's width, computed on a
-    smaller picture: a change over less than half of it does not count as light.
+    Light is the common change of a square of a third of the picture's width, on a reduced picture.
+    A change over less than half of it is not light.
     """
     size = image.shape[1], image.shape[0]
     small = max(size[0] // _COARSE, 1), max(size[1] // _COARSE, 1)
@@ -65,7 +62,7 @@ def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
 
 
 def _light(image: Image, floor: Image, side_px: int) -> Image:
-    """(H, W[, 3]) what the floor's grey levels are multiplied with in a frame, in hundredths."""
+    """(H, W[, 3]) factor of the floor's grey levels in a frame, in hundredths."""
     ratio = cv2.divide(grey_of(image), np.maximum(grey_of(floor), _DARKEST), scale=_ONE)
     light = np.asarray(
         cv2.medianBlur(np.asarray(ratio, dtype=np.uint8), min(side_px | 1, 255)), dtype=np.uint8
@@ -74,10 +71,10 @@ def _light(image: Image, floor: Image, side_px: int) -> Image:
 
 
 def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:
-    """(H, W) grey levels by which a frame is off its lit floor, in its strongest channel.
+    """(H, W) grey levels of a frame's difference from its lit floor, in the strongest channel.
 
-    Shadow and light scale all channels alike: a pixel that is darker by up to ``shade`` or brighter
-    by a little in all of them is floor, and of others this part is taken off.
+    Shadow and light scale all channels equally. A pixel that is darker by up to ``shade`` or
+    slightly brighter in all channels is floor; from others this part is subtracted.
     """
     now, floor = (np.atleast_3d(one).astype(np.float32) for one in (image, lit))
     ratio = now / np.maximum(floor, 1.0)

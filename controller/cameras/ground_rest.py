@@ -1,4 +1,4 @@
-"""A body at rest on known ground: its height and attitude from its place and its shape."""
+"""A body at rest on known ground: height and attitude from place and shape."""
 
 from collections.abc import Callable
 from typing import Final
@@ -20,7 +20,7 @@ _LEAST_SPREAD_M2: Final = 4e-4
 
 
 def heights_of(ground: HeightField | None) -> Heights | None:
-    """Return the heights of known ground, NaN where a place is NaN; None for a level floor."""
+    """Return the heights of known ground, NaN at a NaN place; None for a level floor."""
     if ground is None:
         return None
 
@@ -33,14 +33,14 @@ def heights_of(ground: HeightField | None) -> Heights | None:
 
 
 class GroundRest:
-    """Lays a body on the ground: the plane of its links fits the ground under them."""
+    """Puts a body on the ground: the plane of its links fits the ground below."""
 
     def __init__(self, robot: RobotConfig, heights: Heights | None) -> None:
         self._spine, self._heights = SpineLinks.of(robot), heights
         self._radius_m = robot.body_radius_m
 
     def pose(self, place: Floats, joint_rad: Floats, time_s: float) -> BodyPose:
-        """Return the pose of the head link from its place (3,): x, y, heading."""
+        """Return the head link's pose from its place (3,): x, y, heading."""
         c, s = np.cos(place[2]), np.sin(place[2])
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         head_m = np.array([*place[:2], self._radius_m])
@@ -52,7 +52,7 @@ class GroundRest:
             lift_m, slope = _plane(links_m[:, :2] - head_m[:2], above_m)
             head_m[2] += lift_m
             rotation = rotation_by(np.array([slope[1], -slope[0], 0.0])) @ rotation
-            # tilting turns the head a little about the vertical; its heading is measured
+            # tilting turns the head slightly about the vertical; keep the measured heading
             turn = place[2] - np.arctan2(rotation[1, 0], rotation[0, 0])
             rotation = rotation_by(np.array([0.0, 0.0, np.arctan2(np.sin(turn), np.cos(turn))])) @ (
                 rotation
@@ -61,9 +61,9 @@ class GroundRest:
 
 
 def _plane(places_m: Floats, values_m: Floats) -> tuple[float, Floats]:
-    """Return height at the origin and slope (2,) of the plane that fits values at places (n, 2).
+    """Return height at the origin and slope (2,) of the plane through values at places (n, 2).
 
-    A direction along which the places hardly spread has no slope of its own.
+    Directions without spread get no slope.
     """
     middle = places_m.mean(axis=0)
     off = places_m - middle

@@ -1,8 +1,7 @@
-"""The lens of a camera: its matrix and distortion as OpenCV's calibration has them, and its file.
+"""The lens of a camera: matrix and distortion as in OpenCV's calibration, and its file.
 
-The file is one of OpenCV's FileStorage, or JSON with plain lists. It has the names of OpenCV's
-calibration sample: ``image_width``, ``image_height``, ``camera_matrix``,
-``distortion_coefficients``.
+The file is an OpenCV FileStorage, or JSON with plain lists, with the names of OpenCV's calibration
+sample: ``image_width``, ``image_height``, ``camera_matrix``, ``distortion_coefficients``.
 """
 
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ _STEPS: Final = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
 
 
 def projected(homography: NDArray[Any], points: Floats) -> Floats:
-    """(..., 2) where a homography (3, 3) puts points (..., 2)."""
+    """(..., 2) images of points (..., 2) under a homography (3, 3)."""
     x, y = points[..., 0], points[..., 1]
     moved = [row[0] * x + row[1] * y + row[2] for row in homography]
     return np.stack([moved[0] / moved[2], moved[1] / moved[2]], axis=-1)
@@ -43,13 +42,13 @@ class Lens:
     """(4, 5, 8, 12 or 14) coefficients in OpenCV's order."""
 
     def undistorted(self, points_px: Floats) -> Floats:
-        """(..., 2) where pixels (..., 2) would be without distortion."""
+        """(..., 2) pixels (..., 2) without distortion."""
         flat = np.ascontiguousarray(points_px, dtype=float).reshape(-1, 1, 2)
         found = cv2.undistortImagePoints(flat, self.matrix, self.distortion, arg1=_STEPS)
         return np.asarray(found, dtype=float).reshape(points_px.shape)
 
     def distorted(self, points_px: Floats) -> Floats:
-        """(..., 2) pixels of the picture for places (..., 2) of one without distortion."""
+        """(..., 2) pixels with distortion of pixels (..., 2) without it."""
         flat = np.asarray(points_px, dtype=float).reshape(-1, 2)
         rays = np.linalg.solve(self.matrix, np.column_stack([flat, np.ones(len(flat))]).T).T
         none = np.zeros(3)
@@ -60,11 +59,10 @@ class Lens:
 
     @classmethod
     def read(cls, file: Path) -> Self:
-        """Read the file of ``snakewalk camera calibrate``, or another of OpenCV's calibration.
+        """Read a file of ``snakewalk camera calibrate``, or of OpenCV's calibration.
 
         Raises:
-            InputError: it does not exist, is of another kind, or its numbers do not describe a
-                lens.
+            InputError: it does not exist, is of another kind, or does not describe a lens.
 
         """
         if file.suffix.lower() not in _ENDINGS:
@@ -92,7 +90,7 @@ class Lens:
         return cls((int(size[0]), int(size[1])), matrix, distortion.ravel())
 
     def write(self, file: Path, rms_px: float, views: int) -> None:
-        """Write the file, with how well it was found; its ending says the format."""
+        """Write the file in the format of its ending, with the quality of the fit."""
         store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_WRITE)
         store.write("image_width", self.size_px[0])
         store.write("image_height", self.size_px[1])
@@ -104,7 +102,7 @@ class Lens:
 
 
 def _stored(file: Path) -> tuple[list[float], list[Any]]:
-    """Width and height, and the two matrices; 0 and None where a name is missing.
+    """Width and height, and the two matrices; 0 and None for missing names.
 
     Raises:
         InputError: OpenCV cannot read the file.

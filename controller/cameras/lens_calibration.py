@@ -1,4 +1,4 @@
-"""The lens from pictures of a board: OpenCV's calibration, and how far it can be believed."""
+"""The lens from pictures of a board: OpenCV's calibration, and its accuracy."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from snakewalk.controller.cameras.calibration_board import BoardView
 from snakewalk.controller.cameras.lens import Lens
 
 FEWEST_VIEWS: Final = 5
-_OUTLIER: Final = 3.0  # times the usual view's residual: a blurred or misread picture (ours)
-_CELLS: Final = 6  # each way, in which corners are counted
-_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, which alone determine k3
+_OUTLIER: Final = 3.0  # times the median view's residual: a blurred or misread picture (ours)
+_CELLS: Final = 6  # in each direction, to count corners
+_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, which determine k3
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +64,9 @@ class LensCalibration:
 
 
 def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) -> LensCalibration:
-    """Find the lens; views far off the others are left out.
+    """Find the lens; outlying views are dropped.
 
-    Args:
-        views: the board found in each picture; None is left out.
-        size_px: width, height of the pictures.
+    ``views`` are the boards found in each picture, or None.
 
     Raises:
         InputError: too few views, or none that fix a lens.
@@ -94,7 +92,7 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
 def _calibrated(
     views: Mapping[int, BoardView], size_px: tuple[int, int], count: int
 ) -> LensCalibration:
-    """Calibrate with all of ``views``, which are known by their place among ``count``."""
+    """Calibrate with all of ``views``, by their index among ``count``."""
     board = [np.column_stack([v.corners_m, np.zeros(len(v.corners_m))]) for v in views.values()]
     try:
         rms, matrix, distortion, turns, _, errors, _, residuals = cv2.calibrateCameraExtended(

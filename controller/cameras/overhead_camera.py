@@ -1,8 +1,8 @@
 """A camera above the floor: from a frame to the body's line in the world.
 
-The floor maps to the image by one homography. The image shows the body's outline, which lies as
-high as its axis. From a lens at height ``h`` above the foot ``f``, a point at height ``z`` covers
-the floor further out, at ``g = f + (p - f) h / (h - z)``, and that is undone.
+The floor maps to the image by one homography. The image shows the body's outline, at the height of
+its axis. From a lens at height ``h`` above the foot ``f``, a point at height ``z`` covers the floor
+farther out, at ``g = f + (p - f) h / (h - z)``; this is inverted.
 """
 
 from collections.abc import Callable
@@ -37,13 +37,13 @@ from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _SHADOW, _LARGE_SHADOW = 0.02, 0.05  # of the body's area: dark and colourless next to it (ours)
-_SURROUNDINGS = 0.25  # of the picture's width: the square in which the body is a small part
+_SURROUNDINGS = 0.25  # of the picture's width: a square in which the body is small
 _MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
-_HALF = 2  # the floor is matched on a picture smaller by this factor
+_HALF = 2  # reduction of the picture to match the floor
 _PARTS = 6, 4  # of a picture, across and down
-_BETTER = 0.8  # share of the squared residual of a part, if a move explains it (ours)
+_BETTER = 0.8  # share of a part's squared residual, if a move explains it (ours)
 _LEAST_PARTS = 3
-_LIKE = 0.2  # correlation of two pictures of the floor, noise and robot included (ours)
+_LIKE = 0.2  # correlation of two floor pictures, noise and robot included (ours)
 _SURFACE_ROUNDS = 6
 """Rounds in which the ray of a pixel meets the ground: on 30 degrees each leaves a third (ours)."""
 MISPLACED_M = 0.03
@@ -53,7 +53,7 @@ _LEAST_AREA = 0.01  # of the image: four corners that span less fix no plane
 
 @dataclass(frozen=True, slots=True)
 class CameraModel:
-    """Where a pixel lies on the floor, and on a level plane above it."""
+    """Map from pixels to the floor, and to a level plane above it."""
 
     floor_from_px: Floats
     """(3, 3) homography, pixels (x right, y down, whole at the centre of a pixel) to metres."""
@@ -80,10 +80,10 @@ class CameraModel:
         lens: Lens | None,
         background: Image,
     ) -> Self:
-        """Build the model by the floor's printed markers, or without any that of a straight look.
+        """Build the model from the floor's markers, or without markers a vertical camera.
 
         Raises:
-            InputError: the markers fix no floor, as ``from_markers`` says.
+            InputError: as ``from_markers``.
 
         """
         if camera.markers_m is not None:
@@ -94,12 +94,12 @@ class CameraModel:
     def straight_down(
         cls, camera: CameraConfig, centre_m: tuple[float, float], lens: Lens | None = None
     ) -> Self:
-        """Build the model of an upright pinhole camera above ``centre_m``."""
+        """Build the model of a vertical pinhole camera above ``centre_m``."""
         scale = camera.field_width_m / camera.width_px
         c, s = scale * np.cos(camera.turn_rad), scale * np.sin(camera.turn_rad)
         x, y = 0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1)
         floor = np.eye(3)
-        floor[:2, :2] = [[c, s], [s, -c]]  # the image's y runs down
+        floor[:2, :2] = [[c, s], [s, -c]]  # the image's y points down
         floor[:2, 2] = centre_m[0] - (c * x + s * y), centre_m[1] - (s * x - c * y)
         return cls(floor, np.array(centre_m, dtype=float), camera.height_m, lens)
 
@@ -107,10 +107,10 @@ class CameraModel:
     def from_corners(
         cls, camera: CameraConfig, centre_m: tuple[float, float], lens: Lens | None = None
     ) -> Self:
-        """Build the model from four places that are known in the image and on the floor.
+        """Build the model from four places known in the image and on the floor.
 
         Raises:
-            InputError: none are given, or three of them lie on a line.
+            InputError: places are missing, or three are on a line.
 
         """
         if camera.corners_px is None or camera.corners_m is None:
@@ -138,10 +138,10 @@ class CameraModel:
     ) -> Self:
         """Build the model from printed markers in a picture of the empty floor.
 
-        Where the lens is known its height and foot are those that the markers show.
+        With a known lens the markers give its height and foot.
 
         Raises:
-            InputError: too few are seen, they lie on a line, or one is not where it was measured.
+            InputError: too few are seen, they are on a line, or one is off its measured place.
 
         """
         places = camera.marker_places_m
@@ -167,7 +167,7 @@ class CameraModel:
         return cls(fit.floor_from_px, foot, height, lens, markers=markers, distortion=distortion)
 
     def matrix(self, size_px: tuple[int, int]) -> Floats:
-        """(3, 3) camera matrix; without a known lens, that of a lens so high above this floor."""
+        """(3, 3) camera matrix; without a lens, that of a pinhole at this height."""
         if self.lens is not None:
             return self.lens.matrix
         middle = 0.5 * (np.array(size_px, dtype=float) - 1.0)
@@ -180,7 +180,7 @@ class CameraModel:
         return np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
 
     def on_plane(self, points_px: Floats, z_m: float) -> Floats:
-        """(..., 2) world places of pixels (..., 2) of points that are ``z_m`` above the ground."""
+        """(..., 2) world places of pixels (..., 2) of points ``z_m`` above the ground."""
         plain = points_px - self.moved_px
         if self.lens is not None:
             plain = self.lens.undistorted(plain)
@@ -195,15 +195,15 @@ class CameraModel:
         return np.asarray(places)
 
     def in_image(self, points_m: Floats, z_m: float) -> Floats:
-        """(..., 2) pixels of world places (..., 2) that are ``z_m`` above the ground."""
+        """(..., 2) pixels of world places (..., 2) ``z_m`` above the ground."""
         return self.projection(z_m)(points_m)
 
     def projection(self, z_m: float) -> Callable[[Floats], Floats]:
-        """``in_image`` of one height, for many calls."""
+        """``in_image`` at one height, for many calls."""
         if self.heights is not None:
             return self._projection_on(self.heights, z_m)
         grow = 1.0 / (1.0 - z_m / self.height_m)
-        onto_floor = np.diag([grow, grow, 1.0])  # a higher point covers the floor further out
+        onto_floor = np.diag([grow, grow, 1.0])  # a higher point covers the floor farther out
         onto_floor[:2, 2] = self.foot_m * (1.0 - grow)
         back = np.asarray(np.linalg.inv(self.floor_from_px) @ onto_floor, dtype=float)
         lens, moved_px = self.lens, np.array(self.moved_px)
@@ -215,7 +215,7 @@ class CameraModel:
         return project
 
     def _projection_on(self, heights: Heights, z_m: float) -> Callable[[Floats], Floats]:
-        """Return the same for places on uneven ground."""
+        """``projection`` on uneven ground."""
         back = np.linalg.inv(self.floor_from_px)
         moved_px = np.array(self.moved_px)
 
@@ -242,7 +242,7 @@ class LineDetection:
 
 @dataclass(frozen=True, slots=True)
 class OverheadDetector:
-    """Camera, empty floor and height of the body's axis; ``detect`` accepts any frame."""
+    """Camera, empty floor and height of the body's axis."""
 
     model: CameraModel
     background: Image
@@ -262,7 +262,7 @@ class OverheadDetector:
         """Find the body in one frame (H, W[, 3]).
 
         Raises:
-            InputError: the frame is not as large as the background.
+            InputError: the frame's size differs from the background's.
 
         """
         skeleton = self.detect_px(image).skeleton
@@ -270,13 +270,13 @@ class OverheadDetector:
         return LineDetection(time_s, line, skeleton.status)
 
     def registered(self, image: Image) -> Self:
-        """Return the detector for a camera that was bumped; itself where the floor has not moved.
+        """Return the detector for a bumped camera; itself if the floor has not moved.
 
-        Printed markers also measure turns and tilts. Without three of them in view the floor's own
-        texture is matched: tiles, joints. A floor without texture gives no result.
+        Printed markers also measure rotations and tilts. With fewer than three in view the floor's
+        own texture is matched (tiles, joints). A floor without texture gives no result.
 
         Raises:
-            InputError: the frame is not as large as the background.
+            InputError: the frame's size differs from the background's.
 
         """
         self._check_size(image)
@@ -293,7 +293,7 @@ class OverheadDetector:
         return self._moved_by_texture(image)
 
     def _moved_by_markers(self, first: Self, move: PictureMove, size_px: tuple[int, int]) -> Self:
-        """Return the first detector with this move of its picture, where it is another than now."""
+        """Return the first detector with this move of its picture, if it differs from now."""
         known, now = self.bump or Bump((0.0, 0.0)), move.bump
         corners = np.array(
             [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
@@ -324,10 +324,10 @@ class OverheadDetector:
         return replace(self, model=model, background=ground, bump=now, first=first, pictured=None)
 
     def _moved_by_texture(self, image: Image) -> Self:
-        """The shift under which the floor's own texture lies best.
+        """Detector with the best shift of the floor's texture.
 
-        Moving objects cover parts of the picture, so the move must explain three parts more than it
-        spoils.
+        Moving objects cover parts of the picture, so the move must improve three parts more than it
+        worsens.
         """
         floor, now = (_texture(one) for one in (self.background, image))
         far = _FURTHEST_PX // _HALF
@@ -364,10 +364,10 @@ class OverheadDetector:
     def track(
         self, image: Image, time_s: float, prior: BodyPrior, robot: RobotConfig
     ) -> TrackedPose:
-        """Find the robot in one frame near to where it is believed; nothing else is looked at.
+        """Find the robot in one frame near its expected place only.
 
         Raises:
-            InputError: the frame is not as large as the background.
+            InputError: the frame's size differs from the background's.
 
         """
         self._check_size(image)
@@ -398,17 +398,17 @@ class OverheadDetector:
         """Silhouette and skeleton of a frame, in pixels.
 
         Raises:
-            InputError: the frame is not as large as the background.
+            InputError: the frame's size differs from the background's.
 
         """
         apart = self._apart(image)
         return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
 
     def outline(self, image: Image, time_s: float) -> LineDetection:
-        """Find the body in one frame (H, W[, 3]) by its outline alone: a tenth of the time.
+        """Find the body in one frame (H, W[, 3]) by its outline only, in a tenth of the time.
 
         Raises:
-            InputError: the frame is not as large as the background.
+            InputError: the frame's size differs from the background's.
 
         """
         apart = self._apart(image)
@@ -420,7 +420,7 @@ class OverheadDetector:
         return LineDetection(time_s, line, skeleton.status)
 
     def _apart(self, image: Image) -> Image:
-        """(H, W) grey levels by which a frame is off its floor."""
+        """(H, W) grey levels of a frame's difference from its floor."""
         self._check_size(image)
         floor = self.background
         lit = lit_floor(image, floor, 0.5 * (_SURROUNDINGS * image.shape[1]) ** 2)
@@ -432,7 +432,7 @@ def _next_to_shadow(
 ) -> TrackedPose:
     """Find a body next to a hard shadow by its colour.
 
-    If the body has no colour, the shadow may be the body, so its place is rejected.
+    A colourless body may be the shadow, so its place is rejected.
     """
     by_colour = track_pose(robot, contrast.standing_out(DEEP_SHADE), prior, found.time_s)
     if not by_colour.fault:
@@ -443,7 +443,7 @@ def _next_to_shadow(
 
 
 def _texture(image: Image) -> NDArray[np.float32]:
-    """(H / 2, W / 2) edges of a picture: light that changes slowly is not among them."""
+    """(H / 2, W / 2) edges of a picture, without slow changes of light."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     half = grey.shape[1] // _HALF, grey.shape[0] // _HALF
     small = cv2.resize(grey, half, interpolation=cv2.INTER_AREA).astype(np.float32)
@@ -454,7 +454,7 @@ def _texture(image: Image) -> NDArray[np.float32]:
 def _parts_explained(
     now: NDArray[np.float32], floor: NDArray[np.float32], moved: NDArray[np.float32]
 ) -> int:
-    """How many more parts of the picture are like the moved floor than like the one before."""
+    """Number of picture parts that the move improves, minus those that it worsens."""
     far = _FURTHEST_PX // _HALF
     before, after = (
         cv2.resize(
@@ -466,7 +466,7 @@ def _parts_explained(
 
 
 def _peak(values: Floats) -> float:
-    """Place of the top of the parabola through three values, from the middle one."""
+    """Offset of the vertex of the parabola through three values from the middle one."""
     bend = float(values[0] - 2.0 * values[1] + values[2])
     return 0.0 if bend >= 0.0 else 0.5 * float(values[0] - values[2]) / bend
 

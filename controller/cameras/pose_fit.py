@@ -1,8 +1,8 @@
 """The pose of a chain of known shape from the detected line of its body.
 
-The joints are measured, so only place and heading are open. The link centres by forward kinematics
-are fitted to the detected line by Procrustes' rigid fit, evenly spaced from its middle. The middle
-may shift a little: a tip that is hidden or sticks out moves it.
+The joints are measured, so only place and heading are unknown. The link centres by forward
+kinematics are fitted to the line by Procrustes' rigid fit, evenly spaced from its middle. The
+middle may shift slightly: a tip that is hidden or sticks out moves it.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ _BLUR_M = 0.003
 """Usual error of a link's place on the line."""
 _TIPS_M = 0.02
 """How far the line's middle may be off the body's."""
-_STIFF = _BLUR_M / _TIPS_M  # holds the slide itself near 0, not a step of it
-_ALIKE = 0.2  # share of a link's variance that all links have in common (ours)
-_REGULAR = 3e-5  # a straight body's slide and shift are one thing: neither runs away
+_STIFF = _BLUR_M / _TIPS_M  # keeps the total slide near 0, not one step
+_ALIKE = 0.2  # share of a link's variance common to all links (ours)
+_REGULAR = 3e-5  # limits slide and shift of a straight body, which are equivalent
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +43,7 @@ class PoseFit:
 def fit_both_ends(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tuple[PoseFit, PoseFit]:
     """Fit with the line's first end as the head, and with its last end.
 
-    Args:
-        robot: its links.
-        line_m: (P, 2) from tip to tip.
-        joint_rad: (J,) measured when the line was detected.
-
+    ``line_m`` (P, 2) is from tip to tip; ``joint_rad`` (J,) were measured at its time.
     """
     body = body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad)
     links = body.link_m[:, :2]
@@ -81,7 +77,7 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
 
 
 def _along(line_m: Floats, arc: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Places (L, 2) on the line and its directions there; beyond its ends it goes on straight."""
+    """Places (L, 2) on the line and its directions; straight beyond its ends."""
     k = np.clip(np.searchsorted(arc, at), 1, len(arc) - 1)
     step = line_m[k] - line_m[k - 1]
     ahead = step / np.maximum(arc[k] - arc[k - 1], 1e-9)[:, None]
@@ -91,10 +87,10 @@ def _along(line_m: Floats, arc: Floats, at: Floats) -> tuple[Floats, Floats]:
 def _shift_along(
     links: Floats, ahead: Floats, away: Floats, weight: Floats, shifted_m: float
 ) -> float:
-    """How much further along the line the links lie, where the body's bends show it.
+    """Additional slide of the links along the line, from the body's bends.
 
-    One step of least squares for slide, shift and turn together; tips that are lost or stick out
-    move the middle by a few millimetres, and a straight body leaves it there.
+    One least squares step for slide, shift and turn. Lost or protruding tips move the middle by a
+    few millimetres; a straight body keeps it.
     """
     matrix = _motions(links, ahead, weight)
     target = np.append(away.ravel() * np.sqrt(np.repeat(weight, 2)), -_STIFF * shifted_m)
@@ -102,7 +98,7 @@ def _shift_along(
 
 
 def _motions(links: Floats, ahead: Floats, weight: Floats) -> Floats:
-    """(2 L + 1, 4) weighted motion of the links for a shift, a turn and a slide along the line."""
+    """(2 L + 1, 4) weighted motion of the links for a shift, a turn and a slide."""
     count = len(links)
     one, none = np.ones(count), np.zeros(count)
     columns = [
@@ -117,7 +113,7 @@ def _motions(links: Floats, ahead: Floats, weight: Floats) -> Floats:
 
 
 def _covariance(links: Floats, ahead: Floats, weight: Floats, error_m: float) -> Floats:
-    """(3, 3) of the head's place and heading; ``links`` (L, 2) lie relative to the head's."""
+    """(3, 3) of the head's place and heading; ``links`` (L, 2) are relative to the head."""
     matrix = _motions(links, ahead, weight)
     error_m = max(error_m, 0.5 * _BLUR_M)
     turn = 12.0 * _ALIKE / float(np.square(links[-1] - links[0]).sum() + 1e-9)
@@ -126,7 +122,7 @@ def _covariance(links: Floats, ahead: Floats, weight: Floats, error_m: float) ->
 
 
 def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """Turn (2, 2) and shift (2,) of ``links`` to ``line`` with the least squares."""
+    """Least squares rotation (2, 2) and shift (2,) of ``links`` to ``line``."""
     share = weight / weight.sum()
     a, b = (share[:, None] * links).sum(axis=0), (share[:, None] * line).sum(axis=0)
     p, q = links - a, line - b
@@ -138,5 +134,5 @@ def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]
 
 
 def _turned(points: Floats, turn: Floats) -> Floats:
-    """Points (..., 2) after ``turn`` (2, 2): as ``points @ turn.T``, in one order of sums."""
+    """Points (..., 2) after ``turn`` (2, 2): ``points @ turn.T`` with a fixed order of sums."""
     return np.asarray(points[..., :1] * turn[:, 0] + points[..., 1:] * turn[:, 1])

@@ -1,9 +1,9 @@
-"""The pose of a chain of known shape in a frame, near to where it must be.
+"""The pose of a chain of known shape in a frame, near its expected pose.
 
-The joints are measured and the last pose is known, so the search is for the complete chain. First
-its axis is fitted on a ridge filter of the difference from the floor. Then, section by section
-across the body, the middle of the difference is fitted rigidly. Only what lies near the body is
-looked at.
+The joints are measured and the last pose is known, so the complete chain is searched. First its
+axis is fitted on a ridge filter of the difference from the floor. Then the middles of the
+difference across the body, section by section, are fitted rigidly. Only the surroundings of the
+body are used.
 """
 
 from collections.abc import Callable
@@ -24,33 +24,33 @@ REACH_M: Final = 0.10
 _TURN_RAD: Final = 0.15
 _STEP_M, _STEP_RAD = 0.0125, 0.0375  # of the search
 _ROUNDS: Final = 8
-_WIDE: Final = 2.0  # radii to each side that a section looks at, at first
-_NARROW: Final = 1.5  # and then
+_WIDE: Final = 2.0  # initial half width of a section, radii
+_NARROW: Final = 1.5  # final one
 _STILL_M: Final = 3e-4  # a smaller step ends the fit
 _SAMPLES: Final = 17
 _OUTER: Final = 2  # of them, at each end of a section
 _FREE: Final = 0.3  # share of the body's contrast there, without another object (ours)
-_LEAST_FREE: Final = 0.5  # of the sections: with fewer free ones all count
+_LEAST_FREE: Final = 0.5  # of the sections: with fewer free ones all are used
 _SECTION_M: Final = 0.003  # usual error of a section's middle
 _TIP_M: Final = 0.012  # of a tip: heads and tails differ from the model
-_CAP: Final = 0.4  # of the radius: by how much a tip sticks out of its link
+_CAP: Final = 0.4  # of the radius: a tip beyond its link
 _REGULAR: Final = np.array([1e-6, 1e-6, 1e-6])
 _LEAST_SEEN: Final = 0.7  # of the sections
 _LEAST_HALF: Final = 0.5  # of those of each half of the body
-_OFF: Final = 0.3  # of the radius: largest residual of a fit that is believed
-_OFF_IN_BLOCKS: Final = 0.2  # the same in a compressed frame, whose blocks are alike (ours)
+_OFF: Final = 0.3  # of the radius: largest residual of an accepted fit
+_OFF_IN_BLOCKS: Final = 0.2  # the same in a compressed frame (ours)
 _SIGMA_IN_BLOCKS: Final = 0.25  # of the radius: largest standard deviation there (ours)
 _TOO_COMPRESSED: Final = "the frame is compressed too strongly; raise the camera's JPEG quality"
 _TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
 _NO_TIP: Final = "a tip of the body is not where it must be"
 _BOTH: Final = np.array([False, False])
 _ONE_HIDDEN: Final = np.array([True, False]), np.array([False, True])
-_SURE_M: Final = 0.008  # largest standard deviation of a pose of which one tip is hidden (ours)
+_SURE_M: Final = 0.008  # largest standard deviation of a pose with one hidden tip (ours)
 _UNKNOWN: Final = np.array([REACH_M, REACH_M, _TURN_RAD])  # if the frame shows nothing
-_ALIKE: Final = 1.0  # sections next to each other have similar errors (ours)
+_ALIKE: Final = 1.0  # adjacent sections have similar errors (ours)
 _ALIKE_IN_BLOCKS: Final = 4.0  # the same in a compressed frame (ours)
-_SHAPE: Final = 0.04  # radii: error of all sections together, from the body's look (ours)
-_THIN, _THICK = 0.2, 1.5  # of the body's width: limits of the content of a section
+_SHAPE: Final = 0.04  # radii: common error of all sections, from the body's look (ours)
+_THIN, _THICK = 0.2, 1.5  # of the body's width: limits of a section's content
 
 
 ToPixels = Callable[[Floats], Floats]
@@ -59,7 +59,7 @@ ToPixels = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, slots=True)
 class BodyPrior:
-    """Where a chain is believed to be when a frame is taken."""
+    """Expected chain at the time of a frame."""
 
     links_m: Floats
     """(L, 2) centres of the links in the world, the head's first."""
@@ -117,10 +117,9 @@ class StandingOut:
 def track_pose(
     robot: RobotConfig, seen: StandingOut, prior: BodyPrior, time_s: float
 ) -> TrackedPose:
-    """Find the chain near to where it is believed.
+    """Find the chain near its expected place.
 
-    From frame to frame the belief is off by little, so the search is made only where a fit from
-    the belief itself fails.
+    The expectation is usually close, so a search is made only if a fit from it fails.
     """
     chain = _chain(robot, prior)
     found = _fit(robot, seen, chain, time_s, (np.zeros(2), 0.0))
@@ -132,7 +131,7 @@ def track_pose(
 
 @dataclass(frozen=True, slots=True)
 class _Chain:
-    """Where sections and tips of a believed body lie."""
+    """Sections and tips of an expected body."""
 
     places_m: Floats
     """(S, 2) two sections a link."""
@@ -228,9 +227,9 @@ def _fit(
     time_s: float,
     start: tuple[Floats, float],
 ) -> TrackedPose:
-    """Fit the chain rigidly from a shift (2,) and a turn about its middle on.
+    """Fit the chain rigidly from a shift (2,) and a turn about its middle.
 
-    If one tip is not at its place while all the rest is, that tip counts as hidden.
+    If only one tip is off its place, it counts as hidden.
     """
     found = _fit_tips(robot, seen, chain, time_s, start, _BOTH)
     if found.fault != _NO_TIP:
@@ -286,7 +285,7 @@ def _fit_tips(
 
 
 def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -> Floats:
-    """(3, 3) of the head, which lies at ``head_m`` from the middle of the sections."""
+    """(3, 3) of the head at ``head_m`` from the middle of the sections."""
     size = np.abs(look.target)
     usual = max(1.0, 1.4826 * float(np.median(size))) if size.size else 1.0
     weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))
@@ -302,9 +301,9 @@ def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -
 def _search(
     seen: StandingOut, places: Floats, middle: Floats, radius_m: float
 ) -> tuple[Floats, float]:
-    """Shift (2,) and turn under which the chain's axis lies best on a ridge."""
+    """Shift (2,) and turn with the chain's axis best on a ridge."""
     px = seen.to_px(middle + np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]]))
-    grow = (px[1:] - px[0]) / 0.01  # (2, 2) rows: pixels for a metre of x, of y
+    grow = (px[1:] - px[0]) / 0.01  # (2, 2) rows: pixels per metre of x, of y
     radius = radius_m * float(np.sqrt(abs(np.linalg.det(grow))))
     ridge = cv2.GaussianBlur(seen.share, (0, 0), 0.5 * radius) - cv2.GaussianBlur(
         seen.share, (0, 0), 1.5 * radius
@@ -336,26 +335,26 @@ def _search(
 
 
 def _section_spots(here: Floats, forward: Floats, wide_m: float) -> tuple[Floats, Floats]:
-    """Places (S, N, 2) across the chain, and how far left (N,) of it they lie."""
+    """Places (S, N, 2) across the chain, and their offsets (N,) to the left."""
     off = np.linspace(-wide_m, wide_m, _SAMPLES)
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
     return here[:, None] + off[:, None] * normal[:, None], off
 
 
 def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, Floats]:
-    """Offset (S,) of the middle of the difference to the left of the chain, and its width (S,)."""
+    """Left offset (S,) of the middle of the difference, and its width (S,)."""
     content = value.sum(axis=1)
     width = content * (off[1] - off[0]) / (2.0 * radius_m)
     return (value @ off) / np.maximum(content, 1e-9), width
 
 
 def _outside(value: Floats) -> Floats:
-    """(S,) how much stands out at the outer ends of the sections (S, N), on the worse side."""
+    """(S,) difference at the outer ends of the sections (S, N), on the worse side."""
     return np.asarray(np.maximum(value[:, :_OUTER].mean(axis=1), value[:, -_OUTER:].mean(axis=1)))
 
 
 def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floats]:
-    """Places (2, N, 3, 2) along the chain's tips, and how far beyond (N,) them they lie."""
+    """Places (2, N, 3, 2) along the chain's tips, and their distances (N,) beyond."""
     off = np.linspace(-1.5 * radius_m, 2.5 * radius_m, 2 * _SAMPLES)
     normal = np.stack([-out[:, 1], out[:, 0]], axis=1)
     side = 0.4 * radius_m * np.array([-1.0, 0.0, 1.0])
@@ -367,7 +366,7 @@ def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floa
 
 
 def _tips(value: Floats, off: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """How far beyond the chain's tips (2,) the body ends, and where an end is seen."""
+    """Distances (2,) of the body's ends beyond the chain's tips, and whether they are visible."""
     value = value.max(axis=2)
     end = off[0] + value.sum(axis=1) * (off[1] - off[0])
     told = (value[:, :4].mean(axis=1) > 0.5) & (value[:, -4:].mean(axis=1) < 0.3)
@@ -375,7 +374,7 @@ def _tips(value: Floats, off: Floats) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 def _rows(r: Floats, direction: Floats) -> Floats:
-    """(N, 3) by how much a shift and a turn move points at ``r`` along ``direction``."""
+    """(N, 3) motion of points at ``r`` along ``direction`` for a shift and a turn."""
     turned = direction[:, 1] * r[:, 0] - direction[:, 0] * r[:, 1]
     return np.column_stack([direction, turned])
 

@@ -55,7 +55,7 @@ def top_view(
 def rendered_detector(
     run: RunConfig, robot: RobotConfig, floor: Image, ground: HeightField | None = None
 ) -> OverheadDetector:
-    """Build the detector of the simulator's camera from its picture (H, W, 3) of the empty floor.
+    """Build the detector of the simulator's camera from a picture (H, W, 3) of the empty floor.
 
     Raises:
         InputError: its markers fix no floor.
@@ -68,12 +68,12 @@ def rendered_detector(
 
 
 class RenderedCamera:
-    """The simulated robot from above; each frame arrives one period after it was taken.
+    """The simulated robot from above; each frame arrives a period after it was taken.
 
-    A frame is taken at the first read of the joints at or after its time, and dated with that read.
+    A frame is taken at the first joint read at or after its time, and dated with it.
 
     Raises:
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: no off-screen OpenGL.
 
     """
 
@@ -99,11 +99,11 @@ class RenderedCamera:
         require_whole_body(self.first(), "the simulated camera")
 
     def first(self) -> LineDetection:
-        """Look now."""
+        """Detect the body now."""
         return self._detect(self._clock.now_s())
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
-        """Capture a frame if one is due; return those that have arrived."""
+        """Capture a frame if due; return arrived ones."""
         if now_s >= self._next_s - 1e-9:
             self._coming.append(self._track(now_s, prior_at(now_s)))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)

@@ -1,9 +1,9 @@
-"""How child processes are started: the one place, so that all of them have a safe module path.
+"""Start of child processes with a safe module path; the only place for it.
 
-A child interpreter searches the working folder first, before it runs a line of this program: a
-file ``multiprocessing.py`` or ``resource.py`` next to a downloaded model would be executed.
-``PYTHONSAFEPATH`` prevents it. Isolated mode (``-I``) would also ignore the user's ``PYTHONPATH``
-and packages (``pip install --user``), from which ROS and other dependencies may come.
+A child interpreter searches the working folder first: a file ``multiprocessing.py`` or
+``resource.py`` next to a downloaded model would be executed. ``PYTHONSAFEPATH`` prevents it.
+Isolated mode (``-I``) would also ignore the user's ``PYTHONPATH`` and packages (``pip install
+--user``), which ROS and other dependencies may need.
 """
 
 import os
@@ -29,7 +29,7 @@ _LOCK: Final = threading.RLock()
 
 
 def child_environ() -> dict[str, str]:
-    """Return the environment of a child: this one, with a safe module path."""
+    """Environment of a child: that of this process, with a safe module path."""
     environ = dict(os.environ)
     environ["PYTHONSAFEPATH"] = "1"
     folders = module_folders(environ)
@@ -40,7 +40,7 @@ def child_environ() -> dict[str, str]:
 
 
 def start_module(module: str, *arguments: str) -> "subprocess.Popen[str]":
-    """Start a Python module in a child; its output is a pipe of text."""
+    """Start a Python module in a child; its output is a text pipe."""
     return subprocess.Popen(
         [sys.executable, "-m", module, *arguments],
         stdout=subprocess.PIPE,
@@ -52,13 +52,10 @@ def start_module(module: str, *arguments: str) -> "subprocess.Popen[str]":
 def run_code(
     code: str, *arguments: str, folder: Path | None = None, timeout_s: float | None = None
 ) -> "subprocess.CompletedProcess[str]":
-    """Run Python code in a child and wait; returns its exit code and output as text.
+    """Run Python code in a child and wait; return its exit code and output as text.
 
-    Args:
-        code: the program.
-        arguments: of the program.
-        folder: working folder of the child; default: that of this process.
-        timeout_s: the child is killed after this time.
+    ``folder`` is its working folder, by default that of this process. It is killed after
+    ``timeout_s``.
 
     Raises:
         TimeoutError: the child was killed.
@@ -70,7 +67,7 @@ def run_code(
 def run_program(
     command: Sequence[str], folder: Path | None = None, timeout_s: float | None = None
 ) -> "subprocess.CompletedProcess[str]":
-    """Run a program as ``run_code`` runs Python code.
+    """Run a program like ``run_code``.
 
     Raises:
         TimeoutError: the program was killed.
@@ -94,11 +91,8 @@ def run_program(
 def start(target: Callable[..., object], *arguments: Any, daemon: bool = False) -> SpawnProcess:
     """Start ``target(*arguments)`` in a fresh interpreter that leaves Ctrl-C to this process.
 
-    Args:
-        target: a function of a module.
-        arguments: picklable values.
-        daemon: whether the child is killed when this process exits.
-
+    ``target`` is a function of a module, ``arguments`` are picklable. A ``daemon`` is killed when
+    this process exits.
     """
     process = _CONTEXT.Process(target=target, args=arguments, daemon=daemon)
     with _starting():
@@ -107,16 +101,16 @@ def start(target: Callable[..., object], *arguments: Any, daemon: bool = False) 
 
 
 def pipe() -> tuple[Connection, Connection]:
-    """Return both ends of a line between this process and a child."""
+    """Return both ends of a connection to a child."""
     return _CONTEXT.Pipe()
 
 
 class SafePool(ProcessPoolExecutor):
-    """A pool of fresh interpreters, started as ``start`` does."""
+    """A pool of fresh interpreters, started like ``start``."""
 
     def __init__(self, workers: int, begin: Callable[..., object], *arguments: Any) -> None:
         """Make a pool; each worker calls ``begin(*arguments)`` first."""
-        with _starting():  # its locks start a process, too
+        with _starting():  # its locks start a process too
             super().__init__(workers, _CONTEXT, begin, arguments)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
@@ -127,7 +121,7 @@ class SafePool(ProcessPoolExecutor):
 
 @contextmanager
 def _starting() -> Iterator[None]:
-    """Let the children started in this block inherit a safe module path and a blocked SIGINT.
+    """Give children started in this block a safe module path and a blocked SIGINT.
 
     A terminal sends Ctrl-C to all processes; this one decides what the children do.
     """
@@ -147,7 +141,7 @@ def _starting() -> Iterator[None]:
 
 
 def _set_environ(environ: dict[str, str]) -> None:
-    """Set the two variables that decide where a child finds modules."""
+    """Set the two variables for a child's module path."""
     for name in ("PYTHONSAFEPATH", "PYTHONPATH"):
         if name in environ:
             os.environ[name] = environ[name]

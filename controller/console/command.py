@@ -41,8 +41,7 @@ def command(
 ) -> Callable[[F], F]:
     """Declare a function as a command; ``python -m tests.architecture.manifests`` lists it.
 
-    The files of ``results`` and ``tables`` are checked before the module of the command is
-    imported.
+    The files of ``results`` and ``tables`` are checked before its module is imported.
     """
 
     def declare(function: F) -> F:

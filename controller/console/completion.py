@@ -1,7 +1,7 @@
-"""Values that the shell completes: shipped names, a user's files, and the words of a choice.
+"""Shell completion: shipped names, a user's files, and the words of a choice.
 
-Each function receives the typed text and returns its completions. A shell completes any other file
-by itself where these return nothing.
+Each function maps the typed text to its completions. Without completions, the shell completes
+files.
 """
 
 from collections.abc import Callable
@@ -12,12 +12,9 @@ Complete = Callable[[str], list[str]]
 
 
 def names(*kinds: str, files: tuple[str, ...] = (".toml",)) -> Complete:
-    """Return the completion of shipped names of ``kinds``, and of files with these endings.
+    """Completion of shipped names of ``kinds``, and of files with these endings.
 
-    Args:
-        kinds: folders of the shipped configurations, ``all gaits`` or ``spine gaits``.
-        files: endings of one's own files that may stand in place of a name.
-
+    ``kinds`` are folders of shipped configurations, ``all gaits`` or ``spine gaits``.
     """
 
     def complete(incomplete: str) -> list[str]:
@@ -28,12 +25,12 @@ def names(*kinds: str, files: tuple[str, ...] = (".toml",)) -> Complete:
 
 
 def words(*choices: str) -> Complete:
-    """Return the completion of a choice among fixed words."""
+    """Completion of fixed words."""
     return lambda incomplete: [word for word in choices if word.startswith(incomplete)]
 
 
 def keys(incomplete: str) -> list[str]:
-    """Keys of ``--set``, each with its ``=``; ``run``, ``robot`` and ``world`` name the file."""
+    """Keys of ``--set``, each with ``=``; ``run``, ``robot`` and ``world`` name the file."""
     return [f"{key}=" for key in _loader().known_keys() if key.startswith(incomplete)]
 
 
@@ -52,7 +49,7 @@ def _loader() -> ModuleType:
 
 
 def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
-    """Files with these endings, and folders, in the folder that ``incomplete`` names so far."""
+    """Files with these endings, and folders, in the typed folder."""
     folder, slash, start = incomplete.rpartition("/")
     place = Path(f"{folder}{slash}") if slash else Path()
     if not place.is_dir():

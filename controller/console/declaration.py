@@ -1,9 +1,8 @@
-"""Declaration of a command, read from its file without importing what its body uses.
+"""Declaration of a command, read without importing the modules that its body uses.
 
-``--help``, completion and the check of options need a command's signature, docstring and
-``@command`` only. A module of a command imports everything that it uses at its top, which costs
-seconds. This module therefore evaluates only the statements of the file that the declaration
-needs. The whole module is imported when the command runs.
+``--help``, completion and the check of options need only a command's signature, docstring and
+``@command``. Importing its module costs seconds. So this module evaluates only the statements that
+the declaration needs. The whole module is imported when the command runs.
 """
 
 import ast
@@ -17,13 +16,9 @@ _COMMANDS: Final = ".commands."
 
 
 def declaration(target: str) -> Callable[..., Any] | None:
-    """Return a function with the signature, docstring and declaration of a command.
+    """Function with the signature, docstring and declaration of a command; do not call it.
 
-    The function must not be called. Returns None if the source of the module is not available.
-
-    Args:
-        target: ``module:function``.
-
+    ``target`` is ``module:function``. Returns None if the module's source is not available.
     """
     module, _, name = target.partition(":")
     names = _names(module, {name}, is_declared=True)
@@ -31,9 +26,9 @@ def declaration(target: str) -> Callable[..., Any] | None:
 
 
 def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[str, Any] | None:
-    """Return names of a module's namespace, after the statements that they need.
+    """Names of a module's namespace, after the statements that they need.
 
-    ``is_declared`` leaves the bodies of the named functions out.
+    ``is_declared`` omits the bodies of the named functions.
     """
     spec = importlib.util.find_spec(module)
     file = Path("" if spec is None or spec.origin is None else spec.origin)
@@ -63,7 +58,7 @@ def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[s
 
 
 def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
-    """Return the names that an import statement provides, as far as they are needed."""
+    """Needed names of an import statement."""
     namespace: dict[str, Any] = {}
     if isinstance(node, ast.ImportFrom):
         needed = [each for each in node.names if (each.asname or each.name) in names]

@@ -1,4 +1,4 @@
-"""Kind of a device by its name; nothing is opened, so that no line of an adapter changes."""
+"""Kind of a device by its name; opening it would change lines of an adapter."""
 
 import os
 import stat
@@ -8,7 +8,7 @@ from snakewalk.drivers.errors import PortError
 
 try:
     import termios
-except ImportError:  # Windows: opening a port reports what to do there
+except ImportError:  # Windows: opening a port reports the remedy
     termios = None  # type: ignore[assignment]
 
 _NO_DEVICES = ("sim", "robot")
@@ -18,9 +18,9 @@ _PSEUDO_TERMINALS = range(136, 144)
 
 
 def check_port_name(port: str | None) -> str | None:
-    """Return ``--port`` if no name in it is that of a file, a folder or another kind of device.
+    """Return ``--port`` if no name in it is a file, a folder or another kind of device.
 
-    A name that does not exist passes; opening it reports that.
+    A missing name passes; opening it reports that.
 
     Raises:
         PortError: one line per fault.

@@ -18,12 +18,12 @@ class Finding:
     """Remedy; empty if all is well."""
 
     def to_dict(self) -> dict[str, str]:
-        """For JSON."""
+        """Fields for JSON."""
         return asdict(self)
 
 
 def worst(findings: list[Finding]) -> Grade:
-    """Grade of the whole."""
+    """Worst grade of the findings."""
     grades = {finding.grade for finding in findings}
     return "fail" if "fail" in grades else "warn" if "warn" in grades else "ok"
 
@@ -44,9 +44,9 @@ def shown_ids(servo_ids: Sequence[int]) -> str:
 def shown_subject(
     servo_ids: Sequence[int], verb: str, label: Callable[[int], str] | None = None
 ) -> str:
-    """``servo 3 answers``, ``servos 1 to 4 answer``; ``verb`` is the plural.
+    """``servo 3 answers``, ``servos 1 to 4 answer``; ``verb`` is plural.
 
-    ``label`` returns the text for a single servo whose joint is known.
+    ``label`` returns the text for a single servo with a known joint.
     """
     irregular = {
         **{"have": "has", "are": "is", "reply": "replies", "switch": "switches"},

@@ -1,4 +1,4 @@
-"""Findings as a table, or as JSON; a fault ends the command with 1."""
+"""Findings as a table, or as JSON; a fault ends the command with exit code 1."""
 
 import json
 from collections.abc import Mapping
@@ -13,10 +13,10 @@ _COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 
 def show_findings(findings: list[Finding], facts: Mapping[str, object], as_json: bool) -> None:
-    """Print findings, in JSON behind ``facts``.
+    """Print findings; in JSON after ``facts``.
 
     Raises:
-        SystemExit: with 1, where one of them is a fault.
+        SystemExit: with 1 after a fault.
 
     """
     grade = worst(findings)

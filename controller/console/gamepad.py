@@ -1,4 +1,4 @@
-"""A gamepad through Linux's joystick interface (``/dev/input/js0``): eight bytes an event.
+"""A gamepad through Linux's joystick interface (``/dev/input/js0``): eight bytes per event.
 
 ``struct js_event``: time in ms (u32), value (i16), type (u8: 1 button, 2 axis, 0x80 at the start),
 number (u8); Documentation/input/joydev/joystick-api.rst of the kernel.
@@ -27,7 +27,7 @@ AXES = {0: ("left", "right"), 1: ("up", "down"), 6: ("left", "right"), 7: ("up",
 
 
 class Pad:
-    """Makes key names of events; a stick counts once each time it leaves the middle."""
+    """Converts events to key names; a stick counts once each time it leaves the middle."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -36,11 +36,11 @@ class Pad:
 
     @property
     def held(self) -> bool:
-        """Whether one of the dead man's buttons is down."""
+        """Whether a dead man's button is held."""
         return bool(self._down)
 
     def keys(self, data: bytes) -> list[str]:
-        """Names of the keys that ``data`` (any number of bytes) means."""
+        """Key names of ``data``, any number of bytes."""
         found: list[str] = []
         data = self._rest + data
         whole = len(data) - len(data) % _EVENT.size
@@ -59,7 +59,7 @@ class Pad:
 
 
 class Gamepad:
-    """The device; use as a context manager."""
+    """The device, as a context manager."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -75,12 +75,12 @@ class Gamepad:
 
     @property
     def gone(self) -> str | None:
-        """Why its buttons do not work any more, or None."""
+        """Reason why its buttons fail, or None."""
         return f"{self._path}: the gamepad is gone, and its E-STOP with it" if self._gone else None
 
     @property
     def held(self) -> bool:
-        """Whether a shoulder button is held; a pad that is gone holds none."""
+        """Whether a shoulder button is held; False for a lost pad."""
         return self._pad.held and not self._gone
 
     def __enter__(self) -> Self:
@@ -108,6 +108,6 @@ class Gamepad:
                 self._is_written = True
         except BlockingIOError:
             return self._pad.keys(data)
-        except OSError:  # unplugged, or its radio is out of reach
+        except OSError:  # unplugged, or out of radio range
             self._gone = True
         return self._pad.keys(data)

@@ -1,4 +1,4 @@
-"""Keys of the terminal, one by one, without waiting for a line or for a key."""
+"""Keys of the terminal, without waiting for a line or a key."""
 
 import os
 import select
@@ -25,7 +25,7 @@ _READS_MAX = 16
 
 
 def names(text: str) -> list[str]:
-    """Names of the keys whose characters a terminal sent; arrows come as three each."""
+    """Names of the keys in terminal characters; arrows are three characters each."""
     found: list[str] = []
     at = 0
     while at < len(text):
@@ -41,7 +41,7 @@ def names(text: str) -> list[str]:
 
 
 class Keyboard:
-    """A terminal in cbreak mode; use as a context manager, which restores it."""
+    """A terminal in cbreak mode, as a context manager."""
 
     held = True
     """A keyboard has no dead man's button."""

@@ -1,6 +1,6 @@
-"""Compile every loop in advance: two child processes share the packages.
+"""Compile every loop in advance, in two child processes.
 
-A module is imported to compile its loops; numba stores the machine code next to the module.
+Importing a module compiles its loops; numba stores the machine code next to the module.
 """
 
 import importlib
@@ -23,7 +23,7 @@ _COMPILED: Final = "snakewalk.drivers.compiling"
 
 
 def loop_modules(package: str) -> list[str]:
-    """Return the names of the modules of a package that have a loop; none is imported."""
+    """Names of the modules of a package with a loop; imports none."""
     found: list[str] = []
     folder = Path(__file__).resolve().parents[2]
     for part in package.split(".")[1:]:
@@ -39,10 +39,9 @@ def loop_modules(package: str) -> list[str]:
 
 
 def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
-    """Compile all loops and return the number that the cache did not contain.
+    """Compile all loops and return the number that was not in the cache.
 
-    Args:
-        on_module: called with the number of modules that are done, their total, and a name.
+    ``on_module`` is called with the number of finished modules, their total, and a name.
 
     Raises:
         RuntimeError: a child failed; its output is above.
@@ -79,7 +78,7 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
 
 
 def _step_a_body() -> None:
-    """Compile the steps of the physics, whose types are MuJoCo's, by a first call."""
+    """Compile the physics' steps, whose types are MuJoCo's, by a first call."""
     if importlib.util.find_spec("mujoco") is None:
         return
     plant = importlib.import_module("snakewalk.sim.physics.plant")
@@ -91,7 +90,7 @@ def _step_a_body() -> None:
 
 
 def _compile_share(packages: list[str]) -> None:
-    """Run in a child: import the modules, and print a line for each module and compiled loop."""
+    """In a child: import the modules, and print a line per module and compiled loop."""
     observe_compilation(lambda loop: print("loop", loop, flush=True))
     for package in packages:
         for name in loop_modules(f"snakewalk.{package}"):

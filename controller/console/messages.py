@@ -1,8 +1,8 @@
-"""Messages of a command in addition to its result: on standard error by level, and in a log file.
+"""Messages of a command: on standard error by level, and in a log file.
 
-Everything goes through the logger ``snakewalk`` of Python's logging: ``debug`` is what a step did,
-``info`` what a run decided by itself, ``warning`` what a user should know, ``error`` a fault.
-Warnings of libraries are ``debug``. Without :func:`messages` nothing is shown, as for any library.
+They use the logger ``snakewalk``: ``debug`` is a step, ``info`` a decision of a run, ``warning``
+something that a user should know, ``error`` a fault. Warnings of libraries are ``debug``. Without
+:func:`messages` nothing is shown, as for any library.
 """
 
 import logging
@@ -32,19 +32,19 @@ FAULT: Final = "fault"
 
 
 class _Screen(logging.Handler):
-    """Standard error at that moment: a progress bar redirects it while it is shown."""
+    """Current standard error; a progress bar redirects it."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a line; a warning says who warns."""
+        """Print a line; a warning names the program."""
         if not getattr(record, FAULT, False):
             start = "snakewalk: " if record.levelno >= logging.WARNING else ""
             print(f"{start}{plain(record.getMessage())}", file=sys.stderr, flush=True)
 
 
 class _KeptFile(logging.FileHandler):
-    """The file of ``--log-file``; a fault of disk or folder is reported once, when it happens.
+    """The file of ``--log-file``; reports a fault of disk or folder once.
 
-    If the file or its folder is deleted, it is made again with all messages so far.
+    If the file or its folder is deleted, it is restored with all messages so far.
     """
 
     def __init__(self, file: Path) -> None:
@@ -67,8 +67,8 @@ class _KeptFile(logging.FileHandler):
         except OSError as error:
             self._report(error)
 
-    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  the name that logging calls
-        """Report that the disk has rejected a record."""
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
+        """Report a rejected record."""
         error = sys.exc_info()[1]
         if isinstance(error, OSError):
             self._report(error)
@@ -76,14 +76,14 @@ class _KeptFile(logging.FileHandler):
             super().handleError(record)
 
     def close(self) -> None:
-        """Close the file; a fault of the disk is reported."""
+        """Close the file; report a fault of the disk."""
         try:
             super().close()
         except OSError as error:
             self._report(error)
 
     def _restore(self) -> None:
-        """Make folder and file again, with the messages so far."""
+        """Restore folder and file with the messages so far."""
         if self.stream is not None:
             self.stream.close()
         Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
@@ -110,13 +110,13 @@ def _print_warning(text: str) -> None:
 
 
 class _OneLine(logging.Formatter):
-    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  the name that logging calls
-        """The line of a record, without control characters; a traceback follows it."""
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's name
+        """The line of a record without control characters; a traceback follows it."""
         return plain(super().formatMessage(record))
 
 
 def stderr_console() -> "Console":
-    """Standard error for bars and what changes in place; silent where no ``info`` is shown."""
+    """Standard error for bars; silent if ``info`` is not shown."""
     from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415  a program starts without it
 
     screens = [one for one in LOGGER.handlers if isinstance(one, _Screen)]
@@ -127,7 +127,7 @@ def stderr_console() -> "Console":
 
 @contextmanager
 def messages(level: str, file: Path | None = None) -> Iterator[None]:
-    """Show messages from ``level`` on, and write all of them to the end of ``file``.
+    """Show messages from ``level``, and append all of them to ``file``.
 
     Raises:
         InputError: the file cannot be written.
@@ -153,7 +153,7 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
             "%s; version %s, Python %s, %s",
             *(words, version("snakewalk"), platform.python_version(), platform.platform()),
         )
-        for text in fallbacks_in_use():  # reported when modules were imported, before this
+        for text in fallbacks_in_use():  # reported at the import of modules, before this
             LOGGER.warning(text)
         yield
         LOGGER.debug("done")
@@ -169,7 +169,7 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
 
 
 def _tell_end(error: BaseException) -> None:
-    """Write how a command ended; the function that catches the error prints it."""
+    """Log the end of a command; the function that catches the error prints it."""
     elsewhere = {FAULT: True}
     if isinstance(error, InputError):
         for line in error.faults:
@@ -190,6 +190,6 @@ def _library_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Receive a library's warning: it is for programmers, and shown on request."""
+    """Log a library's warning as ``debug``."""
     del file, line
     LOGGER.debug("%s:%d: %s: %s", Path(filename).name, lineno, category.__name__, message)

@@ -1,4 +1,4 @@
-"""Parts that the commands share: options, and the display of a result."""
+"""Shared parts of the commands: options, and the display of a result."""
 
 import json
 import sys
@@ -183,12 +183,12 @@ LogFile = Annotated[
 
 
 def check_files(run: str | None, robot: str | None, world: str | None) -> None:
-    """Load the files of a user's own that a command names; shipped ones have no faults.
+    """Load a user's files that a command names; shipped ones have no faults.
 
-    The robot and the world are those of the run where none is given.
+    Robot and world default to those of the run.
 
     Raises:
-        ConfigError: every fault of the first file that has one.
+        ConfigError: all faults of the first faulty file.
         InputError: a run names a pose source that is not installed.
 
     """
@@ -207,10 +207,10 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
 
 
 def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) -> None:
-    """Refuse options of a command that another one, or its absence, makes idle.
+    """Reject options that have no effect without, or with, another one.
 
     Raises:
-        InputError: one line for each.
+        InputError: one line per option.
 
     """
     given = {name for name, value in options.items() if value != defaults.get(name)}
@@ -228,7 +228,7 @@ def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) ->
 
 
 def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") -> dict[str, Any]:
-    """Read an option's KEY=VALUE pairs; a value is JSON, or else text.
+    """Read an option's KEY=VALUE pairs; a value is JSON or text.
 
     Raises:
         InputError: key or value is missing, or a key occurs twice.
@@ -243,13 +243,13 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
             raise InputError(f"{option} {text}: {key} has a value already: leave one")
         try:
             values[key] = parse_json(value)
-        except ValueError:  # no JSON; too long a number; too deep a list
+        except ValueError:  # not JSON, too long a number, or too deep a list
             values[key] = value
     return values
 
 
 def show(result: Mapping[str, object], as_json: bool) -> None:
-    """Print a result as a table of two columns, or as JSON; in the table no value is a dash."""
+    """Print a result as a table of two columns (a dash for None), or as JSON."""
     if as_json:
         print(json.dumps(result))
         return
@@ -260,7 +260,7 @@ def show(result: Mapping[str, object], as_json: bool) -> None:
 
 
 def _text(value: object) -> str:
-    """A value for a reader: no brackets and quotes, no ``None``."""
+    """A value without brackets, quotes and ``None``."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, dict):

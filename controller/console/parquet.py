@@ -1,4 +1,4 @@
-"""A table of results as Parquet, made from its CSV a block at a time."""
+"""A table of results as Parquet, converted block by block from its CSV."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -14,7 +14,7 @@ BLOCK_BYTES: Final = 1 << 22
 
 
 def check_parquet(path: Path | None) -> None:
-    """Refuse a Parquet file without its package, before any work.
+    """Reject a Parquet file without its package, before any work.
 
     Raises:
         InputError: pyarrow is not installed.
@@ -27,11 +27,7 @@ def check_parquet(path: Path | None) -> None:
 def table_to_parquet(table: Path, path: Path, kinds: Mapping[str, Kind]) -> int:
     """Write a CSV table as Parquet and return its number of rows; empty cells are null.
 
-    Args:
-        table: the CSV.
-        path: the Parquet file.
-        kinds: kind of each column, in their order.
-
+    ``kinds`` has the kind of each column, in order.
     """
     pa, csv, parquet = (import_module(f"pyarrow{part}") for part in ("", ".csv", ".parquet"))
     types = {

@@ -1,4 +1,4 @@
-"""A console whose texts cannot steer the terminal: they contain names from anyone's files."""
+"""A console whose texts, such as names from files, cannot control the terminal."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,10 +11,10 @@ from snakewalk.config.plain_text import plain
 
 
 class PlainConsole(Console):
-    """Prints everything that it renders as ``plain`` text; styles and cursor moves are its own."""
+    """Prints all texts as ``plain``; styles and cursor moves are its own."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Convert a string to text, before the columns of a table are measured."""
+        """Convert a string to text, before table columns are measured."""
         return super().render_str(plain(text), **options)
 
     def render(

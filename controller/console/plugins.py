@@ -1,10 +1,10 @@
-"""Registry of plug-ins: the offers of each package, found without importing the packages.
+"""Registry of plug-ins, found without importing their packages.
 
 A package lists its plug-ins in a manifest: a module without imports whose ``PLUGINS`` is a tuple of
-``(kind, name, help, "module:attribute", group)``. The manifests of snakewalk's own packages are
+``(kind, name, help, "module:attribute", group)``. snakewalk's own manifests are
 ``snakewalk/controller/*/manifest.py``. Another distribution declares an entry point of the group
-``snakewalk.plugins`` that names its manifest. The module of a plug-in is imported when the plug-in
-is used. ``docs/how-to/add-a-plug-in.md`` shows one of each kind.
+``snakewalk.plugins`` that names its manifest. The module of a plug-in is imported on use.
+``docs/how-to/add-a-plug-in.md`` shows one of each kind.
 """
 
 from collections.abc import Iterable, Iterator
@@ -51,14 +51,14 @@ class Plugin:
 
     @property
     def is_own(self) -> bool:
-        """Whether it is one of snakewalk's own."""
+        """Whether it is snakewalk's own."""
         return self.package.startswith(f"{OWN}.")
 
     def load(self) -> Any:
         """Import the plug-in.
 
         Raises:
-            PluginError: its module does not import, or has no such attribute.
+            PluginError: its module does not import, or lacks the attribute.
 
         """
         module, _, attribute = self.target.partition(":")
@@ -76,12 +76,12 @@ class Plugin:
 
 
 def plugins(kind: str | None = None) -> tuple[Plugin, ...]:
-    """Return all plug-ins, or those of one kind; snakewalk's own come first."""
+    """Return all plug-ins, or those of one kind, snakewalk's own first."""
     return tuple(each for each in (*own_plugins(), *foreign_plugins()) if kind in (None, each.kind))
 
 
 def find(kind: str, name: str) -> Plugin | None:
-    """Return a plug-in; snakewalk's own wins over another one of the same name."""
+    """Return a plug-in; snakewalk's own have priority."""
     for offered in (own_plugins, foreign_plugins):
         for each in offered():
             if each.kind == kind and each.name == name:
@@ -97,11 +97,7 @@ def names(kind: str) -> list[str]:
 def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Plugin:
     """Return a plug-in that an option names.
 
-    Args:
-        kind: one of ``KINDS``.
-        name: the value of the option.
-        option: how a message names the option.
-        others: further valid values, which are not plug-ins.
+    ``option`` is for the message; ``others`` are further valid values, which are not plug-ins.
 
     Raises:
         InputError: the plug-in does not exist; lists the valid values.
@@ -114,7 +110,7 @@ def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Pl
 
 
 def unknown(option: str, name: str, valid: Iterable[str]) -> str:
-    """Say that a value is unknown, and which one was probably meant."""
+    """Message about an unknown value, with the probable one."""
     valid = list(dict.fromkeys(valid))
     near = get_close_matches(name, valid, 1, 0.7)
     meant = f"did you mean {near[0]}? " if near else ""
@@ -137,7 +133,7 @@ def own_plugins() -> tuple[Plugin, ...]:
 
 @cache
 def foreign_plugins() -> tuple[Plugin, ...]:
-    """Return the plug-ins of other distributions; a broken manifest is a problem to report."""
+    """Return the plug-ins of other distributions; a broken manifest becomes a problem."""
     return tuple(plugin for entry in entry_points(group=ENTRY_POINTS) for plugin in _of(entry))
 
 
@@ -156,7 +152,7 @@ _problems: list[str] = []
 
 
 def take_problems() -> list[str]:
-    """Return why manifests are ignored, once each; a command reports it when it can."""
+    """Return why manifests are ignored, once each, for a command to report."""
     taken, _problems[:] = list(_problems), []
     return taken
 

@@ -1,4 +1,4 @@
-"""The one pool of processes: on this machine, or on the workers of a Dask cluster."""
+"""The pool of processes: on this machine, or on the workers of a Dask cluster."""
 
 import os
 import tempfile
@@ -29,9 +29,8 @@ ATTEMPTS = 3
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool whose workers are fresh interpreters.
 
-    If an exception or an interrupt ends the block, the workers are killed at once, and their
-    temporary files are deleted with the pool's folder. Workers whose parent is killed end by
-    themselves.
+    If an exception or an interrupt ends the block, the workers are killed, and their temporary
+    files are deleted. Workers of a killed parent end by themselves.
     """
     others = {child.pid for child in active_children()}
     with (
@@ -49,7 +48,7 @@ def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _begin(folder: str) -> None:
-    """Let a worker's temporary files lie in the pool's folder, and the worker end with its parent.
+    """Put a worker's temporary files into the pool's folder, and end the worker with its parent.
 
     A busy worker does not notice that no process will receive its result.
     """
@@ -69,12 +68,12 @@ def each(
 ) -> Iterator[tuple[A, B]]:
     """Yield (item, result) as they finish; ``dask`` is the address of a scheduler.
 
-    A few items for each worker are submitted at a time, so memory does not grow with their number.
-    If a worker dies, its items start again.
+    A few items per worker are submitted at a time, so memory does not grow with their number. If a
+    worker dies, its items start again.
 
     Raises:
-        InputError: no scheduler answers at that address, or an item ended its worker
-            ``ATTEMPTS`` times.
+        InputError: no scheduler replies at that address, or an item ended its worker ``ATTEMPTS``
+            times.
 
     """
     if dask is not None:
@@ -96,7 +95,7 @@ def _on_one_pool(
     suspects: deque[int],
     deaths: Counter[int],
 ) -> Generator[tuple[A, B], None, bool]:
-    """Yield results until all are done, or a worker dies: then the pool is broken.
+    """Yield results until all are done, or a worker dies and the pool is broken.
 
     ``suspects`` are the items that ran or waited when a worker died. They run first, one at a time,
     so that ``deaths`` counts only the item that ends its worker.

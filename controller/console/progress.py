@@ -1,4 +1,4 @@
-"""Progress for a person: one bar on standard error, and events in lines above it."""
+"""Progress on standard error: one bar, and events in lines above it."""
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
@@ -28,7 +28,7 @@ REFRESH_HZ = 4.0
 
 
 class ProgressBar:
-    """The bar: description, share, a note, time; ``transient`` bars vanish at the end.
+    """A bar with description, share, note and time; ``transient`` bars vanish at the end.
 
     ``remaining`` adds an estimate of the remaining time.
     """
@@ -67,7 +67,7 @@ class ProgressBar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Leave the last state standing, or nothing of a transient bar."""
+        """Leave the last state, or nothing of a transient bar."""
         self._progress.__exit__(kind, error, trace)
 
     def update(
@@ -78,7 +78,7 @@ class ProgressBar:
         description: str | None = None,
         note: str = "",
     ) -> None:
-        """Show that ``done`` of ``total`` is done; None leaves total or description as they are."""
+        """Show that ``done`` of ``total`` is done; None keeps total or description."""
         self._progress.update(
             self._task, completed=done, total=total, description=description, note=note
         )
@@ -88,18 +88,18 @@ class ProgressBar:
         self._progress.advance(self._task)
 
     def hide(self) -> None:
-        """Remove the bar and its line, because its task failed."""
+        """Remove the bar, because its task failed."""
         self._progress.live.transient = True
         self._progress.console.quiet = not self._progress.console.is_interactive
         self._progress.update(self._task, visible=False)
 
     def on_event(self, kind: str, text: str) -> None:
-        """Show an event of a run above the bar; a climb that fails is a warning."""
+        """Show an event of a run above the bar; a failed climb is a warning."""
         LOGGER.log(logging.WARNING if kind == "climb" else logging.INFO, "%s", text)
 
 
 class RunBar(ProgressBar):
-    """Bar of a run, updated once in several cycles; subclasses define what it shows."""
+    """Bar of a run, updated every few cycles; subclasses define its content."""
 
     def __init__(self, description: str, total: float) -> None:
         super().__init__(description, total)
@@ -111,25 +111,25 @@ class RunBar(ProgressBar):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Leave nothing of a run that failed before its first cycle."""
+        """Remove the bar of a run that failed before its first cycle."""
         if kind is not None and self._cycles == 0:
             self.hide()
         super().__exit__(kind, error, trace)
 
     def _is_due(self, progress: "RunProgress") -> bool:
-        """Count a cycle; return whether the bar is updated with it."""
+        """Count a cycle; return whether it updates the bar."""
         self._cycles += 1
         return self._cycles % EVERY == 0 or progress.done
 
 
 class PathBar(RunBar):
-    """How far along the path, which waypoint, how fast."""
+    """Bar with the progress along the path, waypoint and speed."""
 
     def __init__(self, path_m: float) -> None:
         super().__init__("ramp", path_m)
 
     def on_progress(self, progress: "RunProgress") -> None:
-        """Update, not in every cycle."""
+        """Update every few cycles."""
         if self._is_due(progress):
             self.update(
                 progress.along_m,
@@ -139,10 +139,9 @@ class PathBar(RunBar):
 
 
 class TimeBar(RunBar):
-    """Share of the time of a gait, or of any task of known duration, that has passed.
+    """Share of the elapsed time of a gait, or of any task of known duration.
 
-    ``name_at`` receives the elapsed time in seconds and returns the present motion: a run may
-    change its gait.
+    ``name_at`` returns the present motion at an elapsed time, s: a run may change its gait.
     """
 
     def __init__(
@@ -153,7 +152,7 @@ class TimeBar(RunBar):
         self._start_s: float | None = None
 
     def on_progress(self, progress: "RunProgress") -> None:
-        """Update, not in every cycle."""
+        """Update every few cycles."""
         if self._start_s is None:
             self._start_s = progress.time_s
         if self._is_due(progress):
@@ -164,7 +163,7 @@ class TimeBar(RunBar):
 def in_real_time(
     on_progress: "Callable[[RunProgress], None]",
 ) -> "Callable[[RunProgress], None]":
-    """Hold a simulated run to the pace of a person's clock."""
+    """Slow a simulated run to real time."""
     clock = WallClock()
     ahead_s: float | None = None
 
@@ -189,7 +188,7 @@ def show_progress(
 ) -> Iterator[T]:
     """Yield items under a bar that counts them; ``done`` of ``total`` were done before.
 
-    The bar estimates the remaining time from the items that were finished under it.
+    The bar estimates the remaining time from the items finished under it.
     """
     clock = clock or WallClock()
     start_s = clock.now_s()
@@ -206,7 +205,7 @@ def show_progress(
 
 
 def remaining_note(seconds: float) -> str:
-    """Return an estimate of a remaining time as text, in two units at most; empty of none."""
+    """Remaining time as text, in two units at most; empty below a second."""
     minutes = round(seconds / 60.0)
     if seconds < 1.0:
         return ""

@@ -1,4 +1,4 @@
-"""Files of results: checked before any work, written whole or not at all."""
+"""Files of results: checked before any work, written completely or not at all."""
 
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -22,11 +22,11 @@ PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
 
 def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
-    """Check the files of all results before any work is done; None is ignored.
+    """Check the files of all results before any work; None is ignored.
 
     Raises:
-        InputError: one line for each file that exists (without ``force``), whose folder is missing
-            or not writable, or that is named twice.
+        InputError: one line per file that exists (without ``force``), whose folder is missing or
+            not writable, or that is named twice.
 
     """
     files = [path for path in paths if path is not None]
@@ -44,9 +44,9 @@ def refuse_to_overwrite(paths: Sequence[Path | None], force: bool) -> None:
 
 
 def _folder_fault(folder: Path) -> str | None:
-    """Return why a folder accepts no new file; None if it does.
+    """Return why a folder accepts no new file, or None.
 
-    A file without a name is made in it: permissions alone do not reveal a read-only disk.
+    It creates an unnamed file: permissions alone do not reveal a read-only disk.
     """
     if not folder.is_dir():
         return f"{folder}: no such folder"
@@ -59,10 +59,10 @@ def _folder_fault(folder: Path) -> str | None:
 
 @contextmanager
 def run_folder(name: str, out: Path | None) -> Iterator[Path]:
-    """Give the folder of a new run: ``out``, else ``runs/name``, numbered from 2 where it is taken.
+    """Yield the folder of a new run: ``out``, else ``runs/name``, numbered from 2 if taken.
 
-    A numbered folder is made at once, so that two programs never share one; it goes again if
-    nothing was written into it.
+    A numbered folder is made at once, so that two programs never share one; an empty one is
+    removed.
 
     Raises:
         InputError: the folder cannot be made, or accepts no file.
@@ -95,10 +95,10 @@ def run_folder(name: str, out: Path | None) -> Iterator[Path]:
 
 
 def refuse_another_run(folder: Path, force: bool) -> None:
-    """Check that a folder holds no run's files.
+    """Check that a folder has no run's files.
 
     Raises:
-        InputError: it does (without ``force``).
+        InputError: it has (without ``force``).
 
     """
     there = [name for name in RUN_FILES if (folder / name).exists()]
@@ -112,11 +112,11 @@ def refuse_another_run(folder: Path, force: bool) -> None:
 def refuse_mixture(log: Path, folder: Path, force: bool) -> None:
     """Check that page and film of a log are not written into the folder of another run.
 
-    In the log's own folder, as a run leaves it, they are made again. Elsewhere an old page and film
-    are deleted with ``force``, a log never.
+    In the log's own folder they are replaced. Elsewhere ``force`` deletes an old page and film,
+    never a log.
 
     Raises:
-        InputError: the folder holds another log, or (without ``force``) a page or a film.
+        InputError: the folder has another log, or (without ``force``) a page or a film.
 
     """
     logs = [folder / name for name in RUN_FILES[:2] if (folder / name).exists()]
@@ -129,7 +129,7 @@ def refuse_mixture(log: Path, folder: Path, force: bool) -> None:
 
 
 def clear_run(folder: Path) -> None:
-    """Delete the files of an earlier run, so that none is taken for one of the next."""
+    """Delete the files of an earlier run, so that none is mistaken for one of the next."""
     for name in RUN_FILES:
         (folder / name).unlink(missing_ok=True)
 
@@ -150,11 +150,11 @@ def check_picture(path: Path | None) -> None:
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to; it becomes ``path`` when the block ends without an error.
+    """Yield a temporary path, which becomes ``path`` if the block ends without an error.
 
-    The temporary file has the same name, in a folder next to ``path``. Further files that the block
-    writes next to it (a mesh's material) are moved along. After an error (a full disk, an
-    interrupt) nothing is left, and an older file is as it was. Missing parent folders are made.
+    It has the same name, in a folder next to ``path``. Further files that the block writes next to
+    it (a mesh's material) are moved too. After an error (a full disk, an interrupt) an older file
+    is unchanged. Missing parent folders are made.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:

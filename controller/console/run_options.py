@@ -19,7 +19,7 @@ from snakewalk.controller.console.options import (
 class RunOptions:
     """Target of a run, its observers, and the display of its results.
 
-    A command declares all of these options by one parameter of this type.
+    One parameter of this type declares all options of a command.
     """
 
     port: RunPort = None

@@ -1,7 +1,7 @@
 """The module path of a command, without the working folder.
 
-Python puts the working folder on the module path for ``python -m`` and ``python -c``, and for an
-empty entry in ``PYTHONPATH``. A file ``numpy.py`` next to a downloaded model would be executed.
+Python puts the working folder on the module path for ``python -m``, ``python -c``, and an empty
+entry in ``PYTHONPATH``. A file ``numpy.py`` next to a downloaded model would be executed.
 """
 
 import os
@@ -18,8 +18,8 @@ _ROOT = str(Path(snakewalk.__file__).parents[1])
 def make_path_safe() -> None:
     """Remove the working folder from ``sys.path``, unless ``PYTHONPATH`` names it.
 
-    The folder of this package stays importable; if it is the working folder, it becomes the last
-    entry, so that nothing in it hides a module of Python or of another package.
+    If it is the folder of this package, it becomes the last entry, so that it hides no other
+    module.
     """
     try:
         folder = os.path.realpath(os.curdir)

@@ -1,4 +1,4 @@
-"""Text of a page that is passed on: without the folders of the user who made it."""
+"""Text of a shared page, without the folders of the user who made it."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _PATH: Final = re.compile(r"(?:~[\w.-]*|[A-Za-z]:)?[/\\](?!dev/)(?:[^\n]*[/\\])?
 
 
 def without_folders(text: str) -> str:
-    """Return a text in which an absolute path is only a file's name; devices keep theirs.
+    """Return a text with absolute paths reduced to file names; devices keep theirs.
 
     A text that is one path, or OPTION=PATH, may contain spaces.
     """
@@ -29,7 +29,7 @@ def without_folders(text: str) -> str:
 
 
 def shared(value: Any) -> Any:
-    """Return a value of JSON whose texts, keys too, are ``without_folders``."""
+    """Return a JSON value with its texts and keys ``without_folders``."""
     if isinstance(value, str):
         return without_folders(value)
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""A table of results as one CSV that survives a kill: a row is on the disk before the next."""
+"""A table of results as one CSV that survives a kill: each row is on disk before the next."""
 
 import csv
 import io
@@ -17,7 +17,7 @@ _NO_ROW: Final[dict[str, str]] = {}
 def read_csv_table(
     path: Path, columns: Sequence[str], command: str, optional: Sequence[str] = ()
 ) -> Iterator[dict[str, str]]:
-    """Yield the whole rows of a table that ``command`` wrote; a torn last line is dropped.
+    """Yield the complete rows of a table that ``command`` wrote; drops a torn last line.
 
     A column of ``optional`` that the table lacks is empty.
 
@@ -41,7 +41,7 @@ def read_csv_table(
 
 
 class CsvTable:
-    """Appends rows; knows those that are there already by the columns of ``place``."""
+    """Appends rows; identifies existing ones by the columns of ``place``."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class CsvTable:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close; nothing is left of a table without rows."""
+        """Close; delete a table without rows."""
         empty = self._file.tell() == 0
         self._file.close()
         if empty:

@@ -1,1 +1,1 @@
-"""Maps: from files and stereo pictures to height fields that know where they are unknown."""
+"""Maps from files and stereo pictures: height fields that mark unknown ground."""

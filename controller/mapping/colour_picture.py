@@ -1,4 +1,4 @@
-"""Colour pictures of a camera's files."""
+"""Colour pictures from files."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def read_colours(file: Path) -> Image:
     """(H, W, 3) colours, blue first.
 
     Raises:
-        InputError: no such file, or no picture.
+        InputError: no such file, or not a picture.
 
     """
     try:

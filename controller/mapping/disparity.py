@@ -1,8 +1,8 @@
-"""Disparity of a rectified pair: semi-global matching both ways, then planes fitted around pixels.
+"""Disparity of a rectified pair: semi-global matching in both directions, then plane fits.
 
 The matching is OpenCV's (H. Hirschmueller, Stereo processing by semiglobal matching and mutual
-information, 2008), in eight directions, of images widened so that the strip on the left, which has
-its match outside OpenCV's range, is matched as well.
+information, 2008), in eight directions. The images are widened so that the left strip, whose match
+is outside OpenCV's range, is matched too.
 """
 
 from typing import Final
@@ -38,15 +38,15 @@ _TOUCH_PX: Final = 1.0
 
 
 def match(left: Image, right: Image, count: int, least: int = 0) -> Floats:
-    """Disparities (H, W) of the left picture's pixels, NaN where they are not known.
+    """Disparities (H, W) of the left picture's pixels, NaN if unknown.
 
-    A pixel is known if it matches both ways, lies with its neighbours on a plane, and is not a
-    speck.
+    A pixel is known if it matches in both directions, lies on a plane with its neighbours, and is
+    not a speck.
 
     Args:
         left: (H, W) or (H, W, 3), rectified.
         right: the same scene from farther right: a point lies further left in it.
-        count: how many disparities are tried, from ``least`` on; rounded up to 16.
+        count: number of disparities from ``least``; rounded up to 16.
         least: least disparity.
 
     Raises:
@@ -101,9 +101,8 @@ def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
 def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
     """Shift each pixel's window by least squares of the grey levels.
 
-    Semi-global matching finds fractions of a pixel by three costs, which draws them to whole
-    pixels; this is the step of B. D. Lucas and T. Kanade (1981) along the row, after which they are
-    not.
+    Semi-global matching finds fractions from three costs, which biases them to whole pixels. This
+    step of B. D. Lucas and T. Kanade (1981) along the row removes the bias.
     """
     grey = [picture if picture.ndim == 2 else picture.mean(axis=2) for picture in (left, right)]
     one, two = (np.asarray(picture, dtype=np.float32) for picture in grey)
@@ -117,7 +116,7 @@ def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
     )
     told = np.isfinite(disparity).astype(np.float32)
     count = np.maximum(_box(told), 1e-6)
-    off = (one - seen) - _box(told * (one - seen)) / count  # one camera may be the brighter
+    off = (one - seen) - _box(told * (one - seen)) / count  # one camera may be brighter
     steep = _box(told * slope * slope) / count
     shift = -_box(told * slope * off) / count / np.maximum(steep, _LEAST_STEEP)
     return np.asarray(disparity + np.clip(shift, -_MOST_SHIFT_PX, _MOST_SHIFT_PX), dtype=float)
@@ -144,11 +143,10 @@ def _without_specks(disparity: Floats, least: int) -> Floats:
 def _on_planes(
     disparity: Floats, smooth: Floats, radius: int, touch: float, least_share: float
 ) -> None:
-    """Write the value of the plane fitted to the pixels around each that lie near its own.
+    """Write the value of the plane fitted to the pixels around each that are close to it.
 
-    A slanted ground is a plane in disparity, so that a fit does not flatten it as a mean does. Two
-    rounds: the pixels near the middle's value, then those near the first plane. NaN where fewer
-    than the share of the window lie on it.
+    Slanted ground is a plane in disparity; a mean would flatten it. Two rounds: the pixels near the
+    middle's value, then those near the first plane. NaN if too few pixels of the window are on it.
     """
     rows, columns = disparity.shape
     whole = (2 * radius + 1) ** 2
@@ -167,7 +165,7 @@ def _on_planes(
                     for q in range(max(j - radius, 0), min(j + radius + 1, columns)):
                         z = disparity[p, q]
                         y, x = float(p - i), float(q - j)
-                        if abs(z - (a * x + b * y + c)) <= reach:  # never of NaN
+                        if abs(z - (a * x + b * y + c)) <= reach:  # false for NaN
                             n += 1.0
                             sx += x
                             sy += y

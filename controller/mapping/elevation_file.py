@@ -1,4 +1,4 @@
-"""From a file of real ground to an elevation map in the robot's world."""
+"""Elevation map in the robot's world from a file of real ground."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -52,7 +52,7 @@ _MESH_SAMPLES: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class MapOptions:
-    """How a file becomes a map."""
+    """Options of a map from a file."""
 
     units: RasterUnits = field(default_factory=RasterUnits)
     """Facts that the file does not state."""
@@ -82,7 +82,7 @@ class MapOptions:
 
 @dataclass(frozen=True, slots=True)
 class FileMap:
-    """A map, and what of the file it shows."""
+    """A map, and the extent of its file."""
 
     elevation: ElevationMap
     size_m: tuple[float, float]
@@ -99,7 +99,7 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
     """Read a file by its ending.
 
     Raises:
-        InputError: no such kind of file, damaged, too large, without units, or nothing in the crop.
+        InputError: unknown ending, damaged, too large, without units, or nothing in the crop.
         OSError: the file cannot be opened.
 
     """
@@ -155,7 +155,6 @@ def _check_heights(file: Path, z_m: Floats, per_value_m: float, options: MapOpti
 
 
 def _solid(file: Path, options: MapOptions) -> FileMap:
-    """Points or triangles."""
     ending, faces = file.suffix.lower(), None
     notes: list[str] = []
     if ending in LASERS:
@@ -211,7 +210,7 @@ def _upright(file: Path, points: Floats, options: MapOptions) -> Floats:
 def _of_points(
     file: Path, points_m: Floats, faces: Ints | None, options: MapOptions, notes: list[str]
 ) -> FileMap:
-    """Map of points, or of the triangles between them."""
+    """Map of points, or of triangles between them."""
     if faces is None:
         finite = np.isfinite(points_m).all(axis=1)
         if not finite.all():
@@ -257,7 +256,7 @@ def _of_points(
 
 
 def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> None:
-    """Reject a cloud in which many points lie above each other: walls, interiors, a camera's view.
+    """Reject a cloud with many points above each other: walls, interiors, a camera's view.
 
     Raises:
         InputError: the question.

@@ -1,6 +1,6 @@
-"""GeoTIFF and ASCII grid: heights with the units, scale and missing cells that the file states.
+"""GeoTIFF and ASCII grid: heights with the file's units, scale and missing cells.
 
-Large files are read in strips: of heights that a map's sample stands for, the median is taken.
+Large files are read in strips, with the median of the heights per sample.
 """
 
 import math
@@ -61,17 +61,17 @@ def read_geo_raster(
     crop: Crop | None,
     spacing_of: Callable[[float, float], float] | None = None,
 ) -> Raster:
-    """Read a GeoTIFF or an ASCII grid, or the part of it within a crop.
+    """Read a GeoTIFF or an ASCII grid, or its part within a crop.
 
     Args:
         file: ends in .tif, .tiff or .asc.
-        units: the units that the user states.
+        units: stated by the user.
         crop: of the file.
-        spacing_of: function of a cell's width and depth in metres that returns the spacing of the
-            map in metres of the file; a raster with a finer one is reduced to it while it is read.
+        spacing_of: maps a cell's width and depth, m, to the spacing of the map, m of the file; a
+            finer raster is reduced while it is read.
 
     Raises:
-        InputError: it cannot be read, or does not state what matters.
+        InputError: it cannot be read, or lacks necessary facts.
         OSError: the file cannot be opened.
 
     """
@@ -79,7 +79,7 @@ def read_geo_raster(
     import rasterio  # noqa: PLC0415  an extra
 
     driver = "AAIGrid" if file.suffix.lower() == ".asc" else "GTiff"
-    with file.open("rb"):  # a fault of the system is reported as such
+    with file.open("rb"):  # reports a fault of the system as such
         pass
     try:
         with (
@@ -146,7 +146,7 @@ def _read(
 
 
 class _Strips:
-    """Reads a part of a band strip by strip; missing cells are NaN, in the file's order of rows."""
+    """Reads a part of a band strip by strip; missing cells are NaN, rows in the file's order."""
 
     def __init__(self, opened: Any, rows: slice, columns: slice, no_data: float | None) -> None:
         self._opened, self._rows, self._columns, self._no_data = opened, rows, columns, no_data
@@ -154,12 +154,12 @@ class _Strips:
         self.cells = self._width * (rows.stop - rows.start)
 
     def plain(self) -> tuple[Floats, int]:
-        """All cells, and how many of them are missing."""
+        """All cells, and the number of missing ones."""
         values = self._strip(self._rows.start, self._rows.stop)
         return values, int(np.isnan(values).sum())
 
     def reduced(self, dx_m: float, dy_m: float, spacing_m: float) -> tuple[Floats, int]:
-        """Medians of the cells nearest to each sample, and how many cells are missing."""
+        """Medians of the cells nearest to each sample, and the number of missing cells."""
         count = self._rows.stop - self._rows.start
         # counted from the south, where the map begins
         row_of = np.rint((count - 1 - np.arange(count)) * dy_m / spacing_m).astype(np.int64)
@@ -202,14 +202,14 @@ class _Strips:
 
 
 def _column_medians(z: Floats, column_of: Ints, samples: int) -> Floats:
-    """Median over the rows of z and the columns of each sample; NaN is left out."""
+    """Median over the rows of z and the columns of each sample, without NaN."""
     starts = np.searchsorted(column_of, np.arange(samples))
     widths = np.diff([*starts, len(column_of)])
     padded = np.full((samples, len(z) * int(widths.max())), np.nan)
     for k in range(int(widths.max())):
         has = widths > k
         padded[has, k * len(z) : (k + 1) * len(z)] = z[:, starts[has] + k].T
-    padded.sort(axis=1)  # NaN comes last
+    padded.sort(axis=1)  # NaN is last
     count = np.isfinite(padded).sum(axis=1)
     low, high = np.maximum((count - 1) // 2, 0), np.maximum(count // 2, 0)
     at = np.arange(samples)
@@ -221,7 +221,7 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
     """Unit of the cells by the coordinate system.
 
     Raises:
-        InputError: the file has no coordinate system, and its cells may be degrees.
+        InputError: the system is missing, and the cells may be degrees.
 
     """
     crs, turn = opened.crs, opened.transform
@@ -249,7 +249,7 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
 
 
 def _is_part_of_a_degree(cell: float) -> bool:
-    """Whether a degree holds a round number of cells: of 1/3600 or 1/1200, not of 0.05."""
+    """Whether a degree has a whole number of cells: for 1/3600 or 1/1200, not 0.05."""
     per_degree = 1.0 / cell
     return per_degree > 20.5 and abs(per_degree - round(per_degree)) < 1e-3 * per_degree**0.5
 
@@ -260,7 +260,7 @@ def _height_unit(
     """Unit of heights: by the user, the band, or the vertical part of the system.
 
     Raises:
-        InputError: the unit is not stated and lengths may not be metres, or two statements differ.
+        InputError: it is not stated and lengths may not be metres, or statements differ.
 
     """
     if units.height_unit is not None:
@@ -309,7 +309,7 @@ def _band_scale(opened: Any, units: RasterUnits) -> tuple[float, float, list[str
 def _cells(
     file: Path, opened: Any, unit: str, cell: tuple[float, float], part: tuple[slice, slice]
 ) -> _Cells:
-    """Cells in metres on the ground, at the middle of a part."""
+    """Cell size in metres on the ground, at the middle of a part."""
     turn, (rows, columns) = opened.transform, part
     middle_x = turn.c + turn.a * 0.5 * (columns.start + columns.stop)
     middle_y = turn.f + turn.e * 0.5 * (rows.start + rows.stop)

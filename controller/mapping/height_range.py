@@ -1,4 +1,4 @@
-"""Heights that no ground has: values that stand for missing cells without being declared."""
+"""Heights that no ground has: undeclared values of missing cells."""
 
 from typing import Final
 
@@ -19,11 +19,11 @@ _MANY: Final = 3
 
 
 def check_heights(z_m: Floats, per_value_m: float, assumed: Assumptions) -> None:
-    """Reject heights that are probably values for missing cells.
+    """Reject heights that are probably values of missing cells.
 
     Args:
-        z_m: heights in metres; NaN where the file declares no data.
-        per_value_m: metres of a step of one in the file's values, for the suggestion.
+        z_m: heights in metres; NaN for no data.
+        per_value_m: metres per step of the file's values, for the suggestion.
         assumed: may state ``lowest_m`` and ``highest_m`` of the ground.
 
     Raises:
@@ -53,7 +53,7 @@ def check_heights(z_m: Floats, per_value_m: float, assumed: Assumptions) -> None
 
 
 def _check_gap(values: Floats, low: float, per_value_m: float) -> None:
-    """Reject one value in many cells, far below all others (or above, of negated ones)."""
+    """Reject one value in many cells, far below all others (for negated values: above)."""
     count = int((values == low).sum())
     others = values[values > low]
     if count < _MANY or not len(others):

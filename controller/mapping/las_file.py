@@ -1,4 +1,4 @@
-"""LAS and LAZ: points of airborne and terrestrial laser scanners, read in chunks by laspy."""
+"""LAS and LAZ: points of laser scanners, read in chunks by laspy."""
 
 import json
 import logging
@@ -68,7 +68,7 @@ print(child(words))
 
 @dataclass(frozen=True, slots=True)
 class LasPoints:
-    """Points of a file, in its units, and what it states of them."""
+    """Points of a file, in its units, with its statements."""
 
     points: Floats
     """(n, 3) x, y, z."""
@@ -91,17 +91,17 @@ def read_las(
 ) -> LasPoints:
     """Read the points of the ground, or of some classes.
 
-    The decoder of LAZ ends its process on some damaged files: it has a process of its own, which
-    is limited in memory and time.
+    The LAZ decoder ends its process on some damaged files, so it has a separate process with
+    limited memory and time.
 
     Args:
         file: ends in .las or .laz.
-        classes: to keep; None: ground where the file has some, else all but noise.
-        crop: in metres from the south-west corner; it is not cut from a file in degrees.
+        classes: to keep; None: ground if the file has some, else all but noise.
+        crop: in metres from the south-west corner; ignored for a file in degrees.
         unit: of x and y by the user, for the crop.
 
     Raises:
-        InputError: it is damaged, or holds too many points.
+        InputError: it is damaged, or has too many points.
         OSError: the file cannot be opened.
 
     """
@@ -123,7 +123,7 @@ def read_las(
 
 
 def run_child(words: str) -> dict[str, Any]:
-    """Read a file in a process of its own; return its facts, or its fault."""
+    """Read a file in a separate process; return its facts, or its fault."""
     ended = run_code(_CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S))
     try:
         said = parse_json(ended.stdout)
@@ -137,11 +137,11 @@ def run_child(words: str) -> dict[str, Any]:
 
 
 def child(words: str) -> str:
-    """Work of the process of its own: write the points, return what the file states as JSON."""
+    """Work of the separate process: write the points, return the file's statements as JSON."""
     file, classes, crop, unit, out = parse_json(words)
     import laspy  # noqa: PLC0415  an extra
 
-    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # its words are in the fault
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # the fault has its messages
     try:
         with laspy.open(file) as reader:
             stated, height_unit, system = _units(reader.header)
@@ -152,7 +152,7 @@ def child(words: str) -> str:
             points, notes = _read(reader, classes, window)
     except InputError as error:
         return json.dumps({"fault": str(error)})
-    except Exception as error:  # laspy and lazrs raise whatever their parsers meet
+    except Exception as error:  # laspy and lazrs raise the exceptions of their parsers
         return json.dumps({"fault": f"cannot be read as LAS or LAZ: {error}"})
     np.save(out, points)
     return json.dumps(
@@ -166,7 +166,7 @@ def child(words: str) -> str:
 def _read(
     reader: Any, classes: Collection[int] | None, window: Sequence[float] | None
 ) -> tuple[Floats, list[str]]:
-    """Points, and how many of them were used and left out."""
+    """Points, and notes on used and dropped ones."""
     header = reader.header
     count = int(header.point_count)
     if count > _MOST_READ:
@@ -211,7 +211,7 @@ def _read(
 def _class_notes(
     seen: dict[int, int], classes: Collection[int] | None, by_ground: bool, kept: int
 ) -> list[str]:
-    """How many points of which class were kept and left out."""
+    """Numbers of used and dropped points by class."""
     used = set(classes) if classes is not None else set(
         _GROUND if by_ground else (kind for kind in seen if kind not in _NOISE)
     )  # fmt: skip
@@ -229,7 +229,7 @@ def _class_notes(
 
 
 def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
-    """Units of x, y and of z, and the projected system, as the file states them."""
+    """Units of x, y and of z, and the projected system, from the file."""
     wkt, keys = "", {}
     for record in [*header.vlrs, *(header.evlrs or [])]:
         text = getattr(record, "string", None)
@@ -259,14 +259,14 @@ def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
 
 
 def _system(text_or_number: str | int) -> Any:
-    """Coordinate system, if Rasterio is there and knows it."""
+    """Coordinate system, if Rasterio knows it."""
     try:
         from rasterio.crs import CRS  # noqa: PLC0415  an extra
 
         if isinstance(text_or_number, int):
             return CRS.from_epsg(text_or_number)
         return CRS.from_wkt(text_or_number)
-    except Exception:  # its unit is stated or asked for all the same
+    except Exception:  # its unit is stated or requested anyway
         return None
 
 
@@ -276,7 +276,7 @@ def in_metres(
     """Points in metres.
 
     Raises:
-        InputError: nothing states a unit (the question).
+        InputError: the unit is unknown (the question).
 
     """
     plane = unit or held.unit

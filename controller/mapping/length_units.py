@@ -1,4 +1,4 @@
-"""Units of length that files state, in metres: by name, and in the text of a coordinate system."""
+"""Units of length in files, in metres: by name, and in coordinate systems."""
 
 import math
 import re
@@ -34,7 +34,7 @@ _MOST_VARIATION: Final = 0.1
 
 
 def named_unit(words: str) -> str | None:
-    """Name in ``UNITS_M`` of a unit as files spell it; None of an unknown one."""
+    """Name in ``UNITS_M`` of a unit as spelled in files, or None."""
     plain = re.sub(r"[^a-z0-9-]+", " ", words.lower()).strip()
     return next((name for name, known in _SPELLINGS.items() if plain in known), None)
 
@@ -53,7 +53,7 @@ def unit_m(unit: str) -> float:
 
 
 def vertical_unit(wkt: str) -> str | None:
-    """Unit of heights of a compound coordinate system in WKT; None if it has no vertical part."""
+    """Unit of heights of a compound coordinate system in WKT, or None."""
     found = _VERTICAL.search(wkt)
     if found is None:
         return None
@@ -66,7 +66,7 @@ def vertical_unit(wkt: str) -> str | None:
 
 
 def degree_cell_m(dx: float, dy: float, latitude: float) -> tuple[float, float]:
-    """Metres of some degrees of longitude and latitude, on the ellipsoid WGS 84."""
+    """Metres of degrees of longitude and latitude, on WGS 84."""
     a_m, e2, angle = 6378137.0, 0.00669437999014, math.radians(latitude)
     w = 1.0 - e2 * math.sin(angle) ** 2
     north = a_m * (1.0 - e2) / w**1.5
@@ -78,13 +78,10 @@ def true_scale(
 ) -> tuple[float, float]:
     """Metres on the ground per unit of a projected system, in x and y at a place.
 
-    Args:
-        crs: a coordinate system of Rasterio.
-        place: x and y.
-        step: of x and y that is measured.
+    ``crs`` is Rasterio's; ``step`` of x and y is measured.
 
     Returns:
-        Nan twice where the system has no place on the earth.
+        NaN twice if the place is not on the earth.
 
     """
     from rasterio import errors, warp  # noqa: PLC0415  an extra
@@ -113,8 +110,8 @@ def ground_lengths(
 
     Args:
         crs: a coordinate system of Rasterio.
-        per_unit_m: metres that a unit states.
-        places: the middle, then others, of which the scale is compared with the middle's.
+        per_unit_m: nominal metres per unit.
+        places: the middle, then others to compare the scale with.
         step: of x and y that is measured.
 
     Raises:

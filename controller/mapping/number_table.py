@@ -16,14 +16,13 @@ _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 
 
 def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
-    """Numbers (rows, columns) of a table, after a line of names or none.
+    """Numbers (rows, columns) of a table, with or without a line of names.
 
-    Commas, semicolons, tabs or blanks separate them. Empty cells, ``NaN`` and ``NA`` are NaN. A
-    table that is separated otherwise may have decimal commas.
+    Commas, semicolons, tabs or blanks separate them. Empty cells, ``NaN`` and ``NA`` are NaN.
+    Without comma separators a table may have decimal commas.
 
     Raises:
-        InputError: the file is not such a table; names row and column of the first cell that is not
-            a number.
+        InputError: the file is not such a table; names the first cell that is not a number.
 
     """
     size = file.stat().st_size
@@ -66,7 +65,7 @@ def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
 
 
 def _separator(lines: list[str]) -> str | None:
-    """Separator of the cells: the first of ; tab , that is in a line of numbers; else blanks."""
+    """Separator of the cells: the first of ; tab , in a line of numbers; else blanks."""
     first = lines[:10]
     for mark in ";\t":
         if any(mark in line for line in first):
@@ -84,7 +83,7 @@ def _has_decimal_commas(file: Path, rows: list[tuple[int, list[str]]]) -> bool:
     """Whether the numbers have decimal commas.
 
     Raises:
-        InputError: they may as well be thousands.
+        InputError: they may also be thousands.
 
     """
     cells = [cell for _, row in rows for cell in row if "," in cell]
@@ -109,7 +108,7 @@ def _uneven(file: Path, rows: list[tuple[int, list[str]]], widths: set[int]) -> 
 
 
 def _plain(cells: list[str]) -> list[float] | None:
-    """Numbers of a row without missing values, which is most of them."""
+    """Numbers of a row without missing values."""
     try:
         return [float(cell) for cell in cells]
     except ValueError:

@@ -1,7 +1,7 @@
 """Point clouds: PCD of the Point Cloud Library in all three encodings, PLY, and tables of x, y, z.
 
-PCD is read here: trimesh does not, and its other readers bring a viewer with them. The format is
-that of pointclouds.org, "The PCD (Point Cloud Data) file format"; ``binary_compressed`` is LZF.
+PCD is decoded here: trimesh cannot, and other readers include a viewer. Format: pointclouds.org,
+"The PCD (Point Cloud Data) file format"; ``binary_compressed`` is LZF.
 """
 
 import math
@@ -41,7 +41,7 @@ class PcdCloud:
 
 
 def read_pcd(file: Path) -> PcdCloud:
-    """Read a PCD file; its pose of the sensor (VIEWPOINT) is not used.
+    """Read a PCD file; ignores the sensor's pose (VIEWPOINT).
 
     Raises:
         InputError: the file is not a point cloud, is damaged, or would expand too far.
@@ -75,7 +75,7 @@ def _pcd(file: Path, data: bytes) -> Floats:
     kinds = [_KINDS[key] for key in zip(header["TYPE"], sizes, strict=True)]
     if not {"x", "y", "z"} <= set(names):
         raise ValueError(f"its fields are {' '.join(names)}; x, y and z are needed")
-    if len(set(names)) < len(names):  # padding may be named the same again
+    if len(set(names)) < len(names):  # padding may repeat a name
         names = [n if n in "xyz" else f"{n}{k}" for k, n in enumerate(names)]
     if min(counts) < 1 or len(counts) != len(names):
         raise ValueError("COUNT must be 1 or more of each field")
@@ -111,7 +111,7 @@ def _pcd(file: Path, data: bytes) -> Floats:
 
 
 def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
-    """Words behind each key, and where the data begin."""
+    """Words after each key, and the offset of the data."""
     mark = data[:_HEADER_BYTES].find(b"\nDATA ")
     end = data.find(b"\n", mark + 1) + 1
     if mark < 0 or end == 0:
@@ -136,10 +136,10 @@ def _ascii(body: bytes, names: list[str], counts: list[int], total: int) -> Floa
 
 @compiled(f"int64({readonly_array('uint8', layout='C')}, uint8[::1])")
 def _expand(packed: Bytes, plain: Bytes) -> int:
-    """Expand LZF; the number of bytes written, or -1 if the data are damaged.
+    """Expand LZF; return the number of bytes written, or -1 for damaged data.
 
-    A control byte below 32 stands before that many and one plain bytes; any other is a reference
-    back, its three high bits the length, its five low ones the high bits of the distance.
+    A control byte below 32 precedes that many and one plain bytes. Any other is a back reference:
+    three high bits are the length, five low ones the high bits of the distance.
     """
     at, out = 0, 0
     while at < len(packed):
@@ -166,14 +166,14 @@ def _expand(packed: Bytes, plain: Bytes) -> int:
             length += 2
             if back < 0 or out + length > len(plain):
                 return -1
-            for k in range(length):  # byte by byte: the copy may reach into itself
+            for k in range(length):  # byte by byte: source and target may overlap
                 plain[out + k] = plain[back + k]
         out += length
     return out
 
 
 def read_ply(file: Path) -> tuple[Floats, Any]:
-    """Vertices (n, 3) and faces (k, 3) of a PLY, in its unit; faces are None of a point cloud.
+    """Vertices (n, 3) and faces (k, 3) of a PLY, in its unit; faces are None for a cloud.
 
     Raises:
         InputError: it cannot be read.
@@ -199,7 +199,7 @@ def read_ply(file: Path) -> tuple[Floats, Any]:
         faces = getattr(held, "faces", None)
     except InputError:
         raise
-    except Exception as error:  # trimesh raises whatever its parsers meet
+    except Exception as error:  # trimesh raises the exceptions of its parsers
         raise InputError(f"{file}: cannot be read as a PLY: {error}") from None
     if faces is None or len(faces) == 0:
         return points[np.isfinite(points).all(axis=1)], None

@@ -1,6 +1,6 @@
-"""Raster files without a place on the earth: pictures, tables and arrays of numbers.
+"""Raster files without a coordinate system: pictures, tables and arrays of numbers.
 
-Rows are stored from the north, as elevation models and pictures are; in a ``Raster`` y grows.
+Rows are stored from the north, like elevation models and pictures; in a ``Raster`` y grows.
 """
 
 import math
@@ -44,7 +44,7 @@ class Raster:
 
 @dataclass(frozen=True, slots=True)
 class RasterUnits:
-    """Facts about its numbers that a file may leave out."""
+    """Facts about a file's numbers that it may omit."""
 
     unit: str | None = None
     """Unit of lengths: of ``UNITS_M``, or deg (then heights are metres); None: as the file
@@ -60,11 +60,11 @@ class RasterUnits:
 
 
 def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Raster:
-    """Read a PNG, a CSV or an NPZ, or the part of it within a crop.
+    """Read a PNG, a CSV or an NPZ, or its part within a crop.
 
     Raises:
-        InputError: it cannot be read, is not a raster of heights, is too large, states no size of
-            its cells where ``units`` does not either, or has no cell within the crop.
+        InputError: it cannot be read, has no heights, is too large, has an unknown cell size, or no
+            cell within the crop.
         OSError: the file cannot be opened.
 
     """
@@ -105,7 +105,7 @@ def raster_window(
     from_north: bool = True,
     most_cells: int = MOST_CELLS,
 ) -> tuple[slice, slice]:
-    """Rows and columns of a file that lie within a crop.
+    """Rows and columns of a file within a crop.
 
     Raises:
         InputError: they are fewer than 2 by 2, or over ``most_cells``.
@@ -132,14 +132,14 @@ def raster_window(
 
 
 def _span(low_m: float, high_m: float, step_m: float, count: int) -> tuple[int, int]:
-    """First and one past the last cell whose middle lies within a span."""
+    """First and end cell with their middle within a span."""
     first = max(0, math.ceil(low_m / step_m - 0.5 - 1e-9))
     last = count if math.isinf(high_m) else math.floor(high_m / step_m - 0.5 + 1e-9) + 1
     return first, min(count, last)
 
 
 def _picture(file: Path) -> Floats:
-    """Grey levels (rows, columns) of a picture of 8 or 16 bit."""
+    """Grey levels (rows, columns) of an 8 or 16 bit picture."""
     require_extra("pictures need", "cv2")
     import cv2  # noqa: PLC0415  an extra
 

@@ -1,7 +1,7 @@
-"""A calibrated pair of cameras: its file, its rectified pictures, and points from disparities.
+"""A calibrated pair of cameras: its file, rectified pictures, and points from disparities.
 
-Coordinates of a camera: x to the right, y down, z forward. A point ``p`` of the left camera is
-``rotation @ p + translation`` in the right one, as OpenCV's ``stereoCalibrate`` has it.
+Camera axes: x to the right, y down, z forward. A point ``p`` of the left camera is ``rotation @ p +
+translation`` in the right one, as in OpenCV's ``stereoCalibrate``.
 """
 
 import re
@@ -49,7 +49,7 @@ class StereoCalibration:
 
 @dataclass(frozen=True, slots=True)
 class RectifiedPair:
-    """Two pictures whose rows correspond, and the camera that records both."""
+    """Two pictures with corresponding rows, and their camera."""
 
     left: Image
     right: Image
@@ -66,7 +66,7 @@ class RectifiedPair:
     """(3, 3) from the left camera's axes to the rectified ones."""
 
     def points_m(self, disparity: Floats) -> Floats:
-        """(H, W, 3) points in the left camera's own axes; NaN for a pixel without a disparity."""
+        """(H, W, 3) points in the left camera's axes; NaN without a disparity."""
         rows, columns = disparity.shape
         u, v = np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float))
         beyond = disparity + self.offset_px
@@ -77,18 +77,13 @@ class RectifiedPair:
 
 
 def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
-    """Read a calibration.
+    """Read a calibration by its ending; ``unit_m`` is metres per unit of the translation.
 
-    The reader accepts files of OpenCV (.yml, .yaml, .xml, .json), .json with plain lists and .npz
-    with the same names, and calib.txt of the Middlebury pairs, whose baseline is in millimetres.
-
-    Args:
-        file: by its ending.
-        unit_m: metres per unit of the translation.
+    Accepts files of OpenCV (.yml, .yaml, .xml, .json), .json with plain lists and .npz with the
+    same names, and calib.txt of the Middlebury pairs, whose baseline is in millimetres.
 
     Raises:
-        InputError: the file has another format, lacks something, or does not describe a pair side
-            by side.
+        InputError: another format, a missing value, or not a pair side by side.
         OSError: it cannot be opened.
 
     """
@@ -119,7 +114,7 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
 
 
 def _storage(file: Path) -> dict[str, Any]:
-    """Matrices of a file of OpenCV by name, or lists of a plain JSON file."""
+    """Matrices of an OpenCV file by name, or lists of a plain JSON file."""
     check_matrices(file)
     lists = read_json_lists(file)
     if lists is not None:
@@ -202,10 +197,10 @@ def _checked(file: Path, found: Mapping[str, Any]) -> StereoCalibration:
 
 
 def rectify(calibration: StereoCalibration, left: Image, right: Image) -> RectifiedPair:
-    """Warp two pictures so that a point has the same row in both; ideal pairs stay as they are.
+    """Warp two pictures so that a point has the same row in both; ideal pairs are unchanged.
 
     Raises:
-        InputError: pictures of different sizes, or whose size does not fit the calibration.
+        InputError: the sizes differ, or do not fit the calibration.
 
     """
     c, (rows, columns) = calibration, left.shape[:2]

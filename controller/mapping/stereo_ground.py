@@ -1,7 +1,7 @@
 """The ground in front of a pair of cameras: disparities to points to a map with holes.
 
-The map's frame: origin on the ground plane below the left camera, x where the camera looks, y to
-the left, z up.
+The map's frame: origin on the ground below the left camera, x where the camera looks, y to the
+left, z up.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ _LEAST_GROUND: Final = 0.2
 
 @dataclass(frozen=True, slots=True)
 class CameraStand:
-    """Where the left camera stands above the ground."""
+    """Pose of the left camera above the ground."""
 
     height_m: float
     tilt_rad: float
@@ -50,7 +50,7 @@ class CameraStand:
 
     @classmethod
     def on_plane(cls, normal: Floats, height_m: float) -> "CameraStand":
-        """Stand over a plane with a unit normal (3,), in the camera's axes, that points up."""
+        """Stand over a plane with an upward unit normal (3,) in the camera's axes."""
         # Up is (-sin(roll) cos(tilt), -cos(roll) cos(tilt), -sin(tilt)) in the camera's axes.
         tilt_rad = float(np.arcsin(np.clip(-normal[2], -1.0, 1.0)))
         return cls(height_m, tilt_rad, float(np.arctan2(-normal[0], -normal[1])))
@@ -58,7 +58,7 @@ class CameraStand:
 
 @dataclass(frozen=True, slots=True)
 class StereoGround:
-    """A map, and how it came about."""
+    """A map and its statistics."""
 
     elevation: ElevationMap
     disparity: Floats
@@ -82,21 +82,20 @@ def stereo_ground(
     *,
     is_level: bool = False,
 ) -> StereoGround:
-    """Map the ground that a pair of pictures shows.
+    """Map the ground in a pair of pictures.
 
     Args:
         pair: rectified pictures.
-        count: disparities that are tried, from that of a point at infinity on.
+        count: number of disparities, from that of a point at infinity.
         spacing_m: between the map's samples.
-        error_m: a point is left out if its expected error,
-            ``distance * DISPARITY_ERROR_PX / disparity``, is more.
+        error_m: largest expected error of a point, ``distance * DISPARITY_ERROR_PX / disparity``.
         stand: height, tilt and roll of the camera; None fits a plane to the visible points.
-        far_m: points farther ahead, level, are left out.
-        is_level: the visible plane is level, also if it is tilted sideways against the camera.
+        far_m: largest horizontal distance of points.
+        is_level: the visible plane is level, even if it is tilted sideways against the camera.
 
     Raises:
-        InputError: no ground is found, its vertical is not known, or nothing is near enough for
-            the error.
+        InputError: no ground is found, its vertical is unknown, or nothing is near enough for the
+            error.
 
     """
     disparity, used, expected_m = seen_points(pair, count, error_m)
@@ -126,7 +125,7 @@ def stereo_ground(
 
 
 def require_upright(stand: CameraStand) -> None:
-    """Reject a fitted stand that rolls: pictures alone do not show whether the ground does.
+    """Reject a fitted stand with roll: pictures do not show whether the ground is level.
 
     Raises:
         InputError: the ground tilts sideways against the camera.
@@ -143,14 +142,9 @@ def require_upright(stand: CameraStand) -> None:
 
 
 def seen_points(pair: RectifiedPair, count: int, error_m: float) -> tuple[Floats, Floats, Floats]:
-    """Result for a pair: disparities (H, W), points (n, 3), and the expected error of each (n,).
+    """Disparities (H, W), points (n, 3), and their expected errors (n,).
 
-    Args:
-        pair: rectified pictures.
-        count: disparities that are tried, from that of a point at infinity on.
-        error_m: a point is left out if its expected error,
-            ``distance * DISPARITY_ERROR_PX / disparity``, is more.
-
+    Arguments as in ``stereo_ground``.
     """
     least = max(0, int(np.floor(-pair.offset_px)))
     disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
@@ -163,13 +157,13 @@ def seen_points(pair: RectifiedPair, count: int, error_m: float) -> tuple[Floats
 
 
 def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:
-    """Stand of a camera over the plane that most points (n, 3) lie on, within three errors (n,).
+    """Stand of a camera over the plane of most points (n, 3), within three errors (n,).
 
-    The plane is that of largest consensus among random ones, then of least squares over what lies
-    on it. It is level only if the ground is: on a slope give the stand.
+    The plane of largest consensus among random ones is refined by least squares. It is level only
+    if the ground is: on a slope give the stand.
 
     Raises:
-        InputError: no plane below the camera holds a fifth of the points.
+        InputError: no plane below the camera has a fifth of the points.
 
     """
     rng = np.random.default_rng(0)
@@ -182,7 +176,7 @@ def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:
         size = np.linalg.norm(normal)
         if size < 1e-12:
             continue
-        normal = normal / size * (-1.0 if normal[1] > 0.0 else 1.0)  # up: y runs down
+        normal = normal / size * (-1.0 if normal[1] > 0.0 else 1.0)  # up: y points down
         if -normal[1] < _LEVEL_ENOUGH or normal @ a >= 0.0:
             continue
         held = int((np.abs(points @ normal - normal @ a) <= reach).sum())

@@ -1,7 +1,7 @@
-"""The stereo head of a simulated run: rendered pictures on the way, and the map that comes of them.
+"""The stereo head of a simulated run: rendered pictures, and the map from them.
 
-The true ground is seen by the renderer and by the physics alone. The content of the pictures goes
-into the map, placed by the pose that the run measures, with the errors of a picture's own pose.
+Only the renderer and the physics see the true ground. The map places the content of the pictures by
+the measured pose.
 """
 
 from collections import deque
@@ -40,10 +40,10 @@ class _Seen(NamedTuple):
 
 
 class StereoHead:
-    """Records a pair of pictures each period, and adds its ground to the map when it is matched.
+    """Records a pair of pictures each period, and adds its ground to the map once matched.
 
     Raises:
-        OffscreenError: nothing here draws without a screen.
+        OffscreenError: no off-screen OpenGL.
 
     """
 
@@ -78,13 +78,9 @@ class StereoHead:
         """Time and qpos (7 + J,) of the last call."""
 
     def observe(self, now_s: float, pose: BodyPose, joint_rad: Floats) -> None:
-        """Record a picture if one is due; add those to the map that are matched by now.
+        """Record a picture if due, and add the matched ones to the map.
 
-        Args:
-            now_s: of the run's clock.
-            pose: of the head, as the run measures it.
-            joint_rad: (J,) as measured.
-
+        ``pose`` of the head and ``joint_rad`` (J,) are measured; ``now_s`` is the run's clock.
         """
         qpos = np.array(self._qpos())
         if now_s >= self._next_s - 1e-9:
@@ -96,7 +92,7 @@ class StereoHead:
         self.fuse(now_s)
 
     def fuse(self, now_s: float) -> None:
-        """Add to the map what has arrived."""
+        """Add matched pictures to the map."""
         while self._coming and self._coming[0].arrives_s <= now_s + 1e-9:
             seen = self._coming.popleft()
             self._map.add(seen.points_m, seen.error_m, seen.taken_s)
@@ -106,7 +102,7 @@ class StereoHead:
         self._view.close()
 
     def _look(self, now_s: float, qpos: Floats, body: BodyView) -> tuple[Floats, Floats]:
-        """(n, 3) points of the ground in the world as the run believes it, and their errors."""
+        """(n, 3) ground points in the estimated world frame, and their errors."""
         config = self._config
         left, right = self._view.taken(self._exposed(now_s, qpos), qpos)
         matrix = self._view.camera_matrix
@@ -131,7 +127,7 @@ class StereoHead:
         return points_m[free], error_m[near][free]
 
     def _true_frame(self, q: Floats) -> CameraFrame:
-        """Where the left camera is with the body at ``q`` (7 + J,)."""
+        """Pose of the left camera with the body at ``q`` (7 + J,)."""
         turned = Rotation.from_quat(q[3:7], scalar_first=True).as_matrix()
         body = body_in_world(self._robot, BodyPose(0.0, q[:3], turned), q[7:])
         return self._frame(body)
@@ -144,7 +140,7 @@ class StereoHead:
         return CameraFrame(at_m, tilted(config.tilt_rad, carrier))
 
     def _exposed(self, now_s: float, qpos: Floats) -> list[CameraFrame]:
-        """Instants of the exposure, up to now: more of them, the more the camera moves in it."""
+        """Instants of the exposure up to now; more for a faster camera."""
         frame = self._true_frame(qpos)
         if self._before is None or now_s <= self._before[0]:
             return [frame]
@@ -163,12 +159,12 @@ class StereoHead:
         ]
 
     def _touch(self, body: BodyView) -> None:
-        """The ground is a radius below each link that lies on it."""
+        """Mark the ground a radius below each link that lies on it."""
         radius_m = np.array(self._robot.link_radii_m)
         self._map.touch(body.link_m - radius_m[:, None] * [0.0, 0.0, 1.0])
 
     def _is_body(self, points_m: Floats, body: BodyView) -> Bools:
-        """(n,) whether points may be of the body itself."""
+        """(n,) whether points may belong to the body."""
         chain_m = chain_points_m(self._robot, body)[:, :2]
         reach_m = self._robot.body_radius_m + _BODY_MARGIN_M
         low, high = chain_m.min(axis=0) - reach_m, chain_m.max(axis=0) + reach_m

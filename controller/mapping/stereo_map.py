@@ -1,4 +1,4 @@
-"""The robot's stereo head as a map source: the ground is known as far as the head has seen it."""
+"""The robot's stereo head as a map source: only seen ground is known."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -42,10 +42,10 @@ class StereoMap:
 
     @contextmanager
     def open(self, context: MapContext) -> Iterator[MapProvider]:
-        """Map the ground on the way; the map is left in the run's folder.
+        """Map the ground during the run; the map is stored in the run's folder.
 
         Raises:
-            OffscreenError: nothing here draws without a screen.
+            OffscreenError: no off-screen OpenGL.
 
         """
         prepared, backend = context.prepared, context.backend

@@ -1,4 +1,4 @@
-"""A map of ground from above: heights, unknown places, and places where a path may go."""
+"""A picture of a map from above: heights, unknown places, and safe ground."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from snakewalk.controller.terrain.relief import Relief
 
 
 def draw_terrain_map(relief: Relief, file: Path, title: str) -> None:
-    """Draw a map, hatched where nothing was measured, blue where a path may go."""
+    """Draw a map: hatched where unknown, blue where a path may go."""
     ground = relief.ground
     w, h = ground.size_m
     wide_in = WIDTH_IN

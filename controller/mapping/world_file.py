@@ -16,13 +16,13 @@ from snakewalk.controller.terrain.relief import Relief
 
 
 def map_beside(world: Path) -> Path:
-    """File of the map of a world's file."""
+    """Map file of a world's file."""
     return world.with_name(f"{world.stem}-map.npz")
 
 
 @dataclass(frozen=True, slots=True)
 class MapWorld:
-    """A world made of a map, not yet written."""
+    """A world from a map, not yet written."""
 
     file: Path
     """The world's TOML."""
@@ -32,7 +32,7 @@ class MapWorld:
 
     @classmethod
     def of(cls, file: Path, ground: HeightField) -> "MapWorld":
-        """Name a map's world after its file; the planner's limits are the defaults.
+        """Name a map's world after its file; the planner has default limits.
 
         Raises:
             InputError: the file's name cannot name a world.
@@ -48,14 +48,14 @@ class MapWorld:
         return map_beside(self.file)
 
     def write(self, comment: Sequence[str]) -> None:
-        """Write both files, with lines of comment at the head."""
+        """Write both files, with a head comment."""
         with atomic_write(self.file) as part:
             write_map(part.with_name(self.map_file.name), self.ground)
             text = template(self.config, "\n".join([*comment, self._holes()]))
             part.write_text(text, encoding="utf-8")
 
     def facts(self) -> dict[str, object]:
-        """Numbers for the user: extent, holes, share of safe ground, and the most open place."""
+        """Extent, holes, share of safe ground, and the most open place."""
         ground = self.ground
         rows, columns = ground.z_m.shape
         x = ground.x0_m + np.arange(columns) * ground.spacing_m
@@ -79,7 +79,7 @@ class MapWorld:
 
     @property
     def known_share(self) -> float:
-        """Samples that were measured, over all."""
+        """Share of measured samples."""
         return 1.0 if self.ground.known is None else float(self.ground.known.mean())
 
     def _holes(self) -> str:

@@ -62,7 +62,7 @@ def board(
 
 
 def check_print(out: Path) -> None:
-    """Refuse files that nothing is printed from.
+    """Reject files that cannot be printed.
 
     Raises:
         InputError: it is neither a .pdf nor a .png.

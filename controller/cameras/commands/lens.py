@@ -103,7 +103,7 @@ def calibrate_camera(
 def _from_files(
     path: Path, board: CalibrationBoard, most: int
 ) -> tuple[list[BoardView | None], tuple[int, int]]:
-    # OpenCV finds boards in 8 bit; deeper pictures come on the same scale
+    # OpenCV finds boards in 8 bit pictures
     pictures = [np.clip(one, 0, 255).astype(np.uint8) for one in open_footage(path).spread(most)]
     sizes = sorted({picture.shape[1::-1] for picture in pictures})
     if len(sizes) > 1:
@@ -115,7 +115,7 @@ def _from_files(
 def _from_device(
     name: str, size: str, board: CalibrationBoard, count: int
 ) -> tuple[list[BoardView | None], tuple[int, int]]:
-    """Record pictures one after another and report for each whether the board was found in it."""
+    """Record pictures and report for each whether the board was found."""
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
         raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")

@@ -1,1 +1,1 @@
-"""Printed markers on the floor: found in a picture, and results from them."""
+"""Printed markers on the floor: detection, and results from them."""

@@ -1,6 +1,6 @@
-"""Printed markers on the floor: found in a picture; they give the floor, and show a bump.
+"""Printed markers on the floor: detection, fit of the floor, and bumps of the camera.
 
-A marker is a square of ArUco's smallest dictionary: at 16 px of side one of its cells has 2.7 px.
+A marker is a square of ArUco's smallest dictionary: at a side of 16 px a cell has 2.7 px.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,25 +21,23 @@ COUNT: Final = 50
 FEWEST: Final = 4
 """Markers that fix a floor."""
 _CELLS: Final = 6  # across a marker, its black border included
-_LARGER: Final = (
-    2  # markers are searched in a picture enlarged by this factor: cells of 2 px (ours)
-)
+_LARGER: Final = 2  # enlargement of the picture for the search: cells of 2 px (ours)
 _INCH_M: Final = 0.0254
-_DRAWN: Final = 6, 24  # px of a cell of the print that is laid onto a picture, least and most
+_DRAWN: Final = 6, 24  # px per cell of the print fitted to a picture, least and most
 _STEPS: Final = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-4
-_SMOOTH: Final = 3  # px of the smoothing before a print is laid onto a picture
-_FURTHEST: Final = 0.5  # of a cell: by how much a corner may be bettered (ours)
+_SMOOTH: Final = 3  # px of the smoothing before a print is fitted
+_FURTHEST: Final = 0.5  # of a cell: largest correction of a corner (ours)
 _AGREE_PX: Final = 1.5  # largest residual of a marker that moved with the picture (ours)
-_FEWEST_MOVED: Final = 3  # markers seen before and now that give the move of the picture
-_TURNED_PX: Final = 0.5  # largest residual of a camera that was only turned (ours)
-_LEAST_SPREAD: Final = 0.05  # of markers' places: less, and they lie on a line
+_FEWEST_MOVED: Final = 3  # markers seen before and now, for the picture's move
+_TURNED_PX: Final = 0.5  # largest residual of a purely rotated camera (ours)
+_LEAST_SPREAD: Final = 0.05  # of markers' places: less is a line
 Markers = Mapping[int, Floats]
 """Corners (4, 2) of each marker by its number, pixels, the upper left of the print first."""
 
 
 @dataclass(frozen=True, slots=True)
 class FloorFit:
-    """The floor as its markers show it."""
+    """The floor from its markers."""
 
     floor_from_px: Floats
     """(3, 3) homography of pixels without distortion to metres."""
@@ -53,13 +51,13 @@ class FloorFit:
 
     @property
     def rms_m(self) -> float:
-        """Root of the mean square of the residuals."""
+        """Root mean square of the residuals."""
         return float(np.sqrt(np.mean(np.square(list(self.residual_m.values())))))
 
 
 @dataclass(frozen=True, slots=True)
 class Bump:
-    """By how much a camera's picture has moved since it was set up."""
+    """Move of a camera's picture since its set-up."""
 
     shift_px: tuple[float, float]
     """x, y: of the picture's middle."""
@@ -76,7 +74,7 @@ class Bump:
         return float(np.hypot(*self.shift_px))
 
     def __str__(self) -> str:
-        """Description of the event."""
+        """Text of the event."""
         if not self.undone:
             return (
                 f"floor markers: lie about {self.away_px:.1f} px from their places, each in "
@@ -103,7 +101,7 @@ class Bump:
 
 @dataclass(frozen=True, slots=True)
 class PictureMove:
-    """Where what was seen at one pixel is seen now."""
+    """Map from earlier to present pixels of the same place."""
 
     now_from_then: Floats
     """(3, 3) homography of pixels without distortion."""
@@ -111,14 +109,14 @@ class PictureMove:
 
 
 def marker_picture(number: int, side_px: int) -> Image:
-    """(side, side) a marker as it is printed, without its white margin."""
+    """(side, side) a printed marker without its white margin."""
     side = max(1, side_px // _CELLS) * _CELLS
     drawn = cv2.aruco.generateImageMarker(_dictionary(), number, side)
     return np.asarray(drawn, dtype=np.uint8)
 
 
 def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
-    """(H, W) a page: the marker, half a cell of white, and below it its number and side."""
+    """(H, W) a page: the marker, half a cell of white, and its number and side."""
     drawn = marker_picture(number, round(side_m / _INCH_M * dots_per_inch))
     margin, foot = len(drawn) // (2 * _CELLS), len(drawn) // 6
     page = np.pad(drawn, ((margin, margin + foot), (margin, margin)), constant_values=255)
@@ -131,7 +129,7 @@ def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
 
 
 def find_markers(picture: Image) -> dict[int, Floats]:
-    """Corners of the markers in a picture (H, W[, 3]), except those that are seen twice."""
+    """Corners of the markers in a picture (H, W[, 3]), except those seen twice."""
     grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     large = cv2.resize(grey, None, fx=_LARGER, fy=_LARGER, interpolation=cv2.INTER_CUBIC)
     corners, numbers, _ = cv2.aruco.ArucoDetector(_dictionary()).detectMarkers(large)
@@ -145,7 +143,7 @@ def find_markers(picture: Image) -> dict[int, Floats]:
 
 
 def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
-    """Corners by the whole print, laid onto the picture: gain and saturation do not move them."""
+    """Corners by fitting the whole print: gain and saturation do not move them."""
     cells_px = float(np.hypot(*(corners[1] - corners[0]))) / _CELLS
     cell = int(np.clip(cells_px, *_DRAWN))
     drawn = marker_picture(number, _CELLS * cell)
@@ -162,7 +160,7 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
         _, move = cv2.findTransformECC(
             sheet, seen, start, cv2.MOTION_AFFINE, _STEPS, whole, _SMOOTH
         )
-    except cv2.error:  # does not converge: half covered, or blurred
+    except cv2.error:  # no convergence: half covered, or blurred
         return corners
     turned = ends @ np.asarray(move[:, :2], dtype=float).T + move[:, 2]
     better = projected(np.asarray(there, dtype=float), turned)
@@ -172,16 +170,15 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
 def fit_floor(
     seen: Markers, places_m: Mapping[int, Sequence[float]], lens: Lens | None
 ) -> FloorFit:
-    """Fit the floor to the middles of its markers.
+    """Fit the floor to the centres of its markers.
 
     Args:
         seen: in a picture.
-        places_m: (2,) of the middle of each marker on the floor.
-        lens: without distortion, pixels and floor are one homography; with a known lens the
-            camera's place is reported as well.
+        places_m: (2,) of each marker's centre on the floor.
+        lens: None: pixels and floor are one homography; otherwise the camera's place is fitted too.
 
     Raises:
-        InputError: fewer than four of the markers are seen, or they lie on a line.
+        InputError: fewer than four markers are seen, or they are on a line.
 
     """
     used = sorted(set(seen) & set(places_m))
@@ -201,7 +198,7 @@ def fit_floor(
     homography, _ = cv2.findHomography(middles, floor)
     lens_m: Floats | None = None
     if lens is not None:
-        rotation, shift = _pose(floor, middles, lens.matrix)  # six numbers in place of eight
+        rotation, shift = _pose(floor, middles, lens.matrix)  # six parameters instead of eight
         homography = np.linalg.inv(_over_floor((rotation, shift), lens.matrix))
         homography, lens_m = homography / homography[2, 2], -rotation.T @ shift
     if homography is None or not np.isfinite(homography).all():
@@ -222,20 +219,20 @@ def fit_floor(
 def picture_move(
     then: Markers, now: Markers, floor_from_px: Floats, matrix: Floats, lens: Lens | None
 ) -> PictureMove | None:
-    """How a camera's picture has moved, by markers that are seen in both.
+    """Move of a camera's picture, from markers seen at both times.
 
-    A bump turns the camera about its lens, or carries it by a little. Markers that disagree with
-    the others were moved on the floor; fewer than half may be.
+    A bump rotates the camera about its lens, or shifts it slightly. Outlying markers were moved on
+    the floor; these must be fewer than half.
 
     Args:
         then: at the set-up.
         now: later.
         floor_from_px: (3, 3) of the set-up.
-        matrix: (3, 3) camera matrix, at least nearly.
-        lens: whose distortion is undone first.
+        matrix: (3, 3) approximate camera matrix.
+        lens: its distortion is removed first.
 
     Returns:
-        None where fewer than three markers are seen in both.
+        None if fewer than three markers are seen at both times.
 
     """
     one, two = ({name: _plain(px, lens) for name, px in seen.items()} for seen in (then, now))
@@ -261,7 +258,7 @@ def picture_move(
 
 
 def _turned(matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> Floats:
-    """(3, 3) of a camera that was turned about its lens: Wahba's problem by its SVD."""
+    """(3, 3) for a rotated camera: Wahba's problem by SVD."""
     rays = []
     for seen in (one, two):
         px = np.concatenate([seen[name] for name in names])
@@ -275,7 +272,7 @@ def _turned(matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) ->
 def _carried(
     matrix: Floats, floor_from_px: Floats, one: Markers, two: Markers, names: Sequence[int]
 ) -> Floats:
-    """(3, 3) of a camera that was turned and carried: its poses over the floor, then and now."""
+    """(3, 3) for a rotated and shifted camera: its poses over the floor, then and now."""
     before, after = (np.concatenate([seen[name] for name in names]) for seen in (one, two))
     floor = projected(floor_from_px, before)
     then, now = (_pose(floor, px, matrix) for px in (before, after))
@@ -284,13 +281,13 @@ def _carried(
 
 
 def _without(name: int, matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
-    """How well the others agree without one of them, px."""
+    """Residual of the other markers without one, px."""
     rest = [other for other in names if other != name]
     return _residual_px(_turned(matrix, one, two, rest), one, two, rest)
 
 
 def _residual_px(move: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
-    """Residual of the marker that is furthest off."""
+    """Largest residual of a marker."""
     return max(
         float(np.hypot(*(projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
     )
@@ -306,7 +303,7 @@ def _bump(move: Floats, matrix: Floats, left_out: tuple[int, ...]) -> Bump:
 
 
 def _pose(floor: Floats, px: Floats, matrix: Floats) -> tuple[Floats, Floats]:
-    """Turn (3, 3) and place (3,) of the floor as the camera sees it."""
+    """Rotation (3, 3) and place (3,) of the floor in the camera's axes."""
     flat = np.column_stack([floor, np.zeros(len(floor))])
     _, turn, shift = cv2.solvePnP(flat, px, matrix, None, flags=cv2.SOLVEPNP_IPPE)
     turn, shift = cv2.solvePnPRefineLM(flat, px, matrix, None, turn, shift)
@@ -321,7 +318,7 @@ def _over_floor(pose: tuple[Floats, Floats], matrix: Floats) -> Floats:
 
 
 def middle_of(corners: Floats) -> Floats:
-    """Where the diagonals (4, 2) cross: the middle, aslant as well."""
+    """Intersection of the diagonals (4, 2): the centre, also in perspective."""
     a, b, c, d = corners
     along = np.linalg.solve(np.column_stack([c - a, b - d]), b - a)
     return np.asarray(a + along[0] * (c - a))

@@ -1,8 +1,8 @@
 """Distortion of an uncalibrated lens, from the printed markers on the floor.
 
-Without distortion, pixels and floor are one homography. Places and shapes of the markers then agree
-within the accuracy of their corners and of their measured places. The fit adds one radial
-coefficient about the picture's middle, and reports it only if it is significant.
+Without distortion, pixels and floor are one homography: places and shapes of the markers agree
+within their accuracy. The fit adds one radial coefficient about the picture's middle, and reports
+it only if it is significant.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,20 +18,20 @@ from snakewalk.controller.cameras.lens import projected
 from snakewalk.controller.cameras.markers.floor_markers import FEWEST, Markers, middle_of
 
 _CORNER_PX: Final = 0.3  # standard deviation of a corner (ours)
-_PLACE_M: Final = 0.004  # of the measured place of a marker, each coordinate (ours)
+_PLACE_M: Final = 0.004  # of a marker's measured place, per coordinate (ours)
 _SIDE: Final = 0.02  # of the side of all prints, as a share (ours)
 _SURE: Final = 3.0  # standard deviations of the coefficient from 0 (ours)
-_STARTS: Final = 0.0, 0.1  # of the coefficient: a strong distortion has a second minimum (ours)
-_GRID: Final = 9  # points across the picture where the error is evaluated
+_STARTS: Final = 0.0, 0.1  # of the coefficient: strong distortion has a second minimum (ours)
+_GRID: Final = 9  # points across the picture for the error
 _SQUARE: Final = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])  # as printed
-_SPAN_M: Final = 1.0  # of floor over which a distortion turns a body (ours)
+_SPAN_M: Final = 1.0  # of floor over which a distortion rotates a body (ours)
 NOTICEABLE_M: Final = 0.005
 """A smaller error of a place on the floor is not reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class Distortion:
-    """Radial distortion that the markers show."""
+    """Radial distortion in the markers."""
 
     coefficient: float
     """Share by which radii grow when the distortion is undone, at half a picture's width."""
@@ -69,12 +69,12 @@ def marker_distortion(
 
     Args:
         seen: corners of the markers.
-        places_m: (2,) of the middle of each marker on the floor.
+        places_m: (2,) of each marker's centre on the floor.
         size_px: width and height of the picture.
         side_m: of a printed marker.
 
     Returns:
-        None of fewer than four markers, or of markers on a line.
+        None for fewer than four markers, or markers on a line.
 
     """
     names = sorted(set(seen) & set(places_m))
@@ -125,6 +125,6 @@ def marker_distortion(
 
 
 def _undone(points: Floats, coefficient: float) -> Floats:
-    """(..., 2) points about the middle of the picture without radial distortion."""
+    """(..., 2) points about the picture's middle without radial distortion."""
     radius2 = np.square(points).sum(axis=-1, keepdims=True)
     return np.asarray(points * (1.0 + coefficient * radius2))

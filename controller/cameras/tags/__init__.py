@@ -1,1 +1,1 @@
-"""Printed tags on the links of a robot: a pose source with six degrees of freedom."""
+"""Printed tags on a robot's links: a pose source with six degrees of freedom."""

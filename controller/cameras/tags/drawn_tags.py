@@ -1,7 +1,6 @@
-"""Drawn pictures of a simulated robot's tags, with the blur and the noise of a camera.
+"""Drawn pictures of a simulated robot's tags, with blur and noise.
 
-Only the tags are drawn, on a grey background; a tag that faces away is hidden, and links hide
-nothing.
+Only tags are drawn, on grey; a tag that faces away is hidden, but links hide nothing.
 """
 
 from typing import Any, Final
@@ -103,7 +102,7 @@ class DrawnTags:
 
 
 def _window(to_picture: Floats, side_px: int, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """Return left, top, right and low of the part of a picture that a print covers."""
+    """Left, top, right and low of the picture part that a print covers."""
     edge = float(side_px)
     corners = np.array([[[0.0, 0.0], [edge, 0.0], [edge, edge], [0.0, edge]]])
     covered = cv2.perspectiveTransform(corners, np.asarray(to_picture, dtype=float))[0]

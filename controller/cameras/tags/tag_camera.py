@@ -1,4 +1,4 @@
-"""Cameras whose pictures show tags: a real one, read in a thread, and the simulator's."""
+"""Cameras with tags in their pictures: a real one in a thread, and the simulator's."""
 
 import queue
 import threading
@@ -24,10 +24,10 @@ _LOOK_S: Final = 0.02
 
 
 class TagPictures(Protocol):
-    """Where pictures come from, as tags that were found in them."""
+    """Source of pictures, as their tags."""
 
     def arrived(self, now_s: float) -> list[TagPicture]:
-        """Return the pictures since the last call; returns at once.
+        """Return the pictures since the last call, without waiting.
 
         Raises:
             InputError: the camera has failed.
@@ -36,12 +36,12 @@ class TagPictures(Protocol):
         ...
 
     def close(self) -> None:
-        """Let the camera go."""
+        """Release the camera."""
         ...
 
 
 class DeviceTags:
-    """Tags in the pictures of a device that OpenCV opens; ``close`` it.
+    """Tags in the pictures of an OpenCV device; ``close`` it.
 
     Raises:
         InputError: the device cannot be opened.
@@ -64,7 +64,7 @@ class DeviceTags:
         """Return the pictures since the last call.
 
         Raises:
-            InputError: the device hands over none any more, or in another size.
+            InputError: the device stopped, or changed its picture size.
 
         """
         found = []
@@ -100,7 +100,7 @@ class DeviceTags:
 
 
 class SimulatedTags:
-    """Tags in drawn pictures of a simulated body; each arrives one period after it was taken."""
+    """Tags in drawn pictures of a simulated body; each arrives a period after it was taken."""
 
     def __init__(
         self,
@@ -112,14 +112,14 @@ class SimulatedTags:
         on_picture: OnPicture,
         seed: int,
     ) -> None:
-        """Watch a body: ``body`` returns the pose of its head and its joint angles."""
+        """Watch a body: ``body`` returns its head pose and joint angles."""
         self._drawn = DrawnTags(robot, TagView.of(camera), camera.fixed_tags, seed)
         self._detector, self._body, self._on_picture = detector, body, on_picture
         self._period_s, self._next_s = 1.0 / camera.rate_hz, clock.now_s()
         self._coming: deque[TagPicture] = deque()
 
     def arrived(self, now_s: float) -> list[TagPicture]:
-        """Record a picture if one is due; return those that have arrived."""
+        """Record a picture if due; return arrived ones."""
         if now_s >= self._next_s - 1e-9:
             head, joint_rad = self._body()
             picture: Image = self._drawn.picture(head, joint_rad)
@@ -140,7 +140,7 @@ def first_picture(pictures: TagPictures, clock: Clock) -> TagPicture:
     """Wait for a picture with tags.
 
     Raises:
-        InputError: none shows a tag within 5 s.
+        InputError: no tag within 5 s.
 
     """
     until_s, seen = clock.now_s() + PATIENCE_S, 0

@@ -1,4 +1,4 @@
-"""Printed tags in a picture: the corners of those that a robot or a world has."""
+"""Printed tags in a picture: the corners of known tags."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ def tag_dictionary(name: str) -> Any:
     """Return OpenCV's dictionary ``DICT_name``.
 
     Raises:
-        InputError: OpenCV has no such dictionary.
+        InputError: it does not exist.
 
     """
     number = getattr(cv2.aruco, f"DICT_{name}", None)
@@ -45,10 +45,10 @@ class TagDetector:
     """Finds tags in pictures."""
 
     def __init__(self, dictionary: str, known: Collection[int]) -> None:
-        """Look for the tags with the numbers ``known``.
+        """Search for the tags with the numbers ``known``.
 
         Raises:
-            InputError: OpenCV has no such dictionary, or it has no tag with such a number.
+            InputError: the dictionary, or a tag in it, does not exist.
 
         """
         tags = tag_dictionary(dictionary)
@@ -64,7 +64,7 @@ class TagDetector:
         self._detector = cv2.aruco.ArucoDetector(tags, parameters)
 
     def find(self, picture: Image) -> dict[int, Floats]:
-        """Return the corners of each tag in a picture (H, W[, 3]) that shows it once."""
+        """Return the corners of each tag that a picture (H, W[, 3]) shows once."""
         grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         corners, numbers, _ = self._detector.detectMarkers(grey)
         found: dict[int, Floats] = {}

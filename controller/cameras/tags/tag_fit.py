@@ -1,11 +1,9 @@
-"""The pose of the head from the tags of one picture and the measured joint angles.
+"""The head's pose from the tags of one picture and the measured joint angles.
 
-The joints turn the tags on all links into one rigid set of corners, in the axes of the head.
-A square alone has two poses with nearly the same picture (IPPE); each of them places the whole
-chain, and the one is taken under which the other tags are seen where they are. If only one tag is
-seen, the pose before decides, and without one the attitude that is nearer to upright. All corners
+The joints combine the tags on all links into one rigid set of corners in the head's axes. A single
+square has two similar poses (IPPE). Each places the whole chain; the one that fits the other tags
+is chosen. With one tag, the earlier pose decides, or else the more upright attitude. All corners
 then give the pose by least squares, with its covariance.
-
 [IPPE] T. Collins, A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 109, 2014.
 """
 
@@ -58,7 +56,7 @@ class HeadFit:
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """Corners of some tags: in the axes of the head, and in the picture."""
+    """Corners of tags in the head's axes and in the picture."""
 
     tags: tuple[int, ...]
     points_m: Floats
@@ -85,13 +83,10 @@ class TagFit:
     def fit(
         self, corners_px: Corners, joint_rad: Floats, before: Floats | None = None
     ) -> HeadFit | None:
-        """Return the head's pose; None if no tag of the robot is seen, or none fits.
+        """Return the head's pose; None if no tag of the robot is visible, or none fits.
 
-        Args:
-            corners_px: of the tags in the picture.
-            joint_rad: (J,) when it was taken.
-            before: (3, 3) attitude of the head in an earlier picture, if there is one.
-
+        ``joint_rad`` (J,) are those at the picture's time; ``before`` (3, 3) is an earlier attitude
+        of the head, if known.
         """
         seen = self._seen(corners_px, joint_rad)
         while seen.tags:
@@ -108,9 +103,9 @@ class TagFit:
         return None
 
     def of_link(self, corners_px: Corners) -> tuple[int, HeadFit] | None:
-        """Return a link and its pose from its largest tag alone; None if no tag is seen.
+        """Return a link and its pose from its largest tag only; None without a tag.
 
-        A tag has two poses; the one nearer to upright is returned.
+        A tag has two poses; the more upright one is returned.
         """
         for number in self._seen(corners_px, np.zeros(len(self._spine.half_m) - 1)).tags:
             mount = self._mounts[number]
@@ -138,7 +133,7 @@ class TagFit:
         return _Seen(tuple(numbers), np.concatenate(points), pixels)
 
     def _start(self, seen: _Seen, before: Floats | None) -> tuple[Floats, Floats] | None:
-        """Return the better of the poses that single tags allow, in the axes of the camera."""
+        """Return the best pose from single tags, in the camera's axes."""
         found = []
         for turn, at in self._candidates(seen):
             off = self._off_px(seen, turn, at)
@@ -173,7 +168,7 @@ class TagFit:
     def _refined(
         self, seen: _Seen, turn: Floats, at: Floats, *, weighted: bool = False
     ) -> tuple[Floats, Floats]:
-        """Fit all corners; ``weighted``: tags that are far off count less (Cauchy's weights)."""
+        """Fit all corners; ``weighted``: outlying tags count less (Cauchy's weights)."""
         scale_px = _MISFIT * self._tags.noise_px
         for _ in range(_ROBUST_ROUNDS if weighted else _ROUNDS):
             off, slope = self._off_px(seen, turn, at).ravel(), self._slope(seen, turn, at)
@@ -186,19 +181,19 @@ class TagFit:
         return turn, at
 
     def _per_tag_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
-        """Return the root of the mean square error of each tag's corners."""
+        """Root mean square error of each tag's corners."""
         off = self._off_px(seen, turn, at).reshape(len(seen.tags), 8)
         return np.asarray(np.sqrt((off**2).mean(axis=1)))
 
     def _off_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
-        """Return the errors (4 k, 2) of the corners."""
+        """Errors (4 k, 2) of the corners."""
         places = seen.points_m @ turn.T + at
         ahead = np.maximum(places[:, 2:], _NEAR_M)
         shown = places[:, :2] / ahead @ self.view.lens.matrix[:2, :2].T
         return np.asarray(shown + self.view.lens.matrix[:2, 2] - seen.pixels)
 
     def _slope(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
-        """Return the derivatives (8 k, 6) by position and by rotation, in the camera's axes."""
+        """Derivatives (8 k, 6) by position and rotation, in the camera's axes."""
         arm = seen.points_m @ turn.T
         x, y, z = (arm + at).T
         z = np.maximum(z, _NEAR_M)
@@ -232,12 +227,12 @@ class TagFit:
 
 
 def tag_corners(tag: TagMount, side_m: float) -> Floats:
-    """Return the corners (4, 3) of a tag in the axes of its link."""
+    """Corners (4, 3) of a tag in the axes of its link."""
     return np.array(tag.offset_m) + square(side_m) @ turned(tag.offset_deg).T
 
 
 def _axes_of(corners: Sequence[Floats] | Floats) -> tuple[Floats, Floats]:
-    """Return axes (3, 3) and middle (3,) of a square from its corners (4, 3)."""
+    """Axes (3, 3) and centre (3,) of a square from its corners (4, 3)."""
     upper_left, upper_right, lower_right, lower_left = corners
     right, top = upper_right - upper_left, upper_left - lower_left
     right, top = right / np.linalg.norm(right), top / np.linalg.norm(top)

@@ -77,15 +77,15 @@ class TagsPose:
 
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:
-        """Open the camera for the time of a run; the first tags are awaited before torque.
+        """Open the camera for a run; waits for the first tags before torque.
 
         Raises:
-            InputError: the camera is not there, shows no tag, or shows the robot elsewhere.
+            InputError: the camera is missing, shows no tag, or shows the robot elsewhere.
 
         """
         run, robot = context.prepared.run, context.prepared.robot
         assert robot.tags is not None
-        # the tags give the head in the world: the mounting of another source does not count
+        # the tags give the head in the world: ignore another source's mounting
         config = (robot.pose or PoseConfig()).model_copy(update={
             "link": 0, "offset_m": (0.0,) * 3, "offset_deg": (0.0,) * 3,
             "world_m": (0.0,) * 3, "world_deg": (0.0,) * 3, "frame": WORLD,
@@ -109,7 +109,7 @@ class TagsPose:
 
 
 class TagFeed:
-    """Poses of the head from pictures and from the joint angles at their times."""
+    """Head poses from pictures and the joint angles at their times."""
 
     def __init__(self, robot: RobotConfig, pictures: TagPictures, fit: TagFit) -> None:
         self._pictures, self._fit = pictures, fit
@@ -118,7 +118,7 @@ class TagFeed:
         self._sequence = self._tags = self._used = 0
 
     def note(self, state: JointState) -> None:
-        """Keep the joint angles of a state."""
+        """Store the joint angles of a state."""
         angles = np.array(state.position_rad)
         self._joints.add(Moment(state.time_s, np.zeros(3), angles))
 
@@ -127,7 +127,7 @@ class TagFeed:
         return [self._pose_of(picture) for picture in self._pictures.arrived(now_s)]
 
     def facts(self) -> dict[str, float | int]:
-        """Return numbers for a command's answer."""
+        """Numbers for a command's result."""
         mean = self._tags / self._used if self._used else 0.0
         return {"pictures": self._sequence, "tags_per_pose": round(mean, 1)}
 
@@ -155,7 +155,7 @@ class TagFeed:
 
 
 class _NotedJoints:
-    """Gives each joint state to the feed before the pose is asked for."""
+    """Passes each joint state to the feed before the pose is computed."""
 
     def __init__(self, feed: TagFeed, pose: Callable[[JointState], BodyPose]) -> None:
         self._feed, self._pose = feed, pose
@@ -187,7 +187,7 @@ def _pictures(context: PoseContext) -> TagPictures:
 
 
 def _check_start(context: PoseContext, fit: TagFit, first: TagPicture, config: PoseConfig) -> None:
-    """Compare a tag of the first picture with the start; the joint angles are not known yet.
+    """Compare a tag of the first picture with the start; joint angles are not known yet.
 
     Raises:
         InputError: only fixed tags are seen, or the robot is elsewhere.

@@ -1,4 +1,4 @@
-"""A calibrated camera in any position: its matrix, its distortion, and its place in the world."""
+"""A calibrated camera in any position: matrix, distortion, and pose."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ _MISFIT_PX: Final = 4.0
 
 
 def square(side_m: float) -> Floats:
-    """Return the corners (4, 3) of a tag in its own axes, as the detector orders them."""
+    """Corners (4, 3) of a tag in its own axes, in the detector's order."""
     half = 0.5 * side_m
     return np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0]])
 
@@ -38,10 +38,10 @@ class TagView:
 
     @classmethod
     def of(cls, camera: CameraConfig) -> Self:
-        """Return the camera of a run; without ``place_m`` its place is unknown (NaN).
+        """Return the camera of a run; without ``place_m`` its place is NaN.
 
         Raises:
-            InputError: the file of its lens cannot be read, or is of another size.
+            InputError: the lens file cannot be read, or is of another size.
 
         """
         size = (camera.width_px, camera.height_px)
@@ -63,11 +63,11 @@ class TagView:
 
     @property
     def is_placed(self) -> bool:
-        """Whether the place of the camera is known."""
+        """Whether the camera's place is known."""
         return bool(np.isfinite(self.place_m).all())
 
     def pixels(self, points_m: Floats) -> Floats:
-        """Return where the picture shows points (..., 3) of the world, with distortion."""
+        """Pixels, with distortion, of world points (..., 3)."""
         seen = (points_m - self.place_m) @ self.rotation
         flat = np.ascontiguousarray(seen.reshape(-1, 3))
         none = np.zeros(3)
@@ -75,7 +75,7 @@ class TagView:
         return np.asarray(found, dtype=float).reshape(*points_m.shape[:-1], 2)
 
     def placed_by(self, seen: Corners, fixed: Sequence[FixedTag], side_m: float) -> Self:
-        """Return the camera where fixed tags place it.
+        """Return the camera placed by fixed tags.
 
         Raises:
             InputError: no fixed tag is seen, or their places contradict the picture.
@@ -109,10 +109,10 @@ class TagView:
 
 
 def _aimed(camera: CameraConfig) -> tuple[Floats, Floats]:
-    """Return place and axes of a camera that looks at a place; the picture's top is up."""
+    """Place and axes of a camera that looks at a place; the picture's top is up."""
     place, aim = np.array(camera.place_m), np.array(camera.aim_m)
     ahead = (aim - place) / np.linalg.norm(aim - place)
-    # of a camera that looks straight down, the picture's top is along y
+    # for a vertical camera, the picture's top is along y
     up = np.array([0.0, 1.0, 0.0]) if abs(ahead[2]) > 1.0 - 1e-9 else np.array([0.0, 0.0, 1.0])
     right = np.cross(ahead, up)
     right /= np.linalg.norm(right)

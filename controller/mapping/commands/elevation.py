@@ -187,7 +187,7 @@ def _numbers_of(classes: str, faults: list[str]) -> tuple[int, ...]:
 def check_world_files(
     out: Path, picture: Path | None, sources: Sequence[Path], force: bool
 ) -> None:
-    """Refuse files that exist, unknown endings, and to write over a file that is read.
+    """Reject existing files, unknown endings, and an output that is also an input.
 
     Raises:
         InputError: one line each.
@@ -205,7 +205,7 @@ def check_world_files(
 
 
 def not_positive(options: Mapping[str, float | None]) -> list[str]:
-    """Say which options have a value that is not above 0, or beyond all lengths and factors."""
+    """Faults of options whose value is not above 0, or beyond all lengths and factors."""
     faults = []
     for option, value in options.items():
         if value is not None and not 0.0 < value < math.inf:
@@ -216,7 +216,7 @@ def not_positive(options: Mapping[str, float | None]) -> list[str]:
 
 
 def check_fill(fill_m: float, faults: list[str]) -> None:
-    """Add what is wrong with ``--fill``."""
+    """Append the fault of ``--fill``, if any."""
     if not 0.0 <= fill_m < math.inf:
         faults.append(f"--fill {fill_m:g}: must be 0 or more")
 
@@ -224,7 +224,7 @@ def check_fill(fill_m: float, faults: list[str]) -> None:
 def finish(
     world: "MapWorld", facts: dict[str, object], picture: Path | None, *, as_json: bool
 ) -> None:
-    """Draw the map if asked for, and show what was made."""
+    """Draw the map if requested, and show the result."""
     if picture is not None:
         from snakewalk.controller.mapping.terrain_map import draw_terrain_map  # noqa: PLC0415  an extra
 

@@ -117,7 +117,7 @@ def walkthrough(
 
 
 def _size(text: str, faults: list[str]) -> tuple[int, int]:
-    """Width and height of ``--size``; adds a fault if the text is not a size."""
+    """Width and height of ``--size``; appends a fault if invalid."""
     parts = text.split("x")
     if len(parts) != 2 or not all(part.isdecimal() for part in parts):
         faults.append(f"--size {text}: is not a size; write it as 640x480")
@@ -129,7 +129,7 @@ def _size(text: str, faults: list[str]) -> tuple[int, int]:
 
 
 def _step_facts(steps: "Sequence[Step]") -> dict[str, object]:
-    """Lists with a value for each pair of successive positions."""
+    """Lists with a value per pair of successive positions."""
     facts: dict[str, object] = {
         "matches": [step.matches for step in steps],
         "inliers": [step.inliers for step in steps],

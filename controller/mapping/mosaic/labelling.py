@@ -1,7 +1,7 @@
 """Discrete labelling of a grid: a Markov random field with Potts terms ([KP] 3.4.1).
 
-A label of a pixel p is a place in its own window of the second picture and a scale. Its flow is
-``base[p] + offset``. Two labels are equal if flow and scale are equal.
+A label of a pixel p is a place in its window of the second picture and a scale. Its flow is
+``base[p] + offset``. Labels are equal if flow and scale are equal.
 """
 
 from typing import Final
@@ -20,9 +20,9 @@ _LABELS: Final = "int64[:, ::1]"
 
 
 def labelled(costs: Costs, base: Ints, penalty: float, rounds: int = 10) -> Ints:
-    """Labels (rows, columns) of low energy, as indices into the last three axes; -1 without any.
+    """Labels (rows, columns) of low energy, as indices into the last three axes, or -1.
 
-    Costs are aggregated along eight directions first, then iterated conditional modes descend.
+    Costs are aggregated along eight directions; then iterated conditional modes descend.
 
     Args:
         costs: data terms.
@@ -41,7 +41,7 @@ def labelled(costs: Costs, base: Ints, penalty: float, rounds: int = 10) -> Ints
 
 
 def cheapest(costs: Costs) -> Ints:
-    """Labels (rows, columns) of the least data terms alone; -1 without any."""
+    """Labels (rows, columns) of the least data terms, or -1."""
     flat = costs.reshape(*costs.shape[:2], -1)
     return np.where(np.isfinite(flat.min(axis=2)), flat.argmin(axis=2), -1).astype(np.int64)
 
@@ -50,7 +50,7 @@ def cheapest(costs: Costs) -> Ints:
 def _aggregate(
     costs: Costs, base: Ints, down: int, right: int, penalty: float, total: Costs
 ) -> None:
-    """Add the least costs of all paths that arrive in a direction."""
+    """Add the least costs of all paths arriving in a direction."""
     rows, columns, scales, high, wide = costs.shape
     path = np.zeros((2, columns, scales, high, wide), np.float32)
     least = np.zeros((2, columns), np.float32)
@@ -89,7 +89,7 @@ def _aggregate(
 
 @compiled(f"void({_COST}, {_INTS}, float64, int64, {_LABELS})")
 def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints) -> None:
-    """Change labels to their conditional modes until none changes: the energy never rises."""
+    """Change labels to their conditional modes until none changes; the energy never rises."""
     rows, columns, scales, high, wide = costs.shape
     window = high * wide
     for _ in range(rounds):
@@ -99,7 +99,7 @@ def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints)
                 now = labels[row, column]
                 if now < 0:
                     continue
-                # Without an equal neighbour the label of the least cost is best.
+                # Without an equal neighbour the label of least cost is best.
                 best, lowest = now, np.inf
                 for s in range(scales):
                     for y in range(high):
@@ -129,7 +129,7 @@ def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints)
 
 
 def energy(costs: Costs, base: Ints, penalty: float, labels: Ints) -> float:
-    """``E(f)``: Potts terms of all pairs of neighbours with labels, and their data terms."""
+    """``E(f)``: data terms of all labels, and Potts terms of neighbours."""
     window, wide = costs.shape[3] * costs.shape[4], costs.shape[4]
     has = labels >= 0
     flat = costs.reshape(*costs.shape[:2], -1)
@@ -146,7 +146,7 @@ def energy(costs: Costs, base: Ints, penalty: float, labels: Ints) -> float:
 
 
 def flow_of(costs: Costs, base: Ints, labels: Ints) -> tuple[Floats, Ints]:
-    """Flow (rows, columns, 2), NaN without a label, and index of the scale of labels."""
+    """Flow (rows, columns, 2), NaN without a label, and scale index of labels."""
     window, wide = costs.shape[3] * costs.shape[4], costs.shape[4]
     place = np.stack([labels % wide, labels % window // wide], axis=-1) + base
     return np.where(labels[..., None] >= 0, place, np.nan), labels // window

@@ -25,7 +25,7 @@ LARGEST_STEP: Final = 0.08
 class LocalModel:
     """Maps ``X, Y, Z`` and ``I`` of a picture over its valid region.
 
-    Coordinates of the camera: x to the right, y down, z forward.
+    Camera axes: x to the right, y down, z forward.
     """
 
     points_m: Floats
@@ -38,11 +38,9 @@ class LocalModel:
 
     @classmethod
     def of_pair(cls, pair: RectifiedPair, count: int) -> Self:
-        """Return the model of a rectified pair.
+        """Return the model of a rectified pair with three channels.
 
-        Args:
-            pair: pictures with three channels.
-            count: number of disparities to try, from the disparity of a point at infinity.
+        ``count`` is the number of disparities, from that of a point at infinity.
 
         Raises:
             InputError: fewer than a hundredth of the pixels match.
@@ -70,16 +68,16 @@ class LocalModel:
 
     @property
     def error_m(self) -> Floats:
-        """(H, W) expected errors of the points; NaN outside of the valid region."""
+        """(H, W) expected errors of the points; NaN outside the valid region."""
         distance = np.linalg.norm(self.points_m, axis=-1)
         per_m = DISPARITY_ERROR_PX / (self.camera[0, 0] * self.baseline_m)
         return np.asarray(distance * self.points_m[..., 2] * per_m)
 
 
 def _is_plain(image: Image) -> Bools:
-    """(H, W) pixels of a region that shows nothing, such as the sky.
+    """(H, W) pixels of a region without texture, such as the sky.
 
-    A matcher continues the depths of its border into it.
+    A matcher continues its border's depths into it.
     """
     grey = np.asarray(image, dtype=np.float32).mean(axis=2)
     window = (_WINDOW_PX, _WINDOW_PX)
@@ -100,7 +98,7 @@ def project(camera: Floats, points_m: Floats) -> Floats:
 def joined(depth_m: Floats, axis: int) -> Bools:
     """Whether neighbours along an axis of a depth map belong to one surface.
 
-    The result is one shorter along the axis. Neighbours outside of the valid region never do.
+    The result is one shorter along the axis, and False outside the valid region.
     """
     one, two = (np.moveaxis(depth_m, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
     with np.errstate(invalid="ignore"):

@@ -19,7 +19,7 @@ _LEAST_ISLAND_PX: Final = 40
 
 @dataclass(frozen=True, slots=True)
 class MorphableModel:
-    """Model of a position with maps of its destination, in the axes of that position."""
+    """Model of a position with maps of its destination, in the position's axes."""
 
     first: LocalModel
     second: LocalModel
@@ -44,7 +44,7 @@ class MorphableModel:
 
 
 def sampled(image: Floats, places_px: Floats) -> Floats:
-    """(H, W, k) bilinear samples of an image at columns and rows (H, W, 2); NaN outside of it."""
+    """(H, W, k) bilinear samples of an image at columns and rows (H, W, 2); NaN outside."""
     at = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
     return np.asarray(
         cv2.remap(
@@ -57,7 +57,7 @@ def sampled(image: Floats, places_px: Floats) -> Floats:
 def dense_flow(
     first: LocalModel, second: LocalModel, pose: RelativePose, flow: ScaleFlow
 ) -> Floats:
-    """(H, W, 2) counterparts of all pixels in the second picture; NaN without one.
+    """(H, W, 2) counterparts of all pixels in the second picture, or NaN.
 
     Between labelled pixels the difference from the reprojection is interpolated.
     """
@@ -88,7 +88,7 @@ def dense_flow(
 def morphable(
     first: LocalModel, second: LocalModel, pose: RelativePose, flow: ScaleFlow
 ) -> MorphableModel:
-    """Fill the destination maps: Eq. 3 where there is a counterpart, Eq. 5 elsewhere."""
+    """Fill the destination maps: Eq. 3 at pixels with a counterpart, Eq. 5 elsewhere."""
     places = dense_flow(first, second, pose, flow)
     met = pose.back(sampled(second.points_m.astype(np.float32), places).astype(float))
     with np.errstate(invalid="ignore"):

@@ -36,9 +36,7 @@ class Mosaic:
 def mosaic(views: Sequence[LocalModel], rectified: bool = True) -> Mosaic:
     """Merge views that differ by a rotation.
 
-    Args:
-        views: each one overlaps an earlier one.
-        rectified: whether each view is made consistent with the earlier ones by Eq. 7.
+    Each view overlaps an earlier one. ``rectified``: Eq. 7 makes each consistent with them.
 
     Raises:
         InputError: a view does not overlap the earlier ones, or is turned too far.
@@ -65,7 +63,7 @@ def mosaic(views: Sequence[LocalModel], rectified: bool = True) -> Mosaic:
 
 
 def _rotations(views: Sequence[LocalModel]) -> Floats:
-    """(n, 3, 3) from each view's axes to the first one's."""
+    """(n, 3, 3) rotations from each view's axes to the first one's."""
     turns = [np.eye(3)]
     for k in range(1, len(views)):
         found = None
@@ -83,7 +81,7 @@ def _rotations(views: Sequence[LocalModel]) -> Floats:
 
 
 def _relative(first: LocalModel, second: LocalModel) -> Floats | None:
-    """(3, 3) rotation from the second view's axes to the first one's; None without matches."""
+    """(3, 3) rotation from the second view's axes to the first one's, or None."""
     matches = match_over_scale(first, second, (1.0,), wide=1.0)
     if len(matches.scale) < _LEAST:
         return None
@@ -113,7 +111,7 @@ def _rays(camera: Floats, places_px: Floats) -> Floats:
 
 
 def _common_plane(views: Sequence[LocalModel], turns: Floats) -> tuple[Floats, tuple[int, int]]:
-    """Camera matrix and width and height of the first view's plane, extended to all views."""
+    """Camera matrix, width and height of the first view's plane, extended to all views."""
     first = views[0].camera
     corners = []
     for view, turn in zip(views, turns, strict=True):
@@ -138,7 +136,7 @@ def _common_plane(views: Sequence[LocalModel], turns: Floats) -> tuple[Floats, t
 
 
 def _on_plane(view: LocalModel, turn: Floats, camera: Floats, size: tuple[int, int]) -> LocalModel:
-    """Turn a view's points into the first view's axes, and move its maps to the common plane."""
+    """Turn a view's points into the first view's axes, and warp its maps to the common plane."""
     to_view = view.camera @ turn.T @ np.linalg.inv(camera)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     points = cv2.warpPerspective(

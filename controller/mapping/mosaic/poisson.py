@@ -10,16 +10,16 @@ from snakewalk.config.arrays import Bools, Floats
 def continued(values: Floats, given: Bools, shape: Floats) -> Floats:
     """Solve ``min sum |grad Z - grad shape|^2`` with Z given on a part of the grid.
 
-    The difference of Z and the shape is harmonic: each unknown one is the mean of its neighbours.
-    A part of the grid that no given value borders keeps the shape.
+    The difference of Z and the shape is harmonic: each unknown value is the mean of its neighbours.
+    A part without a bordering given value keeps the shape.
 
     Args:
-        values: (H, W, k) maps; read where they are given.
+        values: (H, W, k) maps; read where given.
         given: (H, W) pixels with values.
-        shape: (H, W, k) maps whose gradients are kept; NaN is outside of the grid.
+        shape: (H, W, k) maps with the gradients; NaN outside the grid.
 
     Returns:
-        (H, W, k) maps; NaN outside of the grid.
+        (H, W, k) maps; NaN outside the grid.
 
     """
     inside = np.isfinite(shape).all(axis=-1)

@@ -1,7 +1,7 @@
 """Pictures of a morphable model: textured triangles of a pixel grid with a depth buffer ([KP] 3.5).
 
-The mesh of the valid region and the mesh of its part with counterparts are drawn in one pass: a
-vertex without a counterpart has the share 0 of the second texture.
+Both meshes, of the valid region and of its part with counterparts, are drawn in one pass: without a
+counterpart the share of the second texture is 0.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _PICTURE: Final = readonly_array("uint8", 3, "C")
 
 @dataclass(slots=True)
 class Canvas:
-    """A picture that is drawn, with its depth buffer."""
+    """A picture with its depth buffer."""
 
     colour: NDArray[np.uint8]
     """(H, W, 3)"""
@@ -42,14 +42,14 @@ class Canvas:
         return np.asarray(np.isfinite(self.depth_m))
 
     def fill(self, other: "Canvas") -> None:
-        """Copy another canvas to the pixels that nothing covers."""
+        """Copy another canvas to the uncovered pixels."""
         empty = ~self.drawn
         self.colour[empty] = other.colour[empty]
         self.depth_m[empty] = other.depth_m[empty]
 
 
 def cells(points_m: Floats) -> Bools:
-    """(H - 1, W - 1) cells of a grid whose four corners belong to one surface."""
+    """(H - 1, W - 1) grid cells whose four corners belong to one surface."""
     depth = points_m[..., 2]
     along, across = joined(depth, 1), joined(depth, 0)
     return np.asarray(along[:-1] & along[1:] & across[:, :-1] & across[:, 1:])
@@ -68,14 +68,14 @@ def draw(
     """Draw a textured grid.
 
     Args:
-        canvas: is drawn on.
+        canvas: target.
         points_m: (H, W, 3) vertices in the axes of the camera.
         camera: (3, 3) matrix of the canvas.
         drawn: (H - 1, W - 1) cells to draw.
         own: texture whose pixels are the vertices.
         other: second texture.
-        counterpart_px: (H, W, 2) vertices in the second texture; NaN without a counterpart.
-        share: share of the second texture where there is a counterpart.
+        counterpart_px: (H, W, 2) vertices in the second texture, or NaN.
+        share: share of the second texture at a counterpart.
 
     """
     if other is None or counterpart_px is None:
@@ -101,7 +101,7 @@ def _texel(picture: Image, u: float, v: float, channel: int) -> float:
 
 @compiled(f"boolean({_FLOATS}, {_MATRIX}, int64[:, ::1], float64[:, ::1], float64[::1])")
 def _place(points: Floats, camera: Floats, corner: Ints, screen: Floats, inverse: Floats) -> bool:
-    """Write pixels and inverse depths of a triangle's corners; False if one is not in front."""
+    """Write pixels and inverse depths of a triangle's corners; False if one is behind."""
     for k in range(3):
         i, j = corner[k, 0], corner[k, 1]
         z = points[i, j, 2]
@@ -121,7 +121,7 @@ def _shade(
     own: Image, other: Image, counterpart: Floats, share: float, corner: Ints, parts: Floats,
     colour: Image, y: int, x: int,
 ) -> None:  # fmt: skip
-    """Write the colour of a place of a triangle: parts of its corners, both textures mixed."""
+    """Write the colour at barycentric ``parts`` of a triangle, both textures mixed."""
     row = column = there_u = there_v = size = 0.0
     for k in range(3):
         i, j = corner[k, 0], corner[k, 1]

@@ -1,4 +1,4 @@
-"""Pose of the next position by the reprojection of a local model's points ([KP] 3.3)."""
+"""Relative pose of two positions by reprojection of a local model's points ([KP] 3.3)."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -20,7 +20,7 @@ _TOLERANCE_PX: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class RelativePose:
-    """Points of the first position are ``rotation @ p + translation`` at the second one."""
+    """Pose: a point p of the first position is ``rotation @ p + translation`` at the second."""
 
     rotation: Floats
     """(3, 3)"""
@@ -41,7 +41,7 @@ class RelativePose:
 
 
 def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) -> RelativePose:
-    """Minimise ``sum dist(q, K (R P + T))^2`` over the largest set of matches that agree.
+    """Minimise ``sum dist(q, K (R P + T))^2`` over the largest consistent set of matches.
 
     Raises:
         InputError: too few matches agree.
@@ -77,7 +77,7 @@ def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) 
 
 
 def pose_error(found: RelativePose, first_pose: Floats, second_pose: Floats) -> tuple[float, float]:
-    """Error of a pose where the positions' poses (3, 4), camera to world, are known.
+    """Error of a pose for known poses (3, 4) of the positions, camera to world.
 
     Returns:
         Distance of the second camera from its place, m, and the angle of its axes, rad.

@@ -1,4 +1,4 @@
-"""Cameras along a route through the key positions, and the film of it ([KP] 3.5)."""
+"""Cameras along a route through the key positions, and their film ([KP] 3.5)."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -45,10 +45,10 @@ class FilmFacts:
 
 
 def views_along(walk: StereoWalk, per_step: int) -> Iterator[RouteView]:
-    """Cameras from the first position to the last one, ``per_step`` for each step.
+    """Cameras from the first position to the last, ``per_step`` per step.
 
-    Places lie on a smooth curve through the positions; axes turn at a constant rate between them.
-    A single position is seen from a small circle around it.
+    Places are on a smooth curve through the positions; axes turn at a constant rate. A single
+    position is seen from a small circle around it.
     """
     count = len(walk.models)
     if count == 1:
@@ -79,14 +79,8 @@ def render(
 ) -> Canvas:
     """Draw the morphable model of a view.
 
-    Args:
-        walk: models and morphs.
-        view: camera along the route.
-        camera: (3, 3) matrix of the picture.
-        size_px: width and height.
-        alone: leave the holes of the morphable model empty. Otherwise they show the models of the
-            positions around it (ours); places that no position shows stay empty.
-
+    ``alone`` leaves its holes empty. Otherwise they show the models of the adjacent positions
+    (ours), if these show the place.
     """
     canvas = Canvas.blank(*size_px)
     if walk.morphs:
@@ -111,7 +105,7 @@ def render(
 def _draw_model(
     canvas: Canvas, walk: StereoWalk, number: int, view: RouteView, camera: Floats
 ) -> None:
-    """Draw the model of a position, without a morph, from the camera of a view."""
+    """Draw the model of a position from the camera of a view, without a morph."""
     model, pose, base = walk.models[number], walk.poses[number], walk.poses[view.step]
     points = (model.points_m @ pose[:, :3].T + pose[:, 3] - base[:, 3]) @ base[:, :3]
     points = (points - view.place_m) @ view.rotation.T
@@ -128,17 +122,10 @@ def film(
     alone: bool = False,
     on_frame: Callable[[int, int], None] = lambda *_: None,
 ) -> FilmFacts:
-    """Write the film of a route.
+    """Write the film of a route as MP4.
 
-    Args:
-        walk: models and morphs.
-        file: MP4.
-        size_px: even width and height.
-        per_step: frames between two positions.
-        fps: frames per second.
-        alone: as of ``render``.
-        on_frame: called with (frames done, of).
-
+    ``per_step`` is the number of frames between positions; ``alone`` as in ``render``. ``on_frame``
+    is called with (frames done, of). ``size_px`` is even.
     """
     views = list(views_along(walk, per_step))
     camera = picture_camera(walk, size_px)
@@ -155,7 +142,7 @@ def film(
 
 
 def picture_camera(walk: StereoWalk, size_px: tuple[int, int]) -> Floats:
-    """(3, 3) camera whose picture shows as much height as the first position's."""
+    """(3, 3) camera whose picture lies within that of the first position."""
     model = walk.models[0]
     tall, wide = model.valid.shape
     scale = max(size_px[1] / tall, size_px[0] / wide)

@@ -72,8 +72,8 @@ def flow_problem(
 ) -> FlowProblem:
     """Data terms of all labels ``LABELS_p = {q - p: q in SEARCH_p} x S``.
 
-    ``SEARCH_p`` is the part of a square around the reprojection of p that lies near its epipolar
-    line and in the valid region of the second model.
+    ``SEARCH_p`` is the part of a square around the reprojection of p near its epipolar line and in
+    the valid region of the second model.
     """
     tall, wide = first.valid.shape
     rows, columns = (
@@ -100,13 +100,8 @@ def flow_problem(
 def solve_flow(problem: FlowProblem, penalty: float = PENALTY, printed: bool = False) -> ScaleFlow:
     """Flow of least energy.
 
-    Args:
-        problem: data terms.
-        penalty: constant of the Potts term.
-        printed: compare flows as printed. Otherwise neighbours are compared by the difference of
-            their flow from the flow that geometry and pose predict, so that a flow that grows
-            across a plane has no cost.
-
+    ``printed`` compares flows as printed. Otherwise neighbours are compared by the deviation from
+    the flow that geometry and pose predict, so a flow that grows across a plane costs nothing.
     """
     base = problem.base if printed else np.zeros_like(problem.base)
     labels = labelled(problem.costs, base, penalty)
@@ -116,7 +111,7 @@ def solve_flow(problem: FlowProblem, penalty: float = PENALTY, printed: bool = F
 def flow_of_labels(problem: FlowProblem, labels: Ints) -> ScaleFlow:
     """Flow, scale and correlation of labels (rows, columns).
 
-    The vertex of a parabola through the data terms of a label and its neighbours adds the fraction
+    The vertex of a parabola through the data terms of a label and its neighbours gives the fraction
     of a pixel.
     """
     flow_px, index = flow_of(problem.costs, problem.base, labels)
@@ -130,9 +125,9 @@ def flow_of_labels(problem: FlowProblem, labels: Ints) -> ScaleFlow:
 
 
 def _fractions(costs: Costs, labels: Ints) -> Floats:
-    """(rows, columns, 2) offsets of the least cost from the place of a label, within half a pixel.
+    """(rows, columns, 2) offsets of the least cost from a label's place, within half a pixel.
 
-    An offset is 0 where a neighbour of the label is outside of SEARCH or has a lower cost.
+    An offset is 0 if a neighbour is outside SEARCH or has a lower cost.
     """
     high, wide = costs.shape[3:]
     scale, place = np.divmod(np.maximum(labels, 0), high * wide)

@@ -1,7 +1,7 @@
 """Matches between two positions over a set of scales ([KP] 3.3).
 
-A camera that moves forward enlarges what it sees. A patch of the first picture is therefore
-compared with the second picture at several reduced sizes.
+A forward motion enlarges the picture, so a patch of the first picture is compared with the second
+one at several reduced sizes.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _NARROW: Final = 0.12
 
 @dataclass(frozen=True, slots=True)
 class ScaleMatches:
-    """Pairs of pixels, with the scale at which they look most alike."""
+    """Pairs of pixels, with the scale of best similarity."""
 
     first_px: Floats
     """(n, 2) columns and rows in the first picture."""
@@ -48,7 +48,7 @@ def grey(image: Image) -> NDArray[np.float32]:
 
 
 def reduced(picture: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
-    """Picture at the size ``1 / scale``; pixel centre (u, v) goes to (u / scale, v / scale)."""
+    """Picture at size ``1 / scale``; pixel centre (u, v) maps to (u / scale, v / scale)."""
     if scale == 1.0:
         return picture
     sigma = 0.5 * np.sqrt(scale**2 - 1.0)
@@ -74,8 +74,8 @@ def match_over_scale(
         first: model; points are chosen in its valid region.
         second: model at the next position.
         scales: the set S, from 1.
-        distance_m: guess of the way forward; it narrows the search regions.
-        wide: half the width of a search region without a guess, in widths of the picture.
+        distance_m: approximate way forward; it narrows the search regions.
+        wide: half the width of a search region without it, in picture widths.
 
     """
     one, two = grey(first.image), grey(second.image)
@@ -110,7 +110,7 @@ def _best(
     centre: Floats,
     half_px: float,
 ) -> tuple[float, float, float, float] | None:
-    """Column, row, scale and correlation of the best match; None if it is not unique."""
+    """Column, row, scale and correlation of the best match; None if not unique."""
     found: list[tuple[float, float, float, float]] = []
     rivals: list[tuple[float, float, float]] = []
     for scale, picture in pyramid:
@@ -154,7 +154,7 @@ def _best(
 
 
 def _vertex(values: NDArray[np.float32], at: int) -> float:
-    """Offset of the vertex of a parabola through a maximum and its neighbours."""
+    """Offset of a parabola's vertex through a maximum and its neighbours."""
     if not 0 < at < len(values) - 1:
         return 0.0
     below, here, above = (float(value) for value in values[at - 1 : at + 2])

@@ -29,7 +29,7 @@ _UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Facts about the way from a position to the next one."""
+    """Facts about the way between two positions."""
 
     matches: int
     inliers: int
@@ -45,7 +45,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class StereoWalk:
-    """Everything that is drawn along a route."""
+    """Models and morphs along a route."""
 
     models: tuple[LocalModel, ...]
     morphs: tuple[MorphableModel, ...]
@@ -58,15 +58,12 @@ class StereoWalk:
 def read_walk(
     file: Path, config: WalkthroughConfig, on_step: Callable[[int, int], None] = lambda *_: None
 ) -> StereoWalk:
-    """Build the models and the morphs of a route.
+    """Build the models and the morphs of a route from ``file`` with content ``config``.
 
-    Args:
-        file: the positions' file; pictures lie in its folder.
-        config: its content.
-        on_step: called with (steps done, of).
+    Pictures are in the file's folder. ``on_step`` is called with (steps done, of).
 
     Raises:
-        InputError: a picture or the calibration cannot be used, or two positions do not match.
+        InputError: a picture or the calibration is unusable, or two positions do not match.
 
     """
     calibration = read_calibration(file.parent / config.calibration, _UNITS_M[config.unit])

@@ -1,4 +1,4 @@
-"""Ground of a walk: heights and colours of all models, with holes where no position shows it."""
+"""Ground of a walk: heights and colours of all models, with holes at unseen ground."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -20,7 +20,7 @@ _HOLE: Final = (150, 150, 150)
 
 @dataclass(frozen=True, slots=True)
 class WalkGround:
-    """A map of the route, and the first camera's stand above it."""
+    """A map of the route, and the first camera's stand."""
 
     field: HeightField
     """x is where the first camera looks, its origin below this camera."""
@@ -41,12 +41,12 @@ def walk_ground(
     Args:
         walk: models and poses of the positions.
         spacing_m: distance of samples.
-        error_m: points with a larger expected error from their own camera are left out.
+        error_m: points with a larger expected error are dropped.
         fill_m: width of holes that count as known.
         stand: of the first camera; None fits a plane to its points.
 
     Raises:
-        InputError: no ground is visible, or no point is near enough for the error.
+        InputError: no visible ground, or no point near enough for the error.
 
     """
     points, colours, errors = [], [], []
@@ -74,7 +74,7 @@ def walk_ground(
 
 
 def _colours(seen: ElevationMap, points_m: Floats, colours: Floats | Image) -> Image:
-    """(rows, columns, 3) mean colours of the points near the surface of each sample."""
+    """(rows, columns, 3) mean colours of the points near each sample's surface."""
     rows, columns = seen.z_m.shape
     place = points_m[:, :2] - [seen.x0_m, seen.y0_m]
     column, row = np.rint(place / seen.spacing_m).astype(int).T
