@@ -91,7 +91,7 @@ RUNS: dict[str, tuple[tuple[str, ...], Action]] = {
         for number in RUN_SIGNALS
     },
     "SIGINT twice within 1.5 s during `--shadow`": (SHADOW, _twice),
-    "`snakewalk stop` during `--shadow`": (SHADOW, _ends_after_stop),
+    "`snakewalk stop` during `--shadow`": ((*SHADOW, "--seconds", "60"), _ends_after_stop),
     "SIGSTOP for 1.2 s during `--shadow`": (SHADOW, _pause),
     "server killed during `--shadow`": (SHADOW, lambda run: run.served.process.kill()),
     "servo 2 mute during `--shadow`": (SHADOW, lambda run: run.served.say("fault mute ids=[2]")),
@@ -167,18 +167,21 @@ def _row(name: str, options: tuple[str, ...], act: Action, folder: Path, served:
     time.sleep(2.0)  # the bus watchdogs
     if "Traceback" in said:
         code = f"{code}, traceback"
-    return f"| {name} | {code} | {_reason(printed, said, folder)} | {served.torque()} |"
+    return f"| {name} | {code} | {_reason(printed, said, served)} | {served.torque()} |"
 
 
-def _reason(printed: str, said: str, folder: Path) -> str:
-    """Return the trip of the summary; without one, the last message."""
+def _reason(printed: str, said: str, served: Served) -> str:
+    """Return the trip of the summary; without one, the last message of run and server."""
     try:
         text = json.loads(printed).get("tripped") or ""
     except ValueError:
         text = ""
-    lines = [line for line in said.splitlines() if line.startswith("snakewalk: ")]
-    text = text or (lines[-1].removeprefix("snakewalk: ") if lines else "")
-    text = text.replace(f"{folder}/", "").replace("|", "/")
+    lines = [*served.warnings(), *said.splitlines()]
+    lines = [line.removeprefix("snakewalk: ") for line in lines if line.startswith("snakewalk: ")]
+    lines = [line for line in lines if not line.startswith(("log: ", "pose: "))]
+    text = text or (lines[-1] if lines else "")
+    text = text.replace(f"{served.port.parent}/", "").replace("|", "/")
+    text = re.sub(r"/dev/pts/\d+", "/dev/pts/N", text)
     return re.sub(r"; (log|its page|the run up to there): .*|process \d+", "", text) or "-"
 
 
@@ -186,10 +189,10 @@ def main() -> None:
     """Play all scenarios and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--workers", type=int, default=1, help="scenarios at the same time")
-    parser.add_argument("--only", default="", help="scenarios with this text; changes no page")
+    parser.add_argument("--only", default="", help="scenarios that match; changes no page")
     given = parser.parse_args()
-    names = [name for name in RUNS if given.only in name]
-    stops = [name for name in STOPS if given.only in name]
+    names = [name for name in RUNS if re.search(given.only, name)]
+    stops = [name for name in STOPS if re.search(given.only, name)]
     with ThreadPoolExecutor(given.workers) as pool:
         runs = list(pool.map(played, names))
         calibrations = list(pool.map(stopped_calibration, stops))
