@@ -91,7 +91,7 @@ RUNS: dict[str, tuple[tuple[str, ...], Action]] = {
         for number in RUN_SIGNALS
     },
     "SIGINT twice within 1.5 s during `--shadow`": (SHADOW, _twice),
-    "`snakewalk stop` during `--shadow`": ((*SHADOW, "--seconds", "60"), _ends_after_stop),
+    "`snakewalk stop` during `--shadow`": (SHADOW, _ends_after_stop),
     "SIGSTOP for 1.2 s during `--shadow`": (SHADOW, _pause),
     "server killed during `--shadow`": (SHADOW, lambda run: run.served.process.kill()),
     "servo 2 mute during `--shadow`": (SHADOW, lambda run: run.served.say("fault mute ids=[2]")),
@@ -143,7 +143,9 @@ def _row(name: str, options: tuple[str, ...], act: Action, folder: Path, served:
         pad = os.open(folder / "pad", os.O_RDWR)
         os.write(pad, bytes(6) + b"\x81\x04")  # a shoulder button, as it is at the start
     words = ["gait", "run", "lateral-undulation", "--robot", "robot.toml", "--port", "port"]
-    words += ["--seconds", "10", "--no-film", "--json", *options]
+    # a program that is started on a busy machine to stop the run needs many seconds
+    seconds = "60" if act is _ends_after_stop else "10"
+    words += ["--seconds", seconds, "--no-film", "--json", *options]
     if "--out" not in options:
         words += ["--out", "run"]
     with (folder / "out.txt").open("w+") as out, (folder / "err.txt").open("w+") as err:
