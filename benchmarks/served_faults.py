@@ -184,7 +184,7 @@ def _reason(printed: str, said: str, served: Served) -> str:
     text = text or (lines[-1] if lines else "")
     text = text.replace(f"{served.port.parent}/", "").replace("|", "/")
     text = re.sub(r"/dev/pts/\d+", "/dev/pts/N", text)
-    return re.sub(r"; (log|its page|the run up to there): .*|process \d+", "", text) or "-"
+    return re.sub(r"; (log|its page|the run up to there): .*| \(process \d+\)", "", text) or "-"
 
 
 def main() -> None:

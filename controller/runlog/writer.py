@@ -239,7 +239,7 @@ class RunLog:
             self._writer.add_message(self._channels[table], stamp_ns, data, publish_time=stamp_ns)
 
     def _report_deletion(self) -> None:
-        """Warn once if the file has lost its name, because it or its folder was deleted or moved."""
+        """Warn once if the file lost its name, because it or its folder was deleted or moved."""
         if self._is_deleted or self._has_its_name():
             return
         self._is_deleted = True
