@@ -80,13 +80,17 @@ def _relink(run: Run) -> None:
     run.served.port.symlink_to("/dev/null")
 
 
+def _sends(number: signal.Signals) -> Action:
+    return lambda run: run.process.send_signal(number)
+
+
 SHADOW, PAGE = ("--shadow",), ("--view", "--view-at", "127.0.0.1:0")
 PAD, ROS, DISK = ("--gamepad", "pad"), ("--ros",), ("--out", "disk/run")
 RUNS: dict[str, tuple[tuple[str, ...], Action]] = {
     **{
         f"{number.name} during `--shadow`": (
             SHADOW,
-            lambda run, number=number: run.process.send_signal(number),  # type: ignore[misc]
+            _sends(number),
         )
         for number in RUN_SIGNALS
     },
