@@ -49,6 +49,10 @@ class Served:
         pairs = self._log.read_text(encoding="utf-8")[size:].split("  ")
         return [pair.split(":")[1].strip() for pair in pairs]
 
+    def warnings(self) -> list[str]:
+        """Lines that the server printed."""
+        return self._log.read_text(encoding="utf-8").splitlines()
+
     def end(self) -> None:
         """End the server."""
         self.process.kill()

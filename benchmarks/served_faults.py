@@ -80,13 +80,17 @@ def _relink(run: Run) -> None:
     run.served.port.symlink_to("/dev/null")
 
 
+def _sends(number: signal.Signals) -> Action:
+    return lambda run: run.process.send_signal(number)
+
+
 SHADOW, PAGE = ("--shadow",), ("--view", "--view-at", "127.0.0.1:0")
 PAD, ROS, DISK = ("--gamepad", "pad"), ("--ros",), ("--out", "disk/run")
 RUNS: dict[str, tuple[tuple[str, ...], Action]] = {
     **{
         f"{number.name} during `--shadow`": (
             SHADOW,
-            lambda run, number=number: run.process.send_signal(number),  # type: ignore[misc]
+            _sends(number),
         )
         for number in RUN_SIGNALS
     },
@@ -143,7 +147,9 @@ def _row(name: str, options: tuple[str, ...], act: Action, folder: Path, served:
         pad = os.open(folder / "pad", os.O_RDWR)
         os.write(pad, bytes(6) + b"\x81\x04")  # a shoulder button, as it is at the start
     words = ["gait", "run", "lateral-undulation", "--robot", "robot.toml", "--port", "port"]
-    words += ["--seconds", "10", "--no-film", "--json", *options]
+    # a program that is started on a busy machine to stop the run needs many seconds
+    seconds = "60" if act is _ends_after_stop else "10"
+    words += ["--seconds", seconds, "--no-film", "--json", *options]
     if "--out" not in options:
         words += ["--out", "run"]
     with (folder / "out.txt").open("w+") as out, (folder / "err.txt").open("w+") as err:
@@ -167,29 +173,32 @@ def _row(name: str, options: tuple[str, ...], act: Action, folder: Path, served:
     time.sleep(2.0)  # the bus watchdogs
     if "Traceback" in said:
         code = f"{code}, traceback"
-    return f"| {name} | {code} | {_reason(printed, said, folder)} | {served.torque()} |"
+    return f"| {name} | {code} | {_reason(printed, said, served)} | {served.torque()} |"
 
 
-def _reason(printed: str, said: str, folder: Path) -> str:
-    """Return the trip of the summary; without one, the last message."""
+def _reason(printed: str, said: str, served: Served) -> str:
+    """Return the trip of the summary; without one, the last message of run and server."""
     try:
         text = json.loads(printed).get("tripped") or ""
     except ValueError:
         text = ""
-    lines = [line for line in said.splitlines() if line.startswith("snakewalk: ")]
-    text = text or (lines[-1].removeprefix("snakewalk: ") if lines else "")
-    text = text.replace(f"{folder}/", "").replace("|", "/")
-    return re.sub(r"; (log|its page|the run up to there): .*|process \d+", "", text) or "-"
+    lines = [*served.warnings(), *said.splitlines()]
+    lines = [line.removeprefix("snakewalk: ") for line in lines if line.startswith("snakewalk: ")]
+    lines = [line for line in lines if not line.startswith(("log: ", "pose: "))]
+    text = text or (lines[-1] if lines else "")
+    text = text.replace(f"{served.port.parent}/", "").replace("|", "/")
+    text = re.sub(r"/dev/pts/\d+", "/dev/pts/N", text)
+    return re.sub(r"; (log|its page|the run up to there): .*| \(process \d+\)", "", text) or "-"
 
 
 def main() -> None:
     """Play all scenarios and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--workers", type=int, default=1, help="scenarios at the same time")
-    parser.add_argument("--only", default="", help="scenarios with this text; changes no page")
+    parser.add_argument("--only", default="", help="scenarios that match; changes no page")
     given = parser.parse_args()
-    names = [name for name in RUNS if given.only in name]
-    stops = [name for name in STOPS if given.only in name]
+    names = [name for name in RUNS if re.search(given.only, name)]
+    stops = [name for name in STOPS if re.search(given.only, name)]
     with ThreadPoolExecutor(given.workers) as pool:
         runs = list(pool.map(played, names))
         calibrations = list(pool.map(stopped_calibration, stops))

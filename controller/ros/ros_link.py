@@ -1,5 +1,6 @@
 """The run's end of its ROS node: rows of the log out, commands in; it never waits for either."""
 
+import json
 import os
 import socket
 import sys
@@ -11,7 +12,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.command import Command, GoTo, Refused
 from snakewalk.controller.ros.command_codec import decode_command
-from snakewalk.controller.ros.ros_options import RosOptions
+from snakewalk.controller.ros.ros_options import RosOptions, not_loaded
 from snakewalk.controller.run.watcher import WatcherProcess
 from snakewalk.controller.run.watchers import GOALS
 from snakewalk.controller.walk.live_course import NEXT
@@ -70,6 +71,9 @@ def _decoded(line: str) -> Command:
 
 def _serve(line: socket.socket, options: RosOptions) -> None:
     os.environ.update(options.environ(os.environ))
-    from snakewalk.controller.ros.ros_node import serve  # noqa: PLC0415  rclpy stays here
-
+    try:
+        from snakewalk.controller.ros.ros_node import serve  # noqa: PLC0415  rclpy stays here
+    except ImportError as error:
+        line.sendall(json.dumps({"fault": not_loaded(error)}).encode() + b"\n")
+        return
     serve(line, options)

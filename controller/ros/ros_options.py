@@ -33,3 +33,9 @@ class RosOptions:
         if self.network:
             return {_RANGE: "SUBNET"}
         return {} if any(given.get(name) for name in _SAYS_WHERE) else {_RANGE: "LOCALHOST"}
+
+
+def not_loaded(error: ImportError) -> str:
+    """Return why rclpy, which is installed, cannot be loaded."""
+    reason = next(iter(str(error).splitlines()), type(error).__name__)
+    return f"rclpy cannot be loaded: {reason}; check that `import rclpy` works in this environment"

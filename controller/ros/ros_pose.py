@@ -20,7 +20,7 @@ from snakewalk.controller.console.child_process import pipe, start
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.exchange.ros_messages import FRAMES
 from snakewalk.controller.pose.udp_feed import PoseQueue
-from snakewalk.controller.ros.ros_options import READY, RosOptions
+from snakewalk.controller.ros.ros_options import READY, RosOptions, not_loaded
 from snakewalk.controller.run.external.external_source import ExternalSource
 from snakewalk.drivers.clock import Clock
 
@@ -118,6 +118,9 @@ class RosPoseFeed(PoseQueue):
 
 def _serve(line: Connection, topic: str) -> None:
     os.environ.update(RosOptions().environ(os.environ))
-    from snakewalk.controller.ros.ros_pose_node import serve  # noqa: PLC0415  rclpy stays here
-
+    try:
+        from snakewalk.controller.ros.ros_pose_node import serve  # noqa: PLC0415  rclpy stays here
+    except ImportError as error:
+        line.send_bytes(not_loaded(error).encode())
+        return
     serve(line, topic)

@@ -284,10 +284,13 @@ class _Execution:
                 on_wire = self.port is not None and self.rehearsed is None
                 with raised_priority() if on_wire else nullcontext():
                     outcome = drive.run()
+                end = outcome.tripped or "it had come to its end"
                 if button is not None:
-                    button.end(outcome.tripped or "it had come to its end")
-                if beside is not None:
+                    button.report_end(end)
+                if beside is not None:  # for many seconds, in which the port is still open
                     beside.end(clock.now_s())
+                if button is not None:
+                    button.end(end)
         return outcome, pose, mapped, source
 
     def _recovery(self, backend: Backend, warn: Callable[[str, str], None]) -> Recovery[Recheck]:

@@ -239,23 +239,30 @@ class RunLog:
             self._writer.add_message(self._channels[table], stamp_ns, data, publish_time=stamp_ns)
 
     def _report_deletion(self) -> None:
-        """Warn once if the file has no name any more, because it or its folder was deleted."""
-        if self._is_deleted or os.fstat(self._file.fileno()).st_nlink > 0:
+        """Warn once if the file lost its name, because it or its folder was deleted or moved."""
+        if self._is_deleted or self._has_its_name():
             return
         self._is_deleted = True
+        how = "moved" if os.fstat(self._file.fileno()).st_nlink > 0 else "deleted"
         _LOGGER.warning(
-            "%s: was deleted during the run; it is kept open, and written again at the end",
-            self._part,
+            "%s: was %s during the run; it is kept open, and written again at the end",
+            *(self._part, how),
         )
 
+    def _has_its_name(self) -> bool:
+        try:
+            return os.path.samestat(os.fstat(self._file.fileno()), self._part.stat())
+        except OSError:
+            return False
+
     def _restore(self) -> None:
-        """Write a file that was deleted meanwhile again, from its descriptor.
+        """Write a file that was deleted or moved meanwhile again, from its descriptor.
 
         Raises:
             OSError: the disk is full.
 
         """
-        if self._part.exists():
+        if self._has_its_name():
             return
         self._part.parent.mkdir(parents=True, exist_ok=True)
         self._file.flush()

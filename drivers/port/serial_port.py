@@ -172,7 +172,7 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
     if number in (errno.EBUSY, errno.EAGAIN):
         holders = _holders(name)
         is_own = any(each.startswith(f"{_OWN} ") for each in holders)
-        remedy = f"stop it by: snakewalk stop --port {name}" if is_own else "close it"
+        remedy = f"end it, a run by: snakewalk stop --port {name}" if is_own else "close it"
         text = ", ".join(holders)
         return f"{name}: another program has it open{text and ': '}{text}; {remedy}"
     if isinstance(error, ValueError):

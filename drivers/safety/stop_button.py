@@ -137,15 +137,19 @@ class StopButton:
             return f"{self.path}: the stop file was deleted or moved: nobody could stop this run"
         return None
 
+    def report_end(self, how: str) -> None:
+        """Report the end to programs that press the button; the first report counts."""
+        if os.fstat(self._file).st_size >= _BYTES and not self._map[_ENDED]:
+            _write_text(self._map, _END, how)
+            self._map[_ENDED] = 1
+
     def end(self, how: str) -> None:
         """Remove the button, and report the end to waiting programs; safe to call twice."""
         if self._map.closed:
             return
         if _HAS_LOCKS:
             self.path.unlink(missing_ok=True)
-        if os.fstat(self._file).st_size >= _BYTES:
-            _write_text(self._map, _END, how)
-            self._map[_ENDED] = 1
+        self.report_end(how)
         self._map.close()
         os.close(self._file)
         if not _HAS_LOCKS:  # Windows cannot delete a file that any program has open

@@ -196,3 +196,22 @@ def test_a_log_whose_folder_is_deleted_is_reported_at_once_and_written_again(
     with path.open("rb") as file:
         rows = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
     assert rows.count("/cycle") == 100
+
+
+def test_a_log_whose_folder_is_moved_is_reported_and_takes_no_file_of_another_run(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path, angles_rad = tmp_path / "run" / "log.mcap", np.zeros(JOINTS)
+    with RunLog(path) as log:
+        for k in range(100):
+            if k == 30:
+                path.parent.rename(tmp_path / "moved")
+                path.parent.mkdir()
+                part_path(path).write_bytes(b"of another run")
+            time_s = 0.02 * k
+            log.cycle(time_s, angles_rad, angles_rad, joint_state(k), deadline_s=0.02, lateness_s=0)
+        (warning,) = caplog.records
+        assert "was moved during the run; it is kept open" in warning.getMessage()
+    with path.open("rb") as file:
+        rows = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
+    assert rows.count("/cycle") == 100

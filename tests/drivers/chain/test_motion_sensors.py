@@ -133,3 +133,17 @@ def test_unread_unknown_and_rare_readings_are_not_judged() -> None:
 def test_the_travel_of_a_constant_current_must_suffice() -> None:
     least_rad = min(CURRENT_TRAVEL_RAD, 2.0 * BACK_RAD)
     assert swing(hold(0, 0.1), 126, amplitude_rad=least_rad / 8) == []  # a period
+
+
+def test_a_joint_that_is_not_read_hides_no_other() -> None:
+    ((_, line),) = swing(hold(0, 0.0, joint=1), 300, valid=np.array([False, True]))
+    assert line.startswith(ROBOT.joint_label(1))
+
+
+def test_a_current_that_changes_before_it_counts_is_not_reported() -> None:
+    reads = iter(range(600))
+
+    def seldom(motion: np.ndarray) -> None:
+        motion[0, 0] = 0.01 * (next(reads) // (CURRENT_READS - 1))
+
+    assert swing(seldom, 600) == []

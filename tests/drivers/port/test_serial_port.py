@@ -307,4 +307,4 @@ def test_a_command_of_snakewalk_that_has_the_port_open_is_named_with_its_run(
         finally:
             process.kill()
     assert f"run flat-square {name} (process {process.pid})" in text
-    assert text.endswith(f"; stop it by: snakewalk stop --port {name}")
+    assert text.endswith(f"; end it, a run by: snakewalk stop --port {name}")

@@ -25,7 +25,7 @@ class LateKernel:
     def stand_before(self, port: PtyPort) -> None:
         """Answer for the terminal of ``port`` whether bytes are there."""
         self._readable.register(port._fileno, select.POLLIN)
-        port._readable = self
+        port._readable = self  # type: ignore[assignment]
 
     def poll(self, wait_ms: float) -> list[tuple[int, int]]:
         """Do as ``select.poll``, and hand over what is held if the client waits."""

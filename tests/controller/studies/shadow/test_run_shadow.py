@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_world
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.bench.emergency_stop import StopOutcome, runs_of, stop_runs
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.result_files import SUMMARY
 from snakewalk.controller.metrics.comparison import compare
@@ -20,7 +21,7 @@ from snakewalk.controller.run import backend, execute
 from snakewalk.controller.run.deviation import Deviation
 from snakewalk.controller.run.factory import prepare_gait
 from snakewalk.controller.studies.shadow.diagnosis import MOST_S, goals_of
-from snakewalk.controller.studies.shadow.run_shadow import ALARM_A
+from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, RunShadow
 
 
 def short_run(seconds: float) -> Any:
@@ -57,6 +58,22 @@ def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     said = json.loads(ended.stdout)  # the log alone says the same
     assert (ended.exit_code, said["named"], said["at"]) == (1, "weaker servo", 1)
     assert said["text"] == events[-1]
+
+
+def test_a_stop_during_the_diagnosis_learns_that_the_run_has_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    stopped: list[StopOutcome] = []
+
+    def diagnose(shadow: RunShadow, time_s: float) -> None:
+        stopped.extend(stop_runs(runs_of(), "test"))
+
+    monkeypatch.setattr(RunShadow, "end", diagnose)
+    execute.execute(short_run(0.5), tmp_path / "run", shadow=True)
+    ((how, text, safe),) = [(each.how, each.text, each.safe) for each in stopped]
+    assert (how, text, safe) == ("latched", "it had come to its end", True)
+    assert runs_of() == []
 
 
 def test_a_run_of_half_a_minute_is_judged_by_its_last_seconds(tmp_path: Path) -> None:
