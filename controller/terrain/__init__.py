@@ -1,1 +1,1 @@
-"""Terrain: how risky the ground is, and safe paths over it."""
+"""Terrain: risk of the ground, and safe paths over it."""

@@ -1,4 +1,4 @@
-"""Wider bends: a body of a metre cannot follow a corner of a hand's breadth."""
+"""Widen the bends of a path for a body that cannot follow sharp corners."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 
-_CHORD_M = 0.05  # the path is tabulated every centimetre; a shorter arc has no curvature
+_CHORD_M = 0.05  # the path is tabulated every centimetre: a shorter arc has no curvature
 _WORTH = 1.1  # a change must widen the sharpest bend by this much
 _CHANGES = 8
 _NEAREST = 2
@@ -19,10 +19,10 @@ _SPLINE_UNITS = 500
 def widen_in_steps(
     points_m: Floats, free: Bools, radius_m: float, safe: Callable[[SplinePath], bool]
 ) -> Steps[SplinePath]:
-    """Spline through points, with free ones near its sharpest bends dropped or pulled straight.
+    """Spline through points; free points near sharp bends are dropped or pulled straight.
 
-    Ends when every bend has ``radius_m``, or when no change that keeps the path safe helps; the
-    points that are not free stay.
+    Ends when every bend has ``radius_m``, or when no change that keeps the path safe helps. The
+    other points stay.
     """
     yield _SPLINE_UNITS
     path = SplinePath(points_m)
@@ -53,9 +53,9 @@ def widen_in_steps(
 
 
 def sharpest_bend(path: SplinePath) -> tuple[float, Floats]:
-    """Least radius of curvature (infinite on a straight path) and the point where it is.
+    """Return the smallest radius of curvature (infinite on a straight path) and its point.
 
-    Radius of the circle through three points of the path, five centimetres apart.
+    The radius comes from three points of the path, five centimetres apart.
     """
     count = max(1, int(path.length_m / 0.02))
     s = np.linspace(_CHORD_M, max(_CHORD_M, path.length_m - _CHORD_M), count)
@@ -67,7 +67,6 @@ def sharpest_bend(path: SplinePath) -> tuple[float, Floats]:
 
 
 def _near(points: Floats, free: Bools, at_m: Floats) -> list[int]:
-    """Free points nearest to a place."""
     which = np.flatnonzero(free)
     order = np.argsort(np.hypot(*(points[which] - at_m).T))
     return [int(k) for k in which[order[:_NEAREST]]]

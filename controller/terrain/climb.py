@@ -27,10 +27,10 @@ class SteepSection:
 def steep_sections(
     path: SplinePath, ground: HeightField, length_m: float, limit_rad: float
 ) -> list[SteepSection]:
-    """Find the sections on which a body of ``length_m`` stands steeper than ``limit_rad`` uphill.
+    """Return the sections on which a body of ``length_m`` climbs steeper than ``limit_rad``.
 
-    The slope is the rise from tail to head over the length of the body along the path, so a step
-    that is lower than that is passed. Down a slope a body slides, which is not reported.
+    The slope is the rise from tail to head over the body's length along the path, so low steps
+    pass. Slopes downwards are not reported.
     """
     half_m = 0.5 * min(length_m, path.length_m)
     middle_m = np.arange(half_m, path.length_m - half_m + _STEP_M / 2, _STEP_M)

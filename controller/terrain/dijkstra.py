@@ -14,17 +14,16 @@ _UNITS = 1000
 def shortest_tree(
     starts: Ints, ends: Ints, weights: Floats, source: int
 ) -> Steps[tuple[Floats, Indices]]:
-    """Find the shortest distances from a node to all others.
+    """Return the shortest distances from a node to all others.
 
     Args:
-        starts: (n + 1,) index of the first arc of each node, and the number of arcs.
+        starts: (n + 1,) index of the first arc of each node, then the number of arcs.
         ends: (m,) node at the end of each arc.
         weights: (m,) lengths of the arcs, 0 or more.
         source: node.
 
     Returns:
-        Distances (n,), infinite where no arcs lead, and the node before each (n,); -9999
-        if nothing leads there.
+        Distances (n,), infinite if unreachable, and the previous node (n,), or -9999.
 
     """
     count = len(starts) - 1

@@ -1,4 +1,4 @@
-"""Dubins curves: from one pose to another with bounded curvature; how a body joins a path.
+"""Dubins curves: the shortest curves between two poses with bounded curvature.
 
 L. E. Dubins, On curves of minimal length with a constraint on average curvature, and with
 prescribed initial and terminal positions and tangents, American Journal of Mathematics 79, 1957.
@@ -20,7 +20,7 @@ _TURNS = np.array(
     [(a, 0, b) for a in (1, -1) for b in (1, -1)] + [(a, -a, a) for a in (1, -1)] * 2, float
 )
 """(8, 3) turns of the pieces, 1 to the left; three arcs twice, as two middle circles fit."""
-_FULL_TURN_TOLERANCE_RAD = 1e-9  # an arc of nothing is not a full circle by rounding
+_FULL_TURN_TOLERANCE_RAD = 1e-9  # rounding must not make a full circle of an arc of length 0
 _STEP_M = 0.01
 _JOINS = 16
 _SAMPLES = 24
@@ -31,7 +31,7 @@ _LAID_POSES = 16
 
 @dataclass(frozen=True, slots=True)
 class DubinsCurves:
-    """All curves of Dubins' kinds from one pose to each of n others."""
+    """All Dubins curves from one pose to each of n others."""
 
     start_m: complex
     """x + iy."""
@@ -43,7 +43,7 @@ class DubinsCurves:
 
     @property
     def length_m(self) -> Floats:
-        """Lengths (n, 8) of the curves."""
+        """(n, 8) lengths of the curves."""
         return np.asarray(self.pieces_m.sum(axis=-1))
 
     def position(self, goal: int, kind: int, s_m: ArrayLike) -> Floats:
@@ -52,11 +52,11 @@ class DubinsCurves:
         return np.asarray(self._positions(np.array([goal * len(_TURNS) + kind]), s)[0])
 
     def samples(self, which: Ints, count: int) -> Floats:
-        """(k, count, 2) points evenly along curves, both ends included.
+        """(k, count, 2) evenly spaced points of curves, both ends included.
 
         Args:
             which: (k,) flat indices into the (n, 8) curves; these must exist.
-            count: points a curve.
+            count: points per curve.
 
         """
         length_m = self.pieces_m.reshape(-1, 3)[which].sum(axis=-1)
@@ -80,7 +80,7 @@ class DubinsCurves:
 def _draw(start: Floats, pieces_m: Floats, bend_1_m: Floats, s_m: Floats, points: Floats) -> None:
     """Write points (k, c, 2) at arc lengths (k, c) of curves from poses (k, 3).
 
-    The pieces (k, 3) have curvatures ``bend_1_m`` (k, 3).
+    The pieces (k, 3) have curvatures ``bend_1_m`` (k, 3), 1/m.
     """
     for k in range(len(s_m)):
         for i in range(s_m.shape[1]):
@@ -89,7 +89,7 @@ def _draw(start: Floats, pieces_m: Floats, bend_1_m: Floats, s_m: Floats, points
                 length = min(left_m, pieces_m[k, piece])
                 left_m -= length
                 half = 0.5 * bend_1_m[k, piece] * length
-                # the chord of an arc: sin(half) / half of its length, half the turn on
+                # chord of an arc: sin(half) / half times its length, at half the turn
                 chord = length * np.sin(half) / half if half != 0.0 else length
                 x += chord * np.cos(heading + half)
                 y += chord * np.sin(heading + half)
@@ -104,11 +104,10 @@ def dubins_curves(
     goal_headings_rad: ArrayLike,
     radius_m: float,
 ) -> DubinsCurves:
-    """Return all curves from a pose to goals (n, 2) with headings (n,); the shortest is Dubins'.
+    """Return all curves from a pose to goals (n, 2) with headings (n,).
 
-    The heading at the start is one for all goals, or one for each (n,).
-    The tangent of two circles gives an arc, a line and an arc; a circle that touches both, of the
-    same radius, gives three arcs.
+    The start has one heading, or one for each goal (n,). The tangent of two circles gives arc,
+    line, arc; a third circle of the same radius that touches both gives three arcs.
     """
     z0, z1 = complex(*np.asarray(start_m, float)), np.asarray(goals_m, float) @ [1.0, 1.0j]
     h1 = np.asarray(goal_headings_rad, float)
@@ -148,7 +147,7 @@ class Turn:
 
 
 class PathTurns:
-    """All turns from the start of a path onto it, in each of several directions."""
+    """All turns from the start of a path onto it, in several directions."""
 
     def __init__(
         self,
@@ -163,13 +162,13 @@ class PathTurns:
         """Choose ``joins`` places on the path, up to ``until_m``.
 
         Args:
-            path: its start is where the curves begin.
+            path: the curves begin at its start.
             headings_rad: (h,) directions of the body at the start.
-            radius_m: least that the body can turn with.
+            radius_m: smallest turning radius of the body.
             until_m: arc length on the path, for example of the first waypoint.
-            cost_per_m: of points (..., k, 2) along curves, (..., k).
-            least_per_m: least cost of a metre: spares curves that are too long.
-            joins: places.
+            cost_per_m: cost (..., k) at points (..., k, 2) along curves.
+            least_per_m: lower bound of the cost per metre; excludes long curves.
+            joins: number of places.
 
         """
         self.path, self._cost_per_m, self._least_per_m = path, cost_per_m, least_per_m
@@ -182,7 +181,7 @@ class PathTurns:
         """(h,) less than the cheapest turn in each direction costs; empty before they are laid."""
 
     def lay_in_steps(self) -> Steps[DubinsCurves]:
-        """Lay all Dubins curves, once."""
+        """Compute all Dubins curves, once."""
         if self._curves is not None:
             return self._curves
         headings, s_m, path = self._headings_rad, self._s_m, self.path
@@ -213,11 +212,11 @@ class PathTurns:
         return curves
 
     def cheapest(self, direction: int = 0) -> Turn:
-        """Return the turn in one direction with which the way to ``until_m`` costs least."""
+        """Return the turn in one direction with the lowest cost up to ``until_m``."""
         return at_once(self.cheapest_in_steps(direction))
 
     def cheapest_in_steps(self, direction: int = 0) -> Steps[Turn]:
-        """Find ``cheapest`` in steps."""
+        """Return ``cheapest`` in steps."""
         curves = yield from self.lay_in_steps()
         count = len(self._s_m) * len(_TURNS)
         first = direction * count
@@ -247,6 +246,5 @@ class PathTurns:
 
 
 def _turn(angle_rad: Floats) -> Floats:
-    """Angle of an arc, from 0 to a full turn."""
     turn = np.mod(angle_rad, 2.0 * np.pi)
     return np.where(turn > 2.0 * np.pi - _FULL_TURN_TOLERANCE_RAD, 0.0, turn)

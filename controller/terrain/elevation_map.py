@@ -1,6 +1,6 @@
 """Elevation map: measured heights on a regular grid, NaN where nothing was measured.
 
-Points, triangles and rasters come to it; a height field for planner and simulator goes from it.
+It is built from points, triangles or rasters, and gives a height field for planner and simulator.
 """
 
 import math
@@ -39,13 +39,13 @@ class ElevationMap:
     def of_points(
         cls, points_m: Floats, spacing_m: float, height: CellHeight = "median", least: int = 1
     ) -> Self:
-        """Grid the points (n, 3): a sample stands for the square of one spacing around it.
+        """Grid the points (n, 3): a sample represents the square of one spacing around it.
 
         Args:
             points_m: x, y, z.
             spacing_m: between samples.
             height: which of a square's points counts.
-            least: points without which a square is unknown.
+            least: squares with fewer points are unknown.
 
         Raises:
             InputError: no points, too many samples, or fewer than two in a row or column.
@@ -74,9 +74,9 @@ class ElevationMap:
 
         Args:
             vertices_m: (n, 3).
-            faces: (k, 3) numbers of vertices.
-            low_m: (2,) least x and y of the map.
-            high_m: (2,) greatest.
+            faces: (k, 3) indices of vertices.
+            low_m: (2,) smallest x and y of the map.
+            high_m: (2,) largest.
             spacing_m: between samples.
 
         Raises:
@@ -93,10 +93,10 @@ class ElevationMap:
 
     @classmethod
     def of_raster(cls, z_m: Floats, dx_m: float, dy_m: float, spacing_m: float) -> Self:
-        """Sample a raster with cells of any shape at another spacing; its first sample is (0, 0).
+        """Resample a raster; its first sample is (0, 0).
 
-        Finer samples lie on the cubic surface through the raster's; coarser ones are the medians of
-        those that they stand for. A finer sample is known if the four around it are.
+        Finer samples lie on a cubic surface through the raster, and are known if the four around
+        them are. Coarser samples are medians.
 
         Args:
             z_m: (rows, columns), row 0 with the smallest y; NaN is unknown.
@@ -138,16 +138,16 @@ class ElevationMap:
         return np.asarray(np.isfinite(self.z_m))
 
     def centred(self) -> Self:
-        """Return the same map with its middle at (0, 0)."""
+        """Return the map with its middle at (0, 0)."""
         rows, columns = self.z_m.shape
         half = 0.5 * self.spacing_m
         return replace(self, x0_m=-(columns - 1) * half, y0_m=-(rows - 1) * half)
 
     def height_field(self, fill_m: float = 0.0) -> HeightField:
-        """Return the height field; its lowest point is at 0, its holes are filled but unknown.
+        """Return the height field: lowest point at 0, holes filled but unknown.
 
         Args:
-            fill_m: a hole that a disc of this width does not fit into counts as known.
+            fill_m: a hole narrower than a disc of this width counts as known.
 
         Raises:
             InputError: nothing is known.
@@ -170,7 +170,7 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
 
     Args:
         z_m: (rows, columns); some are finite.
-        holes: (rows, columns) what is to be filled.
+        holes: (rows, columns) samples to fill.
 
     """
     nearest = distance_transform_edt(holes, return_distances=False, return_indices=True)
@@ -222,7 +222,6 @@ def opened(holes: Bools, radius: float) -> Bools:
 
 
 def _shape(size_m: Floats, spacing_m: float, *, floor: bool = False) -> tuple[int, int]:
-    """Columns and rows of an extent in x and y."""
     cells = np.floor(size_m / spacing_m + 1e-9) if floor else np.rint(size_m / spacing_m)
     columns, rows = (int(count) + 1 for count in cells)
     if columns * rows > MOST_SAMPLES:
@@ -251,7 +250,7 @@ def _rasterise(vertices: Floats, faces: Ints, z_m: Floats) -> None:
         bx, by, bz = vertices[faces[f, 1]]
         cx, cy, cz = vertices[faces[f, 2]]
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        if area == 0.0:  # upright
+        if area == 0.0:  # vertical
             continue
         left = max(int(np.ceil(min(ax, bx, cx) - 1e-9)), 0)
         right = min(int(np.floor(max(ax, bx, cx) + 1e-9)), columns - 1)

@@ -1,11 +1,10 @@
-"""Exact routes: a way over safe ground wherever one exists, however narrow.
+"""Exact routes: a path over safe ground wherever one exists, however narrow.
 
-The risk of ground is bilinear between the samples of its height field. Lines through all samples,
-through the planner's margin and through both ends cut the ground into cells in which it is bilinear
-as well. From any safe point of such a cell a safe way leads to a safe corner, first along one axis
-and then along the other, in the directions in which the risk does not grow. So two points are
-joined by safe ground if and only if they are joined by edges of cells, or by a way over a saddle
-between opposite corners of one cell.
+The risk is bilinear between the samples of the height field. Lines through all samples, the
+planner's margin and both ends cut the ground into cells with bilinear risk. From any safe point of
+a cell, moving along one axis and then the other without growing risk leads to a safe corner. Two
+points are therefore joined by safe ground if and only if edges of cells join them, or saddles
+between opposite corners of a cell.
 """
 
 from typing import Final, NamedTuple
@@ -24,7 +23,7 @@ _CHUNK: Final = 200_000
 
 
 class _Cells(NamedTuple):
-    """Lines (w,) and (h,), risk (h, w) and safety of their crossings, and both ends' numbers."""
+    """Lines (w,) and (h,), risk and safety (h, w) of crossings, and the numbers of both ends."""
 
     x_m: Floats
     y_m: Floats
@@ -34,7 +33,7 @@ class _Cells(NamedTuple):
 
 
 class _Edges(NamedTuple):
-    """Nodes (k,) and (k,) that are joined, and (k,) x of the saddle between them or NaN."""
+    """Joined nodes (k,) and (k,), and (k,) x of the saddle between them or NaN."""
 
     a: Indices
     b: Indices
@@ -42,14 +41,14 @@ class _Edges(NamedTuple):
 
 
 def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats) -> Floats | None:
-    """(n, 2) corners of the cheapest safe way along cells, both ends included; None without a way.
+    """(n, 2) corners of the cheapest safe path along cells, both ends included, or None.
 
-    Two corners that follow each other are joined by a straight safe piece. An unsafe start is
-    joined straight to the nearest safe node from which the end can be reached.
+    Straight safe pieces join the corners. An unsafe start is joined straight to the nearest safe
+    node that can reach the end.
 
     Args:
         relief: risk of the ground.
-        graph: weighs the edges, as those of a planned path.
+        graph: gives the cost of edges.
         start_m: (2,)
         end_m: (2,) on safe ground.
 
@@ -85,7 +84,7 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
 
 
 def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
-    """Cells of the ground within the margin; None if the margin leaves no ground."""
+    """Cells of the ground within the margin, or None."""
     ground, margin = relief.ground, relief.config.edge_margin_m
     lines = []
     points = np.stack([start, end])
@@ -111,7 +110,7 @@ def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
 
 
 def _edges(cells: _Cells) -> _Edges:
-    """Sides of cells between safe corners, diagonals of safe cells, and ways over saddles."""
+    """Sides of cells between safe corners, diagonals of safe cells, and paths over saddles."""
     safe, number = cells.safe, np.arange(cells.safe.size).reshape(cells.safe.shape)
     corners = safe[:-1, :-1], safe[:-1, 1:], safe[1:, :-1], safe[1:, 1:]
     all_safe = corners[0] & corners[1] & corners[2] & corners[3]
@@ -140,7 +139,7 @@ def _edges(cells: _Cells) -> _Edges:
 
 
 def _saddles_m(cells: _Cells) -> Floats:
-    """(h - 1, w - 1) x of each cell's saddle, where that lies in the cell and is safe; else NaN."""
+    """(h - 1, w - 1) x of each cell's saddle if it is in the cell and safe, else NaN."""
     f = cells.risk
     a, b, c = f[:-1, :-1], f[:-1, 1:] - f[:-1, :-1], f[1:, :-1] - f[:-1, :-1]
     d = f[1:, 1:] - f[1:, :-1] - b
@@ -158,7 +157,7 @@ def _tree(nodes_m: Floats, edges: _Edges, graph: SafeGraph, target: int) -> tupl
         from_m, to_m = nodes_m[edges.a[piece]], nodes_m[edges.b[piece]]
         there[piece], back[piece], _ = graph.edge_cost(from_m, to_m)
     n = len(nodes_m)
-    weight = np.maximum(np.concatenate([there, back]), 1e-12)  # a zero would be no edge
+    weight = np.maximum(np.concatenate([there, back]), 1e-12)  # a sparse zero would be no edge
     ends = np.concatenate([edges.b, edges.a]), np.concatenate([edges.a, edges.b])
     score, towards = dijkstra(
         csr_array(coo_array((weight, ends), shape=(n, n))),
@@ -170,6 +169,5 @@ def _tree(nodes_m: Floats, edges: _Edges, graph: SafeGraph, target: int) -> tupl
 
 
 def _distinct(points: Floats) -> Floats:
-    """Return the points without those that repeat the one before."""
     apart = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-9])
     return np.asarray(points[apart])

@@ -1,8 +1,7 @@
-"""Footprint: the ground under a body that follows a path, and how far steep ground is from it.
+"""Footprint: slopes under a body that follows a path, and the distance to steep ground.
 
-A body that bends to and fro stands on a strip about half its length wide. The slope across the path
-there makes it roll or slide, and the slope along the path stops it. Neither is seen on the path
-alone: a valley is level along its bottom.
+A bending body covers a strip about half its length wide. A slope across the path makes it roll or
+slide; a slope along it stops it. The path alone shows neither: a valley is level along its bottom.
 """
 
 import numpy as np
@@ -15,10 +14,7 @@ from snakewalk.controller.terrain.relief import fitted_gradient, interpolated, w
 
 
 class Footprint:
-    """Slopes in a disc of ``footprint_m`` across, anywhere on a height field.
-
-    Exact on the field's samples, bilinear between them.
-    """
+    """Slopes in a disc of diameter ``footprint_m``; exact on samples, bilinear between them."""
 
     def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
         self._ground, radius_m = ground, config.footprint_m / 2.0
@@ -37,10 +33,10 @@ class Footprint:
 
     @property
     def layers(self) -> Floats:
-        """(rows, columns, 6) slopes, their mean squares xx, xy, yy, and nearness.
+        """(rows, columns, 6) slopes x, y, their mean squares xx, xy, yy, and nearness.
 
-        Nearness is 1 on ground that cannot be climbed, falling to 0 over the clearance. It is
-        ground whose slope under the whole footprint exceeds the climb limit, or is unknown.
+        Nearness is 1 on ground that is unknown or steeper than the climb limit (under the whole
+        footprint), and falls to 0 over the clearance.
         """
         return np.concatenate([self._layers, self._nearness[..., None]], axis=-1)
 
@@ -53,8 +49,8 @@ class Footprint:
     def slopes(self, points_m: Floats, direction: Floats) -> Floats:
         """Tangents (2, ...) of the slope up along a direction, and of the RMS slope across it.
 
-        The slope up is that of the plane fitted to the footprint. The slope across is the root of
-        the mean square over it, so that the two sides of a valley do not cancel.
+        The slope up is that of the plane fitted to the footprint. The slope across is a root mean
+        square, so that the two sides of a valley do not cancel.
 
         Args:
             points_m: (..., 2) in the world.

@@ -1,7 +1,7 @@
-"""Growing map: the ground of a fixed area as one pair of pictures after the other shows it.
+"""Growing map: heights of a fixed area, from one stereo pair after the other.
 
-A place that no picture showed stays unknown. Where a picture contradicts the map, the one that was
-taken from nearer by counts.
+Unseen samples stay unknown. If a pair contradicts the map, the height with the smaller expected
+error counts.
 """
 
 from pathlib import Path
@@ -30,12 +30,12 @@ _COARSE: Final = 5
 
 
 class GrowingMap:
-    """Heights on a grid, each with its expected error, as far as they were seen."""
+    """Heights on a grid with their expected errors."""
 
     def __init__(
         self, x0_m: float, y0_m: float, size_m: tuple[float, float], spacing_m: float
     ) -> None:
-        """Begin with an area of which nothing is known."""
+        """Start with an unknown area."""
         self.spacing_m, self.x0_m, self.y0_m = spacing_m, x0_m, y0_m
         columns, rows = (int(np.ceil(side / spacing_m - 1e-9)) + 1 for side in size_m)
         self.z_m = np.empty((rows, columns))
@@ -51,7 +51,7 @@ class GrowingMap:
 
     @classmethod
     def over(cls, ground: HeightField, spacing_m: float) -> "GrowingMap":
-        """Map of the area of a height field, of which nothing else is taken."""
+        """Return an empty map of the area of a height field."""
         return cls(ground.x0_m, ground.y0_m, ground.size_m, spacing_m)
 
     def clear(self) -> None:
@@ -66,23 +66,23 @@ class GrowingMap:
         return np.asarray(np.isfinite(self.z_m))
 
     def is_known(self, x_m: float, y_m: float) -> bool:
-        """Whether the sample that a place belongs to was seen."""
+        """Whether the sample of a place was seen."""
         cell, inside = self._cells(np.array([[x_m, y_m, 0.0]]))
         return bool(inside[0] and np.isfinite(self.z_m.ravel()[cell[0]]))
 
     def errors_m(self, ground: HeightField) -> Floats:
-        """(k,) heights of the samples that were seen, less those of the true ground."""
+        """(k,) height errors of the seen samples against the true ground."""
         row, column = np.nonzero(self.known)
         x, y = self.x0_m + column * self.spacing_m, self.y0_m + row * self.spacing_m
         return np.asarray(self.z_m[row, column] - ground.elevation_m(x, y))
 
     def add(self, points_m: Floats, error_m: Floats, time_s: float) -> None:
-        """Add what one pair of pictures shows.
+        """Add the points of one pair of pictures.
 
         Args:
             points_m: (n, 3) in the world.
-            error_m: (n,) expected of each.
-            time_s: when they were taken.
+            error_m: (n,) expected error of each.
+            time_s: time of the pictures.
 
         """
         self.pictures += 1
@@ -96,17 +96,17 @@ class GrowingMap:
         self._fuse(cells, z_m[middle], np.maximum(error_m[middle], _LEAST_ERROR_M), time_s)
 
     def touch(self, points_m: Floats) -> None:
-        """Note points (n, 3) of the ground that the body lies on.
+        """Store points (n, 3) of the ground that the body lies on.
 
-        They stay unknown, as a link may hang over a hollow, but bear the surface filled in there.
+        They shape the filled surface but stay unknown, because a link may hang over a hollow.
         """
         cell, inside = self._cells(points_m)
         self._touched_m.ravel()[cell[inside]] = points_m[inside, 2]
 
     def height_field(self) -> HeightField | None:
-        """Return the map with its holes filled, but unknown; None while nothing is known.
+        """Return the map with holes filled but unknown; None while nothing is known.
 
-        They are the smoothest surface, which is coarser farther off.
+        The filled surface is coarser far from seen samples.
         """
         known = self.known
         if not known.any():
@@ -120,9 +120,9 @@ class GrowingMap:
         return HeightField(filled(z_m, smooth), self.spacing_m, self.x0_m, self.y0_m, trusted)
 
     def write(self, file: Path) -> None:
-        """Write a map's file, with the heights, the expected errors and the times.
+        """Write a map file with heights, expected errors and times.
 
-        It is empty of heights, and holds no sample known, where nothing was seen.
+        Without any seen sample, all heights are 0 and unknown.
         """
         ground = self.height_field()
         z_m = np.zeros(self.z_m.shape) if ground is None else ground.z_m
@@ -139,19 +139,19 @@ class GrowingMap:
             )
 
     def _cells(self, points_m: Floats) -> tuple[Indices, Bools]:
-        """Numbers of the samples that points (n, 3) stand for, and which lie in the area."""
+        """Sample numbers of points (n, 3), and which points lie in the area."""
         rows, columns = self.z_m.shape
         x, y = np.rint((points_m[:, :2] - [self.x0_m, self.y0_m]) / self.spacing_m).T.astype(int)
         inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
         return y * columns + x, inside
 
     def _fuse(self, cells: Indices, z_m: Floats, error_m: Floats, time_s: float) -> None:
-        """Join heights of some samples with those that stand, by their expected errors."""
+        """Merge heights with the existing ones by their expected errors."""
         before_m, was_m = self.z_m.ravel()[cells], self.error_m.ravel()[cells]
         new = np.isnan(before_m)
         with np.errstate(invalid="ignore"):
             other = ~new & (np.abs(z_m - before_m) > _CONTRADICTS * np.hypot(error_m, was_m))
-        weight, was = error_m**-2.0, was_m**-2.0  # 0 of a new sample
+        weight, was = error_m**-2.0, was_m**-2.0  # 0 for a new sample
         joined_m = (weight * z_m + was * np.nan_to_num(before_m)) / (weight + was)
         joined_error_m = np.maximum((weight + was) ** -0.5, _LEAST_ERROR_M)
         nearer = other & (error_m < was_m)
@@ -164,7 +164,7 @@ class GrowingMap:
 
 
 def _coarsely_filled(z_m: Floats) -> Floats:
-    """Heights everywhere (rows, columns), of those that are not NaN, by means of squares."""
+    """Fill (rows, columns) everywhere from the known heights, by means of squares."""
     rows, columns = z_m.shape
     more = -rows % _COARSE, -columns % _COARSE
     squares = np.pad(z_m, ((0, more[0]), (0, more[1])), constant_values=np.nan)

@@ -1,8 +1,7 @@
-"""Calculations in steps, so that a control cycle does a bounded part of one.
+"""Calculations in steps, so that each control cycle does a bounded part.
 
-A generator yields the size of each step before it does it, and returns the result. The size is
-counted in units of about a microsecond on a processor of 2020. No clock is read, so the same
-calculation has the same steps on every machine.
+A generator yields the size of each step before the step, and returns the result. The unit is about
+a microsecond on a processor of 2020. No clock is read, so the steps are the same on every machine.
 """
 
 from collections.abc import Generator
@@ -13,7 +12,7 @@ Steps: TypeAlias = Generator[int, None, T]
 
 
 def at_once(steps: Steps[T]) -> T:
-    """Return the result of a calculation, done in one piece."""
+    """Run a calculation to its end and return the result."""
     while True:
         try:
             next(steps)
@@ -23,7 +22,7 @@ def at_once(steps: Steps[T]) -> T:
 
 
 class Unfinished(Generic[T]):
-    """A calculation under way."""
+    """A calculation in progress."""
 
     def __init__(self, steps: Steps[T]) -> None:
         self._steps = steps
@@ -34,10 +33,10 @@ class Unfinished(Generic[T]):
         """None until it is done."""
 
     def carry_on(self, budget: int) -> bool:
-        """Do the next step, and more of them within ``budget`` units; return whether it is done.
+        """Do the next step, and more within ``budget`` units; return whether it is done.
 
         Raises:
-            InputError: as the calculation.
+            InputError: from the calculation.
 
         """
         spent = 0

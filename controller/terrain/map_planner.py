@@ -1,9 +1,9 @@
-"""Paths on a map that grows: over known safe ground, as far as that leads towards the waypoints.
+"""Paths on a growing map: over known safe ground, as far as it leads towards the waypoints.
 
-A waypoint that the map does not reach yet is planned to as if unknown ground could be passed, at
-the price of ground next to a place that cannot be climbed. The body is sent along the part of that
-plan that is known and safe. (The free-space assumption: A. Stentz, The focussed D* algorithm for
-real-time replanning, IJCAI 1995; here no step of it is taken for granted.)
+The plan to a waypoint beyond the map assumes that unknown ground is passable, at the cost of ground
+next to a place that cannot be climbed. The body follows only the known and safe part of that plan.
+(The free-space assumption: A. Stentz, The focussed D* algorithm for real-time replanning, IJCAI
+1995.)
 """
 
 from functools import cached_property
@@ -37,14 +37,14 @@ _UNSEEN: Final = 1.5
 
 
 class MapPlanner:
-    """Plans as ``TerrainPlanner`` does, on the map as it is now; before there is one, straight."""
+    """Plans as ``TerrainPlanner`` on the present map; without a map, plain splines."""
 
     def __init__(self, config: PlannerConfig) -> None:
         self._config = config
         self._on: _Knowledge | None = None
 
     def update(self, ground: HeightField) -> None:
-        """Plan on this map from now on."""
+        """Use this map from now on."""
         self._on = _Knowledge(ground, self._config)
 
     def __call__(
@@ -55,7 +55,7 @@ class MapPlanner:
         avoid_m: ArrayLike = (),
         number: int = 1,
     ) -> SplinePath:
-        """Plan through (n, 2) points in order, or through the first of them and on.
+        """Plan through (n, 2) points in order, as far as the map allows.
 
         Raises:
             InputError: no safe ground is known.
@@ -71,7 +71,7 @@ class MapPlanner:
         avoid_m: ArrayLike = (),
         number: int = 1,
     ) -> Steps[SplinePath]:
-        """Plan as a call does, in steps, on the map as it is when the first one is done."""
+        """Plan as a call does, in steps, on the map at the first step."""
         points = np.asarray(points_m, float)
         known = self._on
         if known is None:
@@ -84,37 +84,37 @@ class MapPlanner:
             plan = known.cautious.in_steps(corners, heading_rad, avoid_m=avoid_m, number=number)
             try:
                 return (yield from plan)
-            except InputError as error:  # no smooth way: not so far
+            except InputError as error:  # no smooth path: try a shorter one
                 faults = error.faults
         raise InputError(faults)
 
     def clear(self, points_m: Floats) -> bool:
-        """Whether nothing that is known of points (n, 2) forbids them."""
+        """Whether the known ground does not forbid points (n, 2)."""
         return self._on is None or bool(
             (self._on.open_relief.risk(*points_m.T) <= _SURELY_UNSAFE).all()
         )
 
     def safe(self, point_m: Floats) -> bool:
-        """Whether a point (2,) is known, and safe."""
+        """Whether a point (2,) is known and safe."""
         if self._on is None or self._on.cautious.relief is None:
             return False
         return bool(self._on.cautious.relief.safe(*point_m))
 
 
 class _Knowledge:
-    """A map, and what is built on it when it is first asked for."""
+    """A map and its lazily built planners."""
 
     def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
         self._ground, self._config = ground, config
 
     @cached_property
     def cautious(self) -> TerrainPlanner:
-        """Treats unknown ground as unsafe."""
+        """Planner that treats unknown ground as unsafe."""
         return TerrainPlanner(self._ground, self._config, exact=False)
 
     @cached_property
     def open_relief(self) -> Relief:
-        """Treats unknown ground as passable."""
+        """Relief that treats unknown ground as passable."""
         return Relief(self._ground, self._config, unknown_risk=0.0)
 
     @cached_property
@@ -122,16 +122,16 @@ class _Knowledge:
         return SafeGraph(self.open_relief)
 
     def corners(self, points: Floats, within_m: float) -> Floats:
-        """(k, 2) the points, as far as known safe ground joins them, then the farthest on it.
+        """(k, 2) the points that known safe ground joins, then the farthest node towards the next.
 
         Args:
-            points: (n, 2) the first is where the head is.
-            within_m: distance from the head; ground farther off counts as unknown.
+            points: (n, 2); the first is the position of the head.
+            within_m: distance from the head; farther ground counts as unknown.
 
         """
         graph, relief = self.cautious.graph, self.cautious.relief
         if graph is None or relief is None or not len(graph.nodes_m):
-            return points  # the planner has the words for it
+            return points  # the planner reports this
         near = np.hypot(*(graph.nodes_m - points[0]).T) <= within_m
         found, reach_m = [points[0]], _REACH_M
         for point in points[1:]:
@@ -146,7 +146,7 @@ class _Knowledge:
         return np.array(found) if len(found) > 1 else points
 
     def _farthest(self, graph: SafeGraph, costs: Floats, start: Floats, goal: Floats) -> Floats:
-        """(2,) node at which the best way to a goal leaves what is known and safe."""
+        """(2,) node at which the best path to a goal leaves known safe ground."""
         to_go = _UNSEEN * graph.length_weight * np.hypot(*(graph.nodes_m - goal).T)
         target = self._open_graph.nearest(goal)
         if target is not None:
@@ -154,7 +154,7 @@ class _Knowledge:
             open_to_go = self._open_graph.costs_to(target)[at]
             if (np.isfinite(costs) & np.isfinite(open_to_go)).any():
                 to_go = open_to_go
-        # Along the best way all sums are equal: the farthest of its nodes counts.
+        # Along the best path all sums are equal; choose the farthest of its nodes.
         whole = (1.0 - _TIES) * costs + to_go
         far = np.hypot(*(graph.nodes_m - start).T) >= _LEAST_M
         if np.isfinite(whole[far]).any():

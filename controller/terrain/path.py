@@ -35,7 +35,7 @@ class SplinePath:
 
     @classmethod
     def tabulated(cls, fine_m: Floats) -> Self:
-        """Return the path of points (n, 2) a centimetre apart, with no spline between them."""
+        """Return a path through points (n, 2) a centimetre apart, without a spline."""
         path = cls.__new__(cls)
         path._tabulate(fine_m)
         return path
@@ -47,7 +47,7 @@ class SplinePath:
 
     @property
     def length_m(self) -> float:
-        """Arc length of the whole path."""
+        """Arc length of the path."""
         return float(self._s[-1])
 
     def position(self, s_m: ArrayLike) -> Floats:
@@ -78,20 +78,20 @@ class SplinePath:
         return float(at_s_m[0])
 
     def project(self, points_m: Floats, s_m: Floats, gap_m: Floats) -> None:
-        """Project points onto the path: each within ``WINDOW_M`` ahead of its last arc length.
+        """Project each point onto the path, within ``WINDOW_M`` ahead of its last arc length.
 
         Args:
             points_m: (n, 2) in the world.
-            s_m: (n,) arc lengths; written.
-            gap_m: (n,) distances from the path there; written.
+            s_m: (n,) arc lengths; updated.
+            gap_m: (n,) out: distances from the path.
 
         """
         _project(self._s, self._xy, points_m, s_m, gap_m, WINDOW_M)
 
     def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
-        """Arc length, from ``from_s_m`` on, at which the path first comes nearest to a point.
+        """Arc length, at ``from_s_m`` or later, of the first closest approach to a point.
 
-        If several passes are as near as a table's step, the first counts: a lap may end where it
+        Of passes that differ by less than a centimetre the first counts: a lap may end where it
         began.
         """
         low = min(int(np.searchsorted(self._s, from_s_m - 1e-9)), len(self._s) - 1)
@@ -101,7 +101,7 @@ class SplinePath:
         return float(self._s[low + run[np.argmin(gap[run])]])
 
     def passes(self, points_m: ArrayLike) -> list[float]:
-        """Arc lengths at which the path first comes nearest to points (n, 2), in their order."""
+        """Arc lengths of the first closest approaches to points (n, 2), in their order."""
         found, at_m = list[float](), 0.0
         for point in np.asarray(points_m, dtype=float):
             at_m = self.first_pass(point, at_m)

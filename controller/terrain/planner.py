@@ -1,4 +1,4 @@
-"""The path planner: waypoints in, a smooth path over safe ground out ([PT] 2.6.1, [KP] 4.3)."""
+"""The path planner: a smooth path over safe ground through waypoints ([PT] 2.6.1, [KP] 4.3)."""
 
 from itertools import pairwise
 
@@ -20,16 +20,16 @@ from snakewalk.controller.terrain.route_advice import route_advice
 from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
-_CHECK_STEP_M = 0.02  # how densely a spline is checked again
-_UNSAFE = 30.0  # metres of level path that a turn accepts to stay off a metre of unsafe ground
-_ROUNDS = 7  # halvings: a corner's pieces end at a hundredth of their length
+_CHECK_STEP_M = 0.02  # spacing of the safety check of a spline
+_UNSAFE = 30.0  # cost of a metre of unsafe ground in a turn, as metres of level path
+_ROUNDS = 7  # halvings: the last pieces have a hundredth of a side's length
 
 
 class TerrainPlanner:
-    """Plans paths on one piece of ground; on a flat floor, plain splines through the points.
+    """Plans paths on one ground; on a flat floor, plain splines through the points.
 
-    Built once (fields and graph), then called with the points of each path; the first point is
-    where the head is, and may lie anywhere.
+    Fields and graph are built once. The first point of a call is the position of the head, safe or
+    not.
     """
 
     def __init__(
@@ -40,8 +40,8 @@ class TerrainPlanner:
         Args:
             ground: None for a flat floor.
             config: limits of safe ground.
-            exact: search all safe ground where the graph's nodes find no way or no smooth one;
-                else such points are refused, which needs less time.
+            exact: search all safe ground if the graph's nodes give no smooth path; else reject such
+                points, which is faster.
 
         """
         self._exact = exact
@@ -63,22 +63,22 @@ class TerrainPlanner:
         avoid_m: ArrayLike = (),
         number: int = 1,
     ) -> SplinePath:
-        """Plan a path from where the body is, on good ground or bad, through (n, 2) waypoints.
+        """Plan a path from the head's position through (n, 2) waypoints.
 
-        From an unsafe first point the path leads straight to the nearest safe node. With a heading
-        the path begins in that direction and turns onto the planned one by a Dubins curve, over
-        safe ground where one leads over it, before it comes to the first waypoint.
+        From an unsafe start the path leads straight to the nearest safe node. With a heading, the
+        path begins in that direction and turns onto the planned one by a Dubins curve before the
+        first waypoint, over safe ground if possible.
 
         Args:
-            points_m: the first is where the head is.
+            points_m: the first is the position of the head.
             heading_rad: direction of the body there; None for any.
-            turn_radius_m: least radius with which the body turns.
-            avoid_m: (k, 2) places where the body could not go on; paths keep off them by a
-                footprint where another way exists.
-            number: number of the first waypoint, for messages about it.
+            turn_radius_m: smallest turning radius of the body.
+            avoid_m: (k, 2) places where the body could not continue; paths avoid them by a
+                footprint if possible.
+            number: number of the first waypoint, for messages.
 
         Raises:
-            InputError: a waypoint is off the world or on unsafe ground, or no safe way leads to it.
+            InputError: a waypoint is off the world, on unsafe ground, or unreachable.
 
         """
         return at_once(self.in_steps(points_m, heading_rad, turn_radius_m, avoid_m, number))
@@ -110,7 +110,7 @@ class TerrainPlanner:
         return turns.onto(turn)
 
     def _base(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
-        """Path through points that knows nothing of the body's direction."""
+        """Path through points in any start direction."""
         yield 700
         if self.relief is None or self.graph is None:
             return SplinePath(points)
@@ -147,9 +147,9 @@ class TerrainPlanner:
         raise InputError(fault)
 
     def _again(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
-        """Path from elsewhere: a new leg to the next waypoint, then the path that was planned.
+        """Path from elsewhere: a new leg to the next waypoint, then the previous plan.
 
-        A body that moves leaves no time for more: turns by waypoints need some 30 ms each.
+        A moving body has no time for more: turns by waypoints need some 30 ms each.
         """
         yield 500
         onward = self._onward(points, avoid)
@@ -161,9 +161,9 @@ class TerrainPlanner:
         return (yield from self._base(points, avoid)) if path is None else path
 
     def _onward(self, points: Floats, avoid: Floats) -> Floats | None:
-        """(n, 2) points, a centimetre apart, of the planned path from the second point on.
+        """(n, 2) points, a centimetre apart, of the previous plan after the second point.
 
-        None where it was planned for other waypoints, ends there, or passes a place to be avoided.
+        None if it has other waypoints, ends there, or passes a place to avoid.
         """
         if self._planned is None or len(points) < 3:
             return None
@@ -171,7 +171,7 @@ class TerrainPlanner:
         if not np.array_equal(planned[1 - len(points) :], points[1:]):
             return None
         until_next = planned[1 : len(planned) - len(points) + 2]
-        passes = path.passes(until_next) or [0.0]  # it may have been planned from that point on
+        passes = path.passes(until_next) or [0.0]  # the plan may have started at that point
         onward = path.piece_m(passes[-1], path.length_m)
         if self.relief is not None and len(avoid):
             gap = np.hypot(*(onward[:, None] - avoid[None]).T)
@@ -180,7 +180,7 @@ class TerrainPlanner:
         return onward
 
     def plan(self, points_m: ArrayLike) -> SplinePath:
-        """Plan a path as a call does, but refuse a start that is off the world or on unsafe ground.
+        """Plan as a call does, but reject a start that is off the world or unsafe.
 
         Raises:
             InputError: as for a call, and for the first point.
@@ -194,7 +194,7 @@ class TerrainPlanner:
         return self(points)
 
     def _turn_cost_per_m(self, points_m: Floats) -> Floats:
-        """Weight (..., k) of a metre of path at (..., k, 2); unsafe ground costs a detour."""
+        """Cost (..., k) of a metre of path at (..., k, 2), with a penalty on unsafe ground."""
         if self.relief is None or self.graph is None:
             return np.ones(points_m.shape[:-1])
         unsafe = ~self.relief.safe(*np.moveaxis(points_m, -1, 0))
@@ -215,7 +215,7 @@ class TerrainPlanner:
             if there is not None and graph is not self.graph:
                 yield from graph.tree_in_steps(there)
             yield 300
-            if k == 1 and there is not None:  # the body may be next to an island of safe nodes
+            if k == 1 and there is not None:  # the nearest node may be on an island of safe nodes
                 here = graph.nearest(points[0], graph.can_reach(there))
             nodes = None if here is None or there is None else graph.cheapest_path(here, there)
             if nodes is None:
@@ -226,10 +226,10 @@ class TerrainPlanner:
         return np.vstack(pieces)
 
     def _spline(self, corners: Floats, points: Floats, relief: Relief) -> Steps[SplinePath]:
-        """Spline through the corners, with more of them wherever it would leave safe ground.
+        """Spline through the corners; add corners where it would leave safe ground.
 
-        A cubic overshoots its polygon; the polygon is safe, and enough points hold the cubic to it.
-        Bends are widened last, as far as that stays safe.
+        A cubic overshoots its polygon. The polygon is safe, and enough points hold the cubic to it.
+        Bends are widened last, as far as that is safe.
         """
         for _ in range(_ROUNDS):
             yield 500
@@ -249,14 +249,14 @@ class TerrainPlanner:
             corners = _denser(corners, path, bad)
         points = path.position(bad)
         worst = points[int(np.argmax(relief.risk(*points.T)))]
-        x, y = (round(float(at), 2) + 0.0 for at in worst)  # no -0.00
+        x, y = (round(float(at), 2) + 0.0 for at in worst)  # avoids -0.00
         raise InputError(
             f"path: no smooth way over safe ground: ({x:.2f}, {y:.2f}) "
             f"{_unsafe_because(relief, worst)}; move a waypoint"
         )
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
-        """Arc lengths where a path is on unsafe ground, after it has left an unsafe start."""
+        """Arc lengths where a path is unsafe, after it has left an unsafe start."""
         s = np.linspace(0.0, path.length_m, max(2, int(path.length_m / _CHECK_STEP_M) + 1))
         safe = relief.safe(*path.position(s).T)
         if not relief.safe(*start):
@@ -275,7 +275,7 @@ class TerrainPlanner:
         )
 
     def _fault(self, k: int, point: Floats) -> list[str]:
-        """Return what is wrong with the k-th point; 0 is the start."""
+        """Return the fault of the k-th point; 0 is the start."""
         relief, graph = self.relief, self.graph
         if relief is None or graph is None or relief.safe(*point):
             return []
@@ -287,7 +287,7 @@ class TerrainPlanner:
         return [f"{self._name(k, point)} {why}; the nearest safe point is ({x:.2f}, {y:.2f})"]
 
     def _name(self, k: int, point: Floats) -> str:
-        """Name of the k-th point: 0 is the start, or where a path begins to later waypoints."""
+        """Name of the k-th point; 0 is the start, or the position of the head."""
         where = f"({point[0]:.2f}, {point[1]:.2f})"
         if k == 0:
             return f"start {where}" if self._number == 1 else where
@@ -295,7 +295,7 @@ class TerrainPlanner:
 
 
 def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
-    """Halve the pieces of the polygon on which the spline is bad, and their neighbours."""
+    """Halve the sides of the polygon at unsafe places of the spline, and their neighbours."""
     at, ends = 0.0, [0.0]
     for before, point in pairwise(points):
         at = path.nearest(point, at, window_m=2.0 * float(np.hypot(*(point - before))) + 0.1)
@@ -311,7 +311,6 @@ def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
 
 
 def _unsafe_because(relief: Relief, point: Floats) -> str:
-    """The fault of a place (2,), in words."""
     if not relief.ground.contains(*point):
         w, h = relief.ground.size_m
         return f"is outside the world, {w:.1f} m by {h:.1f} m around (0, 0)"
@@ -329,14 +328,14 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
     )
 
 
-_REACH = 14  # nodes a straight piece may skip; also the whole leg at once is tried
+_REACH = 14  # largest number of nodes that a straight piece may skip, besides the whole leg
 _SAMPLES_IN_STEP = 6000
 _EXACT_STEP = 50_000  # a search of all safe ground is one step; it is rare
 _CORNER_M = 1.0  # cost of a corner, as metres of path: few corners make wide bends
 
 
 def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:
-    """Return corners straightened again and again, until none can be left out."""
+    """Straighten corners until none can be dropped."""
     while len(shorter := at_once(straighten_in_steps(corners_m, graph))) < len(corners_m):
         corners_m = shorter
     return corners_m
@@ -345,7 +344,7 @@ def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:
 def straighten_in_steps(nodes_m: Floats, graph: SafeGraph) -> Steps[Floats]:
     """(k, 2) corners of the cheapest safe polygon from the first to the last of (m, 2) points.
 
-    Consecutive points are taken to be joined; any other piece must be safe all along.
+    Consecutive points count as joined; any other piece must be safe along its length.
     """
     last = len(nodes_m) - 1
     pairs = [(i, j) for j in range(1, last + 1) for i in range(max(0, j - _REACH), j)]

@@ -1,8 +1,7 @@
-"""Relief of the ground: elevation variance and slope over a window, and their risk.
+"""Relief: elevation variance and slope of the ground over a window, and their risk.
 
-[PT] 2.6.1 and [KP] 4.3 call a point safe when the elevation around it varies little. A snake also
-needs a bound on slope, or it rolls over; both are windowed, since a body bridges what
-is smaller than itself.
+[PT] 2.6.1 and [KP] 4.3 call a point safe if the elevation around it varies little. A bound on slope
+is also needed, or a snake rolls over. Both are windowed, because a body bridges smaller features.
 """
 
 import numpy as np
@@ -22,7 +21,7 @@ _UNKNOWN_RISK = 1e9
 
 
 class Relief:
-    """Windowed elevation variance and slope of a height field, anywhere on it.
+    """Windowed elevation variance and slope of a height field.
 
     Both are exact on the field's samples, up to its border, and bilinear between them.
     """
@@ -30,18 +29,18 @@ class Relief:
     def __init__(
         self, ground: HeightField, config: PlannerConfig, *, unknown_risk: float = _UNKNOWN_RISK
     ) -> None:
-        """Give samples next to one that was not measured the risk ``unknown_risk``; 0 is free."""
+        """Give samples next to an unknown one the risk ``unknown_risk``; 0 makes them passable."""
         self.ground = ground
         self.config = config
         self._variance = elevation_variance_m2(ground, config.variance_window_m)
         self._slope = fitted_slope_rad(ground, config.slope_window_m)
-        # The larger of two, interpolated, is never below either, interpolated: this keeps both.
+        # The maximum, interpolated, is never below either one interpolated: it keeps both limits.
         self._risk = np.maximum(
             self._variance / config.variance_limit_m2, self._slope / config.slope_limit_rad
         )
         self._unknown = np.zeros(ground.z_m.shape)
         if ground.known is not None:
-            # A slope is known if its whole window is: filled places prove nothing.
+            # A slope is known if its whole window is: filled samples prove nothing.
             _, _, disc = _disc(ground, config.slope_window_m)
             self._unknown[binary_dilation(~ground.known, disc > 0.0)] = 1.0
         self._risk = np.where(self._unknown > 0.0, unknown_risk, self._risk)
@@ -54,9 +53,9 @@ class Relief:
     def risk_at_samples(
         self, *, slope_factor: float, variance_factor: float, filled: bool = False
     ) -> Floats:
-        """(rows, columns) risk if both limits were multiplied by factors; without the margin.
+        """(rows, columns) risk with both limits multiplied by factors; without the margin.
 
-        With ``filled`` the filled-in values count as if they had been measured.
+        With ``filled``, filled samples count as measured.
         """
         config = self.config
         risk = np.maximum(
@@ -66,15 +65,15 @@ class Relief:
         return risk if filled else np.where(self._unknown > 0.0, self._risk, risk)
 
     def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
-        """Elevation variance in a disc of ``variance_window_m`` around each point."""
+        """Elevation variance within ``variance_window_m`` of each point."""
         return self._at(self._variance, x_m, y_m)
 
     def slope_rad(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
-        """Inclination of the plane fitted in a disc of ``slope_window_m`` around each point."""
+        """Inclination of the plane fitted within ``slope_window_m`` of each point."""
         return self._at(self._slope, x_m, y_m)
 
     def risk(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
-        """Variance or slope over its limit, whichever is more; infinite beyond the edge margin."""
+        """Larger of variance and slope over their limits; infinite beyond the edge margin."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         return np.where(self.within(x, y), self._at(self._risk, x, y), np.inf)
 
@@ -83,11 +82,11 @@ class Relief:
         return np.asarray(self.risk(x_m, y_m) <= 1.0)
 
     def known(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
-        """Whether the whole slope window around points was measured."""
+        """Whether the slope window around points is fully measured."""
         return np.asarray(self._at(self._unknown, x_m, y_m) <= 1.0 / _UNKNOWN_RISK)
 
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
-        """Whether points lie on the field and ``edge_margin_m`` away from its border."""
+        """Whether points lie on the field, ``edge_margin_m`` or more from its border."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         ground, margin = self.ground, self.config.edge_margin_m - EDGE_TOLERANCE_M
         w, h = ground.size_m
@@ -135,15 +134,15 @@ def _interpolate(
 def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:
     """(rows, columns) variance of the elevation in a disc around each sample ([PT] 2.6.1).
 
-    The disc is cut at the border. It reaches at least the next sample.
+    The disc is cut at the border, and contains at least the neighbouring samples.
     """
-    z = ground.z_m - ground.z_m.mean()  # small numbers first: the variance is a difference
+    z = ground.z_m - ground.z_m.mean()  # centred first, because the variance is a small difference
     mean = windowed_mean(ground, z, radius_m)
     return np.maximum(windowed_mean(ground, z * z, radius_m) - mean**2, 0.0)
 
 
 def windowed_mean(ground: HeightField, values: Floats, radius_m: float) -> Floats:
-    """(rows, columns) mean of values at the samples in a disc around each, cut at the border."""
+    """(rows, columns) mean of values in a disc around each sample, cut at the border."""
     _, _, disc = _disc(ground, radius_m)
     return np.asarray(_summed(values, disc) / _summed(np.ones_like(values), disc))
 
@@ -172,10 +171,10 @@ def fitted_gradient(ground: HeightField, radius_m: float) -> tuple[Floats, Float
 
 def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]:
     """Offsets in x and y of a window's samples, and 1 within the radius."""
-    # A plane needs the diagonal neighbours. Where samples lie exactly on the radius, the quotient
-    # is just below a whole number as often as not: those samples belong to the disc.
+    # A plane needs the diagonal neighbours. Samples exactly on the radius belong to the disc; the
+    # margin covers the rounding of the quotient.
     cells = max(radius_m / ground.spacing_m, 1.5) + 1e-9
-    # no sample is further away than the field is wide
+    # the window need not exceed the field
     up, across = (min(int(cells), count - 1) for count in ground.z_m.shape)
     row, column = np.mgrid[-up : up + 1, -across : across + 1]
     inside = (np.hypot(column, row) <= cells).astype(float)
@@ -183,9 +182,9 @@ def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]
 
 
 def _summed(values: Floats, weight: Floats) -> Floats:
-    """Sum of ``values`` around each sample, weighted by offset; nothing beyond the border.
+    """Sum of ``values`` around each sample, weighted by offset; 0 beyond the border.
 
-    As ``scipy.signal.fftconvolve`` does it, whose import needs more time than all of its sums.
+    Like ``scipy.signal.fftconvolve``, whose import costs more time than all the sums.
     """
     sizes = zip(values.shape, weight.shape, strict=True)
     shape = [next_fast_len(n + m - 1, True) for n, m in sizes]

@@ -1,7 +1,7 @@
 """Rounded polygons: paths that never leave the triangles of their corners.
 
-A cubic through points overshoots: it leaves a line on which it runs exactly. Here each corner is
-replaced by a parabola between points of its two sides, which stays inside of their triangle.
+A cubic through points overshoots. Here a parabola between points of two sides replaces each corner,
+and stays inside their triangle.
 """
 
 import itertools
@@ -20,10 +20,10 @@ _HALVINGS: Final = 10
 
 
 def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> SplinePath:
-    """Path along a polygon (n, 2) whose free corners are rounded as widely as ``safe`` allows.
+    """Path along a polygon whose free corners are rounded as widely as ``safe`` allows.
 
     Args:
-        corners_m: (n, 2) distinct points that follow each other.
+        corners_m: (n, 2) consecutive distinct points.
         free: (n,) corners that the path need not pass; the others stay sharp.
         safe: whether each of points (k, 2) is on safe ground.
 
@@ -48,14 +48,14 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
 
 
 def _bend(corner: Floats, back: Floats, onward: Floats) -> Floats:
-    """(n, 2) points of the parabola between two points, given from their corner."""
+    """(n, 2) points of the parabola; ``back`` and ``onward`` are relative to the corner."""
     count = max(3, round(float(np.hypot(*back) + np.hypot(*onward)) / _STEP_M) + 1)
     t = np.linspace(0.0, 1.0, count)[:, None]
     return np.asarray(corner + (1.0 - t) ** 2 * back + t**2 * onward)
 
 
 def _evenly(points: Floats) -> Floats:
-    """Return points (n, 2) and as many between them that none are over a centimetre apart."""
+    """Insert points into (n, 2) so that none are over a centimetre apart."""
     out = [points[:1]]
     for before, point in itertools.pairwise(points):
         gap = float(np.hypot(*(point - before)))

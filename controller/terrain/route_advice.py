@@ -1,4 +1,4 @@
-"""Advice for points that no safe way joins: the setting of the planner that would join them."""
+"""Advice for points that no safe path joins: the planner setting that would join them."""
 
 from typing import Final
 
@@ -15,7 +15,7 @@ _MOST_SLOPE_RAD: Final = 1.49
 
 
 def route_advice(relief: Relief, points_m: Floats) -> str:
-    """Return the change that joins points (2, 2), or says that no change of a limit does.
+    """Return the change that joins points (2, 2), or that no change of a limit does.
 
     Each proposed value was tried on the samples of the ground.
     """
@@ -48,7 +48,7 @@ def route_advice(relief: Relief, points_m: Floats) -> str:
 def _least(
     relief: Relief, points_m: Floats, slope_most: float, variance_most: float
 ) -> float | None:
-    """Least factor, up to each limit's own largest one, that joins the points; None: none does."""
+    """Smallest factor, up to each limit's largest one, that joins the points, or None."""
 
     def joins(factor: float) -> bool:
         risk = relief.risk_at_samples(
@@ -68,7 +68,7 @@ def _least(
 def _is_joined(relief: Relief, risk: Floats, margin_m: float, points_m: Floats) -> bool:
     """Whether samples of ``risk`` (rows, columns) up to 1 join points (2, 2).
 
-    Samples nearer to the border than ``margin_m`` do not count.
+    Samples within ``margin_m`` of the border do not count.
     """
     ground = relief.ground
     rows, columns = risk.shape
@@ -88,6 +88,6 @@ def _is_joined(relief: Relief, risk: Floats, margin_m: float, points_m: Floats) 
 
 
 def _up(value: float) -> str:
-    """Return a number rounded up to two digits."""
+    """Round up to two digits."""
     unit = 10.0 ** (np.floor(np.log10(value)) - 1.0)
     return f"{np.ceil(value / unit - 1e-6) * unit:.2g}"

@@ -14,10 +14,10 @@ from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.relief import EDGE_TOLERANCE_M, Relief
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-# A tenth is kept back for the nodes and edges: the spline may leave the polygon by a little.
+# A reserve for nodes and edges: the spline may leave the polygon slightly.
 RISK_LIMIT = 0.9
 
-# Half of the sixteen neighbours; the other half are the same edges in the other direction.
+# Half of the sixteen neighbours; the others are the same edges reversed.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
 SAMPLE_M = 0.05
 """Between the points at which an edge is weighed, at most."""
@@ -29,17 +29,17 @@ _EDGES_IN_STEP = 5000
 class SafeGraph:
     """Safe nodes on a grid, joined to up to sixteen neighbours; built once, searched often.
 
-    The printed weight of an edge, the variance of the elevation along it, is zero along every
-    contour, also across the steepest slope, and grows with the square of an edge's length. Here a
-    metre of an edge weighs the *windowed* variance per node spacing, and ``length_weight`` times
+    The printed weight of an edge (variance of the elevation along it) is zero along every contour
+    and grows with the square of the length. Here a metre of an edge weighs the *windowed* variance
+    per node spacing, and ``length_weight`` times
 
         1 + climb_weight (up / limit)^4 + side_weight (side / limit)^4
           + clearance_weight (1 - distance to ground that cannot be climbed / clearance)^2,
 
-    where up along the edge and side across it are the footprint's slopes, as tangents, and so is
-    the climb limit. Flat ground does not tie, and cutting an edge in two changes nothing. Slopes
-    far below the limit cost little more than their variance, those over it much, in every
-    direction: a limit of the climb alone would be kept by hairpins shorter than the body.
+    where up (along the edge) and side (across it) are the footprint's slopes; they and the climb
+    limit are tangents. Cutting an edge in two changes nothing. The power penalises slopes over the
+    limit in every direction: hairpins shorter than the body would satisfy a limit of the climb
+    alone.
     """
 
     def __init__(self, relief: Relief) -> None:
@@ -67,7 +67,7 @@ class SafeGraph:
         self._trees: dict[int, tuple[Floats, Indices]] = {}
 
     def avoiding_in_steps(self, places_m: Floats) -> Steps[Self]:
-        """Return this graph with a cost on what lies within a footprint of places (k, 2)."""
+        """Return this graph with an extra cost within a footprint of places (k, 2)."""
         if len(places_m) == 0:
             return self
         found, edges = copy(self), self._edges
@@ -86,7 +86,7 @@ class SafeGraph:
         return found
 
     def _avoided(self, points_m: Floats) -> Floats:
-        """Metres (...) that a metre of path at points (..., 2) costs more for avoided places."""
+        """Extra metres (...) per metre of path at points (..., 2) near avoided places."""
         total = np.zeros(points_m.shape[:-1])
         for place in self._avoid_m:
             far = np.hypot(*np.moveaxis(points_m - place, -1, 0))
@@ -94,7 +94,7 @@ class SafeGraph:
         return total
 
     def nearest(self, point_m: Floats, among: Bools | None = None) -> int | None:
-        """Return the safe node nearest to a point; None if all nodes are unsafe."""
+        """Return the safe node nearest to a point, or None."""
         gap = np.hypot(*(self.nodes_m - point_m).T)
         if among is not None:
             gap = np.where(among, gap, np.inf)
@@ -107,7 +107,7 @@ class SafeGraph:
         return np.isfinite(self.costs_to(target))
 
     def tree_in_steps(self, target: int) -> Steps[None]:
-        """Prepare what ``can_reach`` and ``cheapest_path`` need of a target."""
+        """Prepare ``can_reach`` and ``cheapest_path`` for a target."""
         if target in self._trees:
             return
         edges = self._edges
@@ -123,7 +123,7 @@ class SafeGraph:
     def costs_from(self, point_m: Floats, reach_m: float) -> Floats:
         """(n,) cost of the cheapest path to each node from a point, safe or not.
 
-        It begins straight to a node within ``reach_m``, or to the nearest one.
+        The path begins straight to a node within ``reach_m``, or to the nearest one.
         """
         gap = np.hypot(*(self.nodes_m - point_m).T)
         first = np.flatnonzero(gap <= max(reach_m, float(gap.min(initial=np.inf))))
@@ -138,7 +138,7 @@ class SafeGraph:
         return np.asarray(dijkstra(both, directed=True, indices=[n]))[0, :n]
 
     def cheapest_path(self, start: int, target: int) -> Floats | None:
-        """(m, 2) nodes of the cheapest path, both ends included; None without a path."""
+        """(m, 2) nodes of the cheapest path, both ends included, or None."""
         score, towards = self._tree(target)
         if not np.isfinite(score[start]):
             return None
@@ -150,7 +150,7 @@ class SafeGraph:
     def edge_cost(
         self, from_m: Floats, to_m: Floats, least_longest_m: float = 0.0
     ) -> tuple[Floats, Floats, Bools]:
-        """Weights of straight pieces (k, 2) to (k, 2), of them back, and whether they are safe.
+        """Costs of straight pieces (k, 2) to (k, 2), of the reverse, and whether they are safe.
 
         All pieces have as many samples as the longest one, or one of ``least_longest_m``.
         """
@@ -158,7 +158,7 @@ class SafeGraph:
         longest_m = float(length.max(initial=least_longest_m))
         count = max(2, int(np.ceil(longest_m / SAMPLE_M)) + 1)
         part, at = np.linspace(0.0, 1.0, count), np.empty((len(from_m), count, 2))
-        for axis in range(2):  # numpy is slow where the innermost axis has two values
+        for axis in range(2):  # numpy is slow with an innermost axis of two values
             step = np.multiply.outer(to_m[:, axis] - from_m[:, axis], part)
             np.add(from_m[:, axis, None], step, out=at[..., axis])
         direction = (to_m - from_m) / np.maximum(length, 1e-12)[:, None]
@@ -167,13 +167,13 @@ class SafeGraph:
         return length * there.mean(axis=-1), length * back.mean(axis=-1), np.asarray(safe)
 
     def cost_per_m(self, points_m: Floats) -> Floats:
-        """Weight (..., k) of a metre of path at points (..., k, 2) along curves, safe or not."""
+        """Cost (..., k) of a metre of path at points (..., k, 2) along curves, safe or not."""
         step = np.gradient(points_m, axis=-2)
         length = np.hypot(step[..., 0], step[..., 1])
         return self._cost_per_m(points_m, step / np.maximum(length, 1e-12)[..., None])[0]
 
     def _cost_per_m(self, points_m: Floats, direction: Floats) -> tuple[Floats, Floats, Floats]:
-        """Weight (...) of a metre along unit vectors (..., 2), of one against, and the risk."""
+        """Cost (...) of a metre along unit vectors (..., 2), of one against, and the risk."""
         ground, config = self._relief.ground, self._relief.config
         w, h = ground.size_m
         margin = config.edge_margin_m - EDGE_TOLERANCE_M
@@ -203,7 +203,7 @@ class SafeGraph:
     def _tree(self, target: int) -> tuple[Floats, Indices]:
         """Score to ``target`` and the next node towards it, from every node.
 
-        Cached: a path that is planned again has the same waypoints and another start.
+        Cached: replanning keeps the waypoints and changes the start.
         """
         if target not in self._trees:
             score, towards = dijkstra(
@@ -213,7 +213,7 @@ class SafeGraph:
         return self._trees[target]
 
     def _joined(self, index: Indices) -> csr_array:
-        """Weights of edges; row and column are target and source, as trees grow from the target."""
+        """Sparse costs: rows are targets, columns sources, as trees grow from the target."""
         height, width = index.shape
         pairs = []
         for up, right in _STEPS:
@@ -250,21 +250,20 @@ def _weigh(
     back: Floats,
     risk: Floats,
 ) -> None:
-    """Write the weight of a metre at each point (n, 2), of one back, and the risk there.
+    """Write the cost of a metre at each point, of one in reverse, and the risk.
 
-    One look-up of all fields a point and no arrays between: the edges of a world have some hundred
-    thousand points.
+    One pass without temporary arrays: a world has some hundred thousand edge points.
 
     Args:
         layers: (rows, columns, 8) risk, variance, and those of the footprint.
         grid: corner and spacing.
-        within: least and largest x, then y, from the corner; the risk is infinite beyond.
+        within: smallest x and y, then largest, from the corner; the risk is infinite beyond.
         weights: of variance, length, nearness, slope across and along, and the climb limit.
         points: (n, 2)
         direction: (n, 2) unit vectors.
-        there: (n,) written.
-        back: (n,) written.
-        risk: (n,) written.
+        there: (n,) out.
+        back: (n,) out.
+        risk: (n,) out.
 
     """
     rows, columns, count = layers.shape

@@ -18,7 +18,7 @@ WAYPOINT_SLOPE_RAD = float(np.radians(8.0))
 
 @dataclass(frozen=True)
 class PathRelief:
-    """A path's ground and bends, over samples every two centimetres."""
+    """A path's ground and bends, sampled every two centimetres."""
 
     length_m: float
     """Arc length in the horizontal plane."""
@@ -95,7 +95,7 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
 def path_warnings(
     planner: TerrainPlanner, relief: PathRelief, waypoints_m: Sequence[tuple[float, float]]
 ) -> tuple[str, ...]:
-    """Say which waypoints are hard to stay at, and what slopes under the body exceed the limit."""
+    """Warn of steep waypoints, and of slopes under the body that exceed the limit."""
     if planner.relief is None or planner.graph is None:
         return ()
     slopes = planner.graph.footprint.slope_rad(np.asarray(waypoints_m, float).reshape(-1, 2))
@@ -117,7 +117,7 @@ def path_warnings(
 
 
 def _disc_m(width_m: float) -> Floats:
-    """Offsets (k, 2) that fill a disc evenly: a sunflower's, at the golden angle."""
+    """Offsets (k, 2) that fill a disc evenly, at the golden angle."""
     k = np.arange(_DISC_POINTS) + 0.5
     turn = k * np.pi * (3.0 - np.sqrt(5.0))
     radius = width_m / 2.0 * np.sqrt(k / _DISC_POINTS)

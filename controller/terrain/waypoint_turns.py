@@ -1,7 +1,7 @@
-"""Turns by waypoints: where a path bends there more sharply than a body can, it swings out.
+"""Turns by waypoints: replace bends that are too sharp for a body by wider turns.
 
-A path through waypoints may turn back at one of them, or come to it past unsafe ground. Its spline
-then has a bend of a few centimetres, and the body that cannot follow it passes the waypoint by.
+A path may turn back at a waypoint, or reach it past unsafe ground. Its spline then has a bend of a
+few centimetres, and the body misses the waypoint.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ _JOINS = 16, 64
 
 
 class WaypointTurns:
-    """Puts Dubins curves in place of sharp bends by the waypoints of a path."""
+    """Replaces sharp bends near the waypoints of a path by Dubins curves."""
 
     def __init__(
         self,
@@ -39,23 +39,23 @@ class WaypointTurns:
         safe: Callable[[Floats], bool],
         radius_m: float,
     ) -> None:
-        """Remember what ground costs.
+        """Store the costs of ground.
 
         Args:
-            cost_per_m: of points (..., k, 2) along curves, (..., k).
-            least_per_m: least cost of a metre.
+            cost_per_m: cost (..., k) at points (..., k, 2) along curves.
+            least_per_m: lower bound of the cost per metre.
             safe: whether all points (n, 2) are on safe ground.
-            radius_m: wanted of every turn.
+            radius_m: preferred radius of turns.
 
         """
         self._cost_per_m, self._least = cost_per_m, least_per_m
         self._safe, self._radius_m = safe, radius_m
 
     def __call__(self, path: SplinePath, waypoints_m: ArrayLike, *, any_start: bool) -> SplinePath:
-        """Return the path with a turn where it bends sharply by its start or a waypoint.
+        """Return the path with turns at sharp bends near its start or a waypoint.
 
-        The body comes to the waypoint, and leaves it, in the direction with which both legs
-        together cost least. Where every turn leads over unsafe ground the bend stays.
+        The body passes a waypoint in the direction with the lowest cost of both legs. A bend
+        without a safe turn stays.
 
         Args:
             path: through the waypoints.
@@ -68,7 +68,7 @@ class WaypointTurns:
     def in_steps(
         self, path: SplinePath, waypoints_m: ArrayLike, *, any_start: bool
     ) -> Steps[SplinePath]:
-        """Do a call in steps."""
+        """Run a call in steps."""
         yield 500
         legs, turned = _legs(path, np.asarray(waypoints_m, float)), False
         for k in range(0 if any_start else 1, len(legs) + 1):
@@ -87,10 +87,7 @@ class WaypointTurns:
         return SplinePath.tabulated(np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]))
 
     def arrive_in_steps(self, leg: SplinePath, onward_m: Floats) -> Steps[SplinePath | None]:
-        """Return the path of a leg to a waypoint and points (n, 2) from there on, joined by a turn.
-
-        None where every turn leads over unsafe ground.
-        """
+        """Join a leg to a waypoint and the points (n, 2) after it by a safe turn, or None."""
         back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
         to_m, backs = leg.piece_m(0.0, leg.length_m), np.array([back])
         found = yield from self._turned(to_m, None, backs, backs - np.pi)
@@ -99,10 +96,10 @@ class WaypointTurns:
     def _turned(
         self, to_m: Floats | None, from_m: Floats | None, backs_rad: Floats, headings_rad: Floats
     ) -> Steps[list[Floats] | None]:
-        """Legs (n, 2) to and from a waypoint with a turn there; None where none is safe.
+        """Legs (n, 2) to and from a waypoint with a turn there; None without a safe turn.
 
-        The path leaves the waypoint in one of the directions ``headings_rad`` (h,), and comes from
-        the opposite of it, ``backs_rad`` (h,).
+        The path leaves the waypoint in one of the directions ``headings_rad`` (h,), opposite to
+        ``backs_rad`` (h,).
         """
         for share in _RADII:
             yield 200
@@ -120,7 +117,7 @@ class WaypointTurns:
         return None
 
     def _turns(self, leg: Floats, headings: Floats, share: float, *, back: bool) -> PathTurns:
-        """Turns from the waypoint onto a leg (n, 2); ``back``: the leg is reversed."""
+        """Turns from the waypoint onto a leg (n, 2); with ``back`` the leg is reversed."""
         path = SplinePath.tabulated(np.ascontiguousarray(leg))
         joins = int(np.clip(path.length_m / _JOIN_M, *_JOINS))
         cost = self._cost_backwards if back else self._cost_per_m
@@ -131,7 +128,7 @@ class WaypointTurns:
         return self._cost_per_m(points_m[..., ::-1, :])[..., ::-1]
 
     def _cheapest(self, sides: list[PathTurns]) -> Steps[list[Turn]]:
-        """Return the safe turns, one on each side, in the direction that costs least; or none."""
+        """Safe turns, one per side, in the direction with the lowest cost; empty without."""
         for side in sides:
             yield from side.lay_in_steps()
         least = np.sum([side.least for side in sides], axis=0)
@@ -152,13 +149,13 @@ class WaypointTurns:
 
 
 def _legs(path: SplinePath, waypoints_m: Floats) -> list[Floats]:
-    """Points (n, 2) of a path from waypoint to waypoint."""
+    """Points (n, 2) of the path's legs between waypoints."""
     marks = [0.0, *path.passes(waypoints_m[:-1]), path.length_m]
     return [path.piece_m(begin, end) for begin, end in pairwise(marks)]
 
 
 def _bend_m(legs: Sequence[Floats], k: int) -> float:
-    """Least radius of curvature of a path near the end of its k-th leg."""
+    """Smallest radius of curvature near the end of the k-th leg."""
     near = round(_NEAR_M / _STEP_M)
     before = [leg[-near:] for leg in legs[max(k - 1, 0) : k]]
     after = [leg[1:near] for leg in legs[k : k + 1]]
