@@ -1,13 +1,12 @@
-"""Backbone-curve fitting: a curve in space in, joint angles out, links kept at their length.
+"""Backbone-curve fitting: joint angles for a curve in space, links at their length.
 
-Two steps. The first is that of Yamada and Hirose (Study of active cord mechanism: approximations to
-continuous curves of a multi-joint body, J. RSJ 26, 2008): in a frame that goes along the curve
-without turning about it (R. L. Bishop, There is more than one way to frame a curve, 1975) the curve
-bends to the left by ``k_left(s)`` and upwards by ``k_up(s)``. A joint gets the bend of its own
-direction over the stretch that it replaces. The second moves the chain onto the curve, which the
-first leaves by an error that grows along the body: Gauss-Newton on the distances of all joints from
-the curve, in the spirit of R. L. Hatton, H. Choset, Generating gaits for snake robots: annealed
-chain fitting and keyframe wave extraction, Autonomous Robots 28, 2010.
+Step one follows Yamada and Hirose (Study of active cord mechanism: approximations to continuous
+curves of a multi-joint body, J. RSJ 26, 2008). In a frame that moves along the curve without
+turning about it (R. L. Bishop, There is more than one way to frame a curve, 1975) the curve bends
+to the left by ``k_left(s)`` and upwards by ``k_up(s)``. A joint gets the bend of its own direction
+over its stretch. The error grows along the body. Step two reduces it by Gauss-Newton on the
+distances of all joints from the curve, similar to R. L. Hatton, H. Choset, Generating gaits for
+snake robots: annealed chain fitting and keyframe wave extraction, Autonomous Robots 28, 2010.
 """
 
 from dataclasses import dataclass
@@ -111,13 +110,13 @@ def fit_backbone(
     """Fit the chain to a curve given by points (N, 3) from the head backwards.
 
     Args:
-        robot: its joints decide what can be met: yaw joints alone a plane curve only.
+        robot: yaw joints alone fit only a plane curve.
         curve_m: at least as long as the robot; points need not be spaced evenly.
-        roll_rad: turn of the body about the curve: 0 has its up axis as close to z as it gets.
-        refine: False stops after the first step.
+        roll_rad: turn of the body about the curve; 0 keeps the head's up axis closest to z.
+        refine: False stops after step one.
 
     Raises:
-        InputError: fewer than four points, a curve shorter than the robot, points on each other.
+        InputError: fewer than four points, a curve shorter than the robot, or repeated points.
 
     """
     curve = SpaceCurve(robot, curve_m)
@@ -131,7 +130,7 @@ def fit_backbone(
         near_m, along = curve.nearest(points)
         away = points - near_m
         across = np.eye(3) - along[:, :, None] * along[:, None, :]
-        across[0] = np.eye(3)  # the head's tip stays at the curve's beginning
+        across[0] = np.eye(3)  # the head's tip stays at the curve's start
         miss = np.einsum("nij,nj->ni", across, away).ravel()
         slopes = chain_jacobian(points, chain_axes(robot, body))
         slopes = np.einsum("nij,njk->nik", across, slopes)
@@ -139,7 +138,7 @@ def fit_backbone(
         free = np.ones(slopes.shape[1], dtype=bool)
         rows = np.vstack([slopes, STIFF_M_RAD * np.eye(len(free))[6:]])
         change = np.zeros(len(free))
-        for _ in range(3):  # joints that would pass their limit stop there, the others go on
+        for _ in range(3):  # joints at their limit stop there, the others continue
             right = np.concatenate([-miss, -STIFF_M_RAD * joints]) - rows[:, ~free] @ change[~free]
             change[free] = np.linalg.lstsq(rows[:, free], right, rcond=None)[0]
             bends = joints + change[6:]
@@ -166,7 +165,7 @@ def _body(robot: "RobotConfig", joint_rad: Floats, tip_m: Floats, rotation: Floa
 
 
 def _seed(robot: "RobotConfig", curve: SpaceCurve, roll_rad: float) -> tuple[Floats, Floats]:
-    """Rotation of the head and bends of the joints, from the curve's bends in its own frame."""
+    """Rotation of the head and bends of the joints, from the curve's bends in its Bishop frame."""
     forward = -curve.tangents
     up = np.array([0.0, 0.0, 1.0])
     if abs(forward[0] @ up) > 0.99:
@@ -174,7 +173,7 @@ def _seed(robot: "RobotConfig", curve: SpaceCurve, roll_rad: float) -> tuple[Flo
     up = up - (up @ forward[0]) * forward[0]
     up /= np.linalg.norm(up)
     up = np.cos(roll_rad) * up - np.sin(roll_rad) * np.cross(up, forward[0])
-    bend = np.zeros((len(forward), 2))  # summed up to here: to the left, upwards
+    bend = np.zeros((len(forward), 2))  # cumulative bend: to the left, upwards
     for k in range(1, len(forward)):
         left = np.cross(up, forward[k - 1])
         change = forward[k - 1] - forward[k]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class CompoundSerpenoidParameters(GaitParameters):
-    """The family of which the other wave gaits are members; amplitudes are of joints."""
+    """The family that includes the other wave gaits; amplitudes are of joints."""
 
     lateral_rad: float = Field(0.5, ge=0.0, le=1.5, description="amplitude of the yaw joints")
     dorsal_rad: float = Field(0.2, ge=0.0, le=1.2, description="amplitude of the pitch joints")

@@ -26,7 +26,7 @@ class ConcertinaParameters(GaitParameters):
 
 
 class Concertina(Gait):
-    """Less than half of the body moves at a time; the rest holds it by friction of any kind."""
+    """The resting parts of the body hold it by friction, also isotropic."""
 
     name = "concertina"
     title = "a folded part runs from tail to head; each part is drawn up while the rest holds"

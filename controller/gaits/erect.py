@@ -1,10 +1,9 @@
 """Walk and trot on legs that hang down: a time chart of contacts, and joint angles of the feet.
 
-The goat of [KP] 4.2.2 is moved by a time chart of the feet on the ground, by the angles of the
-joints of the legs, and by a body that follows from the legs. Here the chart is a share of the cycle
-and an offset for each foot, and the paths of the feet are given. On the ground they move level and
-back at an even rate, all at the same, so that the body goes forward at that rate. In the air they
-move forward again. Hip and knee are the angles of two segments whose foot is there.
+The goat of [KP] 4.2.2 has a time chart of foot contacts, angles of leg joints, and a body that
+follows the legs. Here the chart is a share of the cycle and an offset for each foot, and the paths
+of the feet are given. On the ground they move backwards at one constant rate, which is the speed of
+the body; in the air they return. Hip and knee follow from the position of the foot.
 """
 
 from typing import TYPE_CHECKING, ClassVar
@@ -26,7 +25,7 @@ AXES = "ryy"
 
 
 class ErectParameters(GaitParameters):
-    """Ways of the feet, in shares of a leg's length from hip to foot."""
+    """Paths of the feet, in shares of a leg's length from hip to foot."""
 
     frequency_hz: Frequency = 0.5
     stride: float = Field(0.2, ge=0.0, le=0.5, description="of a foot to either side of the hip")
@@ -65,9 +64,9 @@ class ErectGait(LegGait):
 def hip_and_knee_rad(
     forward_m: Floats, down_m: Floats, upper_m: float, lower_m: float
 ) -> tuple[Floats, Floats]:
-    """Angles of two segments whose end is ``forward_m`` and ``down_m`` from the hip, knee ahead.
+    """Hip and knee angles for a foot ``forward_m`` and ``down_m`` from the hip, knee ahead.
 
-    Out of reach they point there, straight.
+    Out of reach the leg points there, straight.
     """
     square = forward_m**2 + down_m**2
     cosine = (square - upper_m**2 - lower_m**2) / (2.0 * upper_m * lower_m)
@@ -87,7 +86,7 @@ class ErectWalk(ErectGait):
 
 
 class ErectTrot(ErectGait):
-    """Legs that stand across from each other step together."""
+    """Diagonal legs step together."""
 
     name = "erect-trot"
     title = "on legs that hang down, two across from each other together"

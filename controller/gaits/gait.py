@@ -1,4 +1,4 @@
-"""Base of the gaits: joint angles over a phase, the joints that they need, and their source."""
+"""Base class of gaits: joint angles over a phase, required joints, and source."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -36,10 +36,10 @@ class Needs:
     """Whether it advances only on a belly that slides along easily and across badly."""
 
     def check(self, robot: "RobotConfig", what: str) -> None:
-        """Refuse a robot that lacks the joints.
+        """Reject a robot that lacks the joints.
 
         Raises:
-            InputError: one line.
+            InputError: the joints are missing.
 
         """
         for wanted, have, axis in (
@@ -65,7 +65,7 @@ class Needs:
 
 
 def fitting_robot(needs: Iterable[Needs]) -> str:
-    """Name of the shipped robot that has the joints which all of some motions need."""
+    """Name of a shipped robot that has the joints of all given motions."""
     wanted = list(needs)
     if any(each.legs for each in wanted):
         return "quadruped" if any(each.leg_axes for each in wanted) else "salamander"
@@ -83,9 +83,9 @@ class GaitParameters(Strict):
 
 
 class Gait(ABC):
-    """Pure and periodic: ``joints_rad`` of a phase; time is given to it by a ``GaitMotion``.
+    """A periodic map from a phase to ``joints_rad``; a ``GaitMotion`` supplies the phase.
 
-    A subclass states the class variables and ``_shape_rad``.
+    A subclass defines the class variables and ``_shape_rad``.
     """
 
     name: ClassVar[str]
@@ -134,10 +134,10 @@ class Gait(ABC):
         return joints
 
     def check(self, robot: "RobotConfig") -> None:
-        """Refuse a robot that lacks joints, or whose joints do not bend so far.
+        """Reject a robot that lacks joints, or whose joint limits are too small.
 
         Raises:
-            InputError: one line a fault.
+            InputError: the first fault.
 
         """
         joints = self.joints_rad(robot, np.linspace(0.0, 2.0 * np.pi, CYCLE_SAMPLES))
@@ -163,7 +163,7 @@ class Gait(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """One parameter."""
+    """Kind, default, bounds and description of one parameter."""
 
     kind: type
     """float, int or bool."""
@@ -175,7 +175,7 @@ class Range:
 
     @property
     def step(self) -> float:
-        """Change by one press of a key: a fortieth of the range, 1 for whole numbers."""
+        """Change per key press: a fortieth of the range, 1 for whole numbers."""
         return (self.high - self.low) / 40.0 if self.kind is float else 1.0
 
 

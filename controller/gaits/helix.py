@@ -1,9 +1,9 @@
-"""A helix that rolls: round a pole, and inside a pipe.
+"""A helix that rolls: round a pole, or inside a pipe.
 
 The backbone is a helix of radius ``a`` and rise angle ``g``: curvature ``cos^2 g / a``, torsion
-``sin g cos g / a``. Its bend turns about the body along the body (``torsion``) and, as the phase
-grows, with time: the body rolls about its own line and the helix stays. Where it rolls without
-slipping on what it holds, a body of radius r goes ``2 pi r cos g`` along the axis in a cycle.
+``sin g cos g / a``. Its bend turns about the body along the body (``torsion``) and with the phase:
+the body rolls about its own line and the helix stays. Without slip, a body of radius r moves ``2 pi
+r cos g`` along the axis in a cycle.
 """
 
 import math
@@ -30,17 +30,17 @@ SOURCE = (
 def helix_joints_rad(
     robot: "RobotConfig", phase_rad: Floats, radius_m: float, rise_rad: float, hand: int
 ) -> Floats:
-    """(T, J) of a helix about whose line the body has turned by phases (T,).
+    """(T, J) angles of a helix whose body has turned about its own line by phases (T,).
 
-    A joint gets the bend of the body half a spacing of its axis before and behind it, exactly
-    integrated: ``k_axis(s) = k cos(torsion s + phase)`` over that stretch.
+    A joint gets the exact integral of ``k_axis(s) = k cos(torsion s + phase)`` over half a spacing
+    of its axis before and behind it.
 
     Args:
-        robot: yaw and pitch joints.
+        robot: has yaw and pitch joints.
         phase_rad: turn of the bend's direction about the body, from left to up.
-        radius_m: of the centre line; may be ``inf`` for a straight body.
+        radius_m: of the centre line; ``inf`` for a straight body.
         rise_rad: angle of the line against a plane across the axis.
-        hand: 1 a right-handed helix, -1 a left-handed one.
+        hand: 1 right-handed, -1 left-handed.
 
     """
     curvature = math.cos(rise_rad) ** 2 / radius_m
@@ -66,7 +66,7 @@ Backward = Annotated[bool, Field(description="tail first")]
 
 
 class HelixPoleParameters(GaitParameters):
-    """The pole, and how tightly it is held."""
+    """The pole and the grip."""
 
     frequency_hz: Turns = 0.2
     pole_radius_m: float = Field(0.09, ge=0.02, le=1.0, description="of the pole")
@@ -78,7 +78,7 @@ class HelixPoleParameters(GaitParameters):
 
 
 class HelixPipeParameters(GaitParameters):
-    """The pipe, and how hard the body presses."""
+    """The pipe and the pressure."""
 
     frequency_hz: Turns = 0.2
     pipe_radius_m: float = Field(0.15, ge=0.04, le=1.0, description="inner")
@@ -90,7 +90,7 @@ class HelixPipeParameters(GaitParameters):
 
 
 class _Helix(Gait):
-    """Common to both: the sides of the body that touch are opposite, so it rolls the other way."""
+    """Common part: pole and pipe touch opposite sides of the body, so the roll is reversed."""
 
     source = SOURCE
     needs = Needs(yaw=True, pitch=True)
@@ -109,7 +109,7 @@ class _Helix(Gait):
         return helix_joints_rad(robot, direction * phase_rad, self._radius_m(), p.rise_rad, hand)
 
     def advance_m(self) -> float:
-        """Along the axis in a cycle, without slip: ``2 pi r cos g``."""
+        """Advance along the axis in a cycle, without slip: ``2 pi r cos g``."""
         p = self.params
         return float(2.0 * np.pi * p.body_radius_m * math.cos(p.rise_rad))
 

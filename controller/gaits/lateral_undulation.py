@@ -1,4 +1,4 @@
-"""Lateral undulation: a serpenoid wave in the plane, which wheels or scales turn into thrust."""
+"""Lateral undulation: a serpenoid wave in the plane; wheels or scales turn it into thrust."""
 
 from typing import TYPE_CHECKING
 
@@ -29,7 +29,7 @@ class LateralUndulationParameters(GaitParameters):
 
 
 class LateralUndulation(Gait):
-    """``q_j = A sin(phase - 2 pi k s_j) + turn / n`` on the yaw joints; backward, in -phase."""
+    """``q_j = A sin(phase - 2 pi k s_j) + turn / n`` on the yaw joints; backward uses -phase."""
 
     name = "lateral-undulation"
     title = "a wave in the plane runs to the tail, the body goes forward along itself"

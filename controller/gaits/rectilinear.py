@@ -1,4 +1,4 @@
-"""Rectilinear motion: a wave in height runs along a body that stays straight in plan."""
+"""Rectilinear motion: a wave in height along a body with a fixed shape in plan."""
 
 from typing import TYPE_CHECKING
 
@@ -25,7 +25,7 @@ class RectilinearParameters(GaitParameters):
 
 
 class Rectilinear(Gait):
-    """The crests that touch the ground carry the body; it needs no space at the sides."""
+    """The crests that touch the ground move the body; it needs no space at the sides."""
 
     name = "rectilinear"
     title = "a wave in height runs along a straight body, which goes forward through its own width"

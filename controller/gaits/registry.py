@@ -1,4 +1,4 @@
-"""The gaits by name: every concrete ``Gait`` that a module of this package defines."""
+"""The gaits by name: every concrete ``Gait`` in a module of this package."""
 
 import inspect
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ _WITHOUT_GAITS: Final = ("registry", "backbone", "spine_heading")
 
 
 def gaits_by_name() -> dict[str, type[Gait]]:
-    """Return the gaits of the package; ``docs/how-to/add-a-gait.md`` adds one."""
+    """Return the gaits by name; ``docs/how-to/add-a-gait.md`` describes how to add one."""
     return {gait.name: gait for gait in _gaits()}
 
 
@@ -59,13 +59,13 @@ SPINE_GAITS: tuple[str, ...] = tuple(
 
 
 def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "") -> Gait:
-    """Make a gait by its name with parameters in place of defaults.
+    """Make a gait by name with parameters in place of defaults.
 
     Raises:
-        InputError: no such gait, unknown parameters, values out of range; one line each.
+        InputError: unknown gait or parameters, or values out of range; one line each.
 
     """
-    heading_loop()  # compiled here, never within a run
+    heading_loop()  # compiled here, not during a run
     if name not in GAITS:
         raise InputError(f"{name}: no such gait; there are {', '.join(GAITS)}")
     return GAITS[name].of(values, source)

@@ -1,4 +1,4 @@
-"""Rolling: the body lies in an arc and turns about its own line."""
+"""Rolling: an arc-shaped body turns about its own line."""
 
 from typing import TYPE_CHECKING
 
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 
 class RollingParameters(GaitParameters):
-    """One bend that goes round."""
+    """One bend that rotates."""
 
     bend_rad: float = Field(1.2, ge=0.1, le=5.0, description="of the whole body")
 
 
 class Rolling(Gait):
-    """All yaw joints together, all pitch joints a quarter behind; no wave along the body."""
+    """All yaw joints together, all pitch joints a quarter cycle behind."""
 
     name = "rolling"
     title = "the body lies in an arc and rolls sideways like a log"

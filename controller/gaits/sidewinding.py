@@ -1,4 +1,4 @@
-"""Sidewinding: a wave in the plane and one in height, a quarter apart: the body goes sideways."""
+"""Sidewinding: waves in plane and height, a quarter cycle apart, move the body sideways."""
 
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ class SidewindingParameters(GaitParameters):
 
 
 class Sidewinding(Gait):
-    """Parts of the body lie still on the ground while the parts between are lifted across."""
+    """Parts of the body rest on the ground while the parts between are lifted across."""
 
     name = "sidewinding"
     title = "two waves a quarter apart carry the body sideways over ground of any friction"

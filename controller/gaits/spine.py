@@ -1,9 +1,8 @@
 """Swimming with the spine: four modes of fish, as a wave that travels from head to tail.
 
-[GC] writes a standing wave (Eq. 11), which pushes no more forward than back; the same table of
-modes drives Lighthill's travelling form here, and the printed form stays as the parameter
-``standing``.
-Amplitudes are printed without a unit: taken in that of ``u``, of which a body is 2 pi long.
+[GC] prints a standing wave (Eq. 11), which gives no thrust. Its table of modes drives Lighthill's
+travelling form here; ``standing`` selects the printed form. Amplitudes are printed without a unit
+and read in that of ``u``: a body is 2 pi long.
 """
 
 from collections.abc import Callable
@@ -60,9 +59,8 @@ def spine_bends_rad(
 ) -> Floats:
     """(T, joints) bends of a chain of ``joints + 1`` links along the spine at phases (T,).
 
-    The spine ``y(u)``, u from 0 at the head to 2 pi, is divided into parts of equal arc length (or
-    at the shares ``edges`` of it) before its headings are read. They are headings of rigid links,
-    not of slices in u.
+    The spine ``y(u)``, u from 0 at the head to 2 pi, is divided by arc length (equally, or at the
+    shares ``edges``). The headings are therefore those of rigid links, not of slices in u.
     """
     write_headings = heading_loop()
     shares = np.linspace(0.0, 1.0, joints + 2) if edges is None else edges
@@ -73,12 +71,12 @@ def spine_bends_rad(
 
 
 def offset(u: Floats, phase_rad: Floats, p: SpineParameters) -> Floats:
-    """(T, U) of the spine to its left, in the unit of ``u``; the phase is ``2 pi omega t``."""
+    """(T, U) offset to the left, in the unit of ``u``; the phase is ``2 pi omega t``."""
     return np.stack([np.cos(phase_rad), np.sin(phase_rad)], axis=1) @ _shapes(u, p)
 
 
 def _shapes(u: Floats, p: SpineParameters) -> Floats:
-    """(2, U) the parts of the offset that go with the cosine and the sine of the phase."""
+    """(2, U) factors of the offset for the cosine and the sine of the phase."""
     size = p.nose + (p.tail - p.nose) * u / TURN
     if p.standing:  # size cos(waves u + phi) sin(phase)
         return np.stack([np.zeros_like(u), size * np.cos(p.waves * u + p.phase_rad)])
@@ -86,7 +84,7 @@ def _shapes(u: Floats, p: SpineParameters) -> Floats:
 
 
 class SpineGait(Gait):
-    """A mode; subclasses name its row of the table."""
+    """A mode; subclasses give its row of the table."""
 
     source = SOURCE
     needs = Needs(yaw=True)
@@ -132,7 +130,7 @@ class SubcarangiformParameters(SpineParameters):
 
 
 class Subcarangiform(SpineGait):
-    """The rear two thirds do most."""
+    """The rear two thirds move most."""
 
     name = "subcarangiform"
     title = "swims as a trout does: three quarters of a wave, growing to the tail"
@@ -149,7 +147,7 @@ class CarangiformParameters(SpineParameters):
 
 
 class Carangiform(SpineGait):
-    """As printed with the same small amplitude everywhere."""
+    """The same small amplitude everywhere, as printed."""
 
     name = "carangiform"
     title = "swims as a tropical fish does: one small wave of even amplitude"
@@ -183,7 +181,7 @@ class DolphinParameters(SpineParameters):
 
 
 class Dolphin(SpineGait):
-    """The other thunniform row of the table; whales and dolphins beat up and down."""
+    """The second thunniform row of the table, up and down."""
 
     name = "thunniform-dolphin"
     title = "swims as a dolphin does: three quarters of a wave, up and down"

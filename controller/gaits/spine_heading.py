@@ -1,4 +1,4 @@
-"""Headings of the links of a chain that is laid along a moving spine, in a compiled loop."""
+"""Headings of the links of a chain along a moving spine, in a compiled loop."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from snakewalk.drivers.compiling import compiled
 def write_headings(
     u: Floats, shapes: Floats, cosine: Floats, sine: Floats, shares: Floats, headings: Floats
 ) -> None:
-    """Write the headings (T, n) of travel, towards the head, of chords between ``shares``."""
+    """Write headings (T, n), towards the head, of the chords between ``shares``."""
     run, side = np.zeros(len(u)), np.empty(len(u))
     for t in range(len(cosine)):
         for i in range(len(u)):

@@ -1,10 +1,9 @@
 """Trot and walk of a sprawling body: legs by phase, and a spine that bends at the girdles.
 
-The lizard of [KP] 4.2.2 has a body that may bend where the pairs of legs are, and legs whose angles
-to the body over one cycle say everything. Here the angles are computed: on the ground a foot goes
-back at an even rate, in the air it goes forward again. The girdles turn with the legs, the front
-one against the hind one (a standing wave between them), which makes the strides longer, while head
-and tail keep their heading.
+The lizard of [KP] 4.2.2 is given by the angles of its legs over a cycle, on a body that may bend at
+the pairs of legs. Here the angles are computed: a foot moves back at a constant rate on the ground
+and returns in the air. The girdles turn with the legs in opposite directions (a standing wave),
+which lengthens the strides; head and tail keep their heading.
 """
 
 from abc import ABC
@@ -72,10 +71,10 @@ class LegGait(Gait, ABC):
         return joints
 
     def _bend(self, robot: "RobotConfig", phase_rad: Floats, joints: Floats) -> None:
-        """Turn the girdles: each is turned furthest when its legs are.
+        """Turn each girdle furthest when its legs are.
 
-        The left front leg is foremost at phase 0 of its offset: the front girdle is then turned to
-        the right by half of the bend, the hind one to the left.
+        At phase 0 of its offset the left front leg is foremost: the front girdle is turned right by
+        half of the bend, the hind one left.
         """
         p, hind, front = self.params, robot.limbs[0].link, robot.limbs[-1].link
         turned = 0.5 * p.bend_rad * np.cos(phase_rad - TURN * self.offsets[2])
@@ -92,7 +91,7 @@ def _first_roll(joint_axes: str) -> int:
 
 
 class Trot(LegGait):
-    """Legs that stand across from each other step together."""
+    """Diagonal legs step together."""
 
     name = "trot"
     title = "two legs across from each other step together, the spine bends between the girdles"

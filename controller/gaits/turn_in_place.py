@@ -1,4 +1,4 @@
-"""Turn in place: sidewinding whose two halves go opposite ways."""
+"""Turn in place: sidewinding with opposite directions of the two halves."""
 
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class TurnInPlaceParameters(GaitParameters):
-    """As sidewinding, the lift growing from the middle to both ends with opposite signs."""
+    """Parameters as for sidewinding; the lift changes its sign at the middle of the body."""
 
     winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis, in plan")
     lift_rad: float = Field(0.1, ge=0.0, le=0.8, description="at the ends, in height")

@@ -1,7 +1,7 @@
-"""Waves on a chain: where the joints of an axis are, and how far a wave of headings bends them.
+"""Waves on a chain: positions of joints, and joint angles for a wave of headings.
 
-Amplitudes of gaits are *winding angles*: how far the body turns away from its axis (Hirose's
-alpha). They do not depend on the number of joints; these functions make joint angles of them.
+Amplitudes of gaits are *winding angles* (Hirose's alpha): the turn of the body away from its axis.
+They do not depend on the number of joints.
 """
 
 from functools import lru_cache
@@ -18,7 +18,7 @@ TURN = 2.0 * np.pi
 
 
 def places(robot: "RobotConfig", joints: tuple[int, ...]) -> Floats:
-    """(n,) where joints are on the body: 0 at the head's tip, 1 at the tail's end; read-only."""
+    """(n,) positions of joints: 0 at the head's tip, 1 at the tail's end; read-only."""
     return _places(robot.link_ends, joints)
 
 
@@ -33,10 +33,10 @@ def _places(link_ends: tuple[float, ...], joints: tuple[int, ...]) -> Floats:
 def joint_amplitude_rad(
     robot: "RobotConfig", joints: tuple[int, ...], winding_rad: float, waves: float
 ) -> float:
-    """Amplitude of each joint of an axis for a wave of headings of ``winding_rad``.
+    """Amplitude of each joint for a wave of headings of ``winding_rad``.
 
-    A joint makes the difference of the headings half a spacing before and behind it:
-    ``2 winding sin(pi waves d)`` for joints that are a share d of the body apart.
+    A joint bends by the difference of the headings half a spacing before and behind it: ``2 winding
+    sin(pi waves d)`` for a spacing of d body lengths.
     """
     ends = robot.link_ends
     reach = ends[joints[-1] + 1] - ends[joints[0] + 1]
@@ -53,11 +53,11 @@ def travelling(
 
 
 def bends_rad(robot: "RobotConfig", joints: tuple[int, ...], headings_rad: Floats) -> Floats:
-    """(T, n) joint angles of the headings (T, n + 1) of the rigid groups between ``joints``."""
+    """(T, n) joint angles from headings (T, n + 1) of the rigid groups between ``joints``."""
     return np.asarray(headings_rad[:, :-1] - headings_rad[:, 1:])
 
 
 def group_places(robot: "RobotConfig", joints: tuple[int, ...]) -> Floats:
-    """(n + 1,) middles of the rigid groups that ``joints`` separate, on the body as ``places``."""
+    """(n + 1,) middles of the rigid groups between ``joints``, in the scale of ``places``."""
     edges = np.concatenate([[0.0], places(robot, joints), [1.0]])
     return np.asarray((edges[:-1] + edges[1:]) / 2.0)

@@ -1,1 +1,1 @@
-"""Mechanics on paper: ground contact, friction, loads and speed of a body, without a simulator."""
+"""Mechanics without a simulator: ground contact, friction, loads and speed of a body."""

@@ -39,9 +39,9 @@ class BodySlide:
         self._work = np.empty((6, 3))
 
     def set_shapes(self, before: BodyView, after: BodyView, step_s: float) -> float:
-        """Accept two shapes in one frame, ``step_s`` apart; return the speed of the fastest link.
+        """Set two shapes in one frame, ``step_s`` apart; return the fastest link's speed.
 
-        The speed is the greater one of its two parts in the plane, m/s.
+        The speed is the larger component in the plane, m/s.
         """
         headings_rad = before.headings_rad
         return float(
@@ -52,7 +52,7 @@ class BodySlide:
         )
 
     def velocity(self) -> Floats:
-        """Return (3,) the velocity between the shapes, as of ``rigid_velocity``; it is reused."""
+        """Return (3,) the velocity as ``rigid_velocity``; the array is reused."""
         friction = self._friction
         balance(
             *(self._table, OTHERS, len(self._normal), friction.along, friction.across),
@@ -76,16 +76,16 @@ def _fill_slide(
     normal: Floats,
     table: Floats,
 ) -> float:
-    """Fill a ``link_table``; return the greatest part of a link's velocity.
+    """Fill a ``link_table``; return the largest component of a link's velocity.
 
     Args:
         before_m: (L, 3) centres of the links.
         cosine: (L,) of their headings.
-        sine: likewise.
+        sine: (L,) of their headings.
         after_m: (L, 3) centres after the step.
-        step_s: of time.
+        step_s: duration.
         normal: (L,) loads.
-        table: of ``link_table``.
+        table: from ``link_table``.
 
     """
     fastest = 0.0

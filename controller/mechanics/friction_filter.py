@@ -1,8 +1,8 @@
-"""Friction filter: the friction under a body, found from where it slid.
+"""Friction filter: estimate the friction under a body from its slides.
 
-An extended Kalman filter on the logarithms of the friction along and across. It begins at the
-world's file and returns to it while nothing is measured. A model predicts each span of motion under
-three hypotheses; the body's real motion moves the estimate.
+An extended Kalman filter on the logarithms of the friction along and across. It starts at the world
+file's friction and returns to it without measurements. A model predicts each span of motion under
+three hypotheses; the real motion corrects the estimate.
 """
 
 import math
@@ -35,7 +35,7 @@ _ROOT = math.sqrt(0.5)
 
 
 class _Square(NamedTuple):
-    """A symmetric matrix of two rows: sums have one order, so bits are the same everywhere."""
+    """A symmetric 2 x 2 matrix; a fixed order of sums gives the same bits on every machine."""
 
     uu: float
     uv: float
@@ -48,7 +48,7 @@ class _Square(NamedTuple):
         return _Square(self.vv / whole, -self.uv / whole, self.uu / whole)
 
     def plus(self, other: "_Square", times: float = 1.0) -> "_Square":
-        """With ``times`` another added."""
+        """Return the sum with ``times`` another matrix."""
         return _Square(*(a + times * b for a, b in zip(self, other, strict=True)))
 
     def times(self, u: float, v: float) -> tuple[float, float]:
@@ -76,7 +76,7 @@ class SlideEvidence(NamedTuple):
 
 
 def ratio_evidence(information: float, pull: float, square: float, rows: int) -> SlideEvidence:
-    """Return the evidence of motion that shows only v, along against across."""
+    """Return evidence of motion that shows only v (along against across)."""
     return SlideEvidence(_Square(0.0, 0.0, information), 0.0, pull, square, rows)
 
 
@@ -88,7 +88,7 @@ def slide_evidence(information: Floats, pull: Floats, square: float, rows: int) 
 
 @dataclass(frozen=True, slots=True)
 class FoundFriction:
-    """Results so far."""
+    """Present results."""
 
     friction: FrictionConfig
     """Best estimate."""
@@ -108,8 +108,8 @@ class FoundFriction:
 class FrictionFilter:
     """Estimates the friction along and across a body.
 
-    Its axes are u, both logarithms greater, which has no effect on a level floor and gives no
-    information there, and v, along against across.
+    The axes are u, both logarithms together, and v, along against across. A level floor gives no
+    information about u.
     """
 
     def __init__(
@@ -119,11 +119,11 @@ class FrictionFilter:
         prior: float = PRIOR,
         doubt: float = DOUBT_99,
     ) -> None:
-        """Begin at the file's friction.
+        """Start at the file's friction.
 
         Args:
-            file: of the world.
-            sigma: three standard deviations of the model's predictions, in the unit of ``update``.
+            file: friction of the world.
+            sigma: three standard deviations of the model's predictions, in the units of ``update``.
             prior: standard deviation of the logarithms about the file's.
             doubt: squared distance from which on the file is out.
 
@@ -136,7 +136,7 @@ class FrictionFilter:
         self._differs = False
 
     def hypotheses(self) -> tuple[FrictionConfig, ...]:
-        """The three hypotheses for the prediction of the next span: the estimate first."""
+        """Return the three hypotheses for the next prediction, the estimate first."""
         u, v = self._u, self._v
         return self._friction(u, v), self._friction(u + STEP, v), self._friction(u, v + STEP)
 
@@ -144,10 +144,10 @@ class FrictionFilter:
         """Process a span of motion.
 
         Args:
-            measured: (3,) way ahead and to the left, m, and turn, rad.
-            foretold: (3, 3) a row under each of ``hypotheses``; a row that is not finite is
-                ignored.
-            span_s: its length.
+            measured: (3,) distance ahead and to the left, m, and turn, rad.
+            foretold: (3, 3) prediction under each of ``hypotheses``; the span is ignored if any
+                value is not finite.
+            span_s: duration.
 
         """
         rows = [measured.tolist(), *foretold.tolist()]
@@ -155,7 +155,7 @@ class FrictionFilter:
         return self.absorb(self._evidence(*rows) if is_finite else None, span_s)
 
     def absorb(self, evidence: SlideEvidence | None, span_s: float) -> FoundFriction:
-        """Process the evidence of a span of motion; None: the span shows nothing."""
+        """Process the evidence of a span of motion; None: no evidence."""
         kept = math.exp(-span_s / _MEMORY_S)
         before = _Square(*(kept**2 * each for each in self._covariance))
         self._covariance = before.plus(self._prior, 1.0 - kept**2)
@@ -170,7 +170,7 @@ class FrictionFilter:
     def _evidence(
         self, measured: list[float], here: list[float], by_u: list[float], by_v: list[float]
     ) -> SlideEvidence:
-        """Return what the difference between motion and prediction shows."""
+        """Return the evidence of the difference between motion and prediction."""
         gap = [m - h for m, h in zip(measured, here, strict=True)]
         gap[2] = math.remainder(gap[2], 2.0 * math.pi)
         slopes = [
@@ -184,7 +184,6 @@ class FrictionFilter:
         return SlideEvidence(information, pull_u, pull_v, whole, len(gap))
 
     def _correct(self, evidence: SlideEvidence) -> None:
-        """Move the estimate by the evidence of a span."""
         information, pull_u, pull_v, square, rows = evidence
         span, about = self._of_span(information, 1.0)
         excess = max(1.0, (square - about.about(pull_u, pull_v)) / rows)
@@ -204,13 +203,13 @@ class FrictionFilter:
         )
 
     def _of_span(self, information: _Square, excess: float) -> tuple[_Square, _Square]:
-        """Covariance of the friction of one span before and after it, its noise in excess."""
+        """Covariance of one span's friction before and after it; ``excess`` scales noise."""
         span = self._covariance.plus(_Square(_STRAY**2, 0.0, _STRAY**2), excess)
         return span, span.inverse.plus(information, 1.0 / excess).inverse
 
     @property
     def found(self) -> FoundFriction:
-        """The estimate."""
+        """Present estimate."""
         mean, (uu, uv, vv) = self._friction(self._u, self._v), self._covariance
         along = math.exp(_NORMAL_95 * math.sqrt(0.5 * (uu + vv) + uv))
         across = math.exp(_NORMAL_95 * math.sqrt(0.5 * (uu + vv) - uv))
@@ -222,7 +221,7 @@ class FrictionFilter:
         )
 
     def _friction(self, u: float, v: float) -> FrictionConfig:
-        """The file's times a factor along, backward too, and one across."""
+        """Scale the file's friction: one factor along (also backward), one across."""
         file, along, across = self._file, math.exp(_ROOT * (u + v)), math.exp(_ROOT * (u - v))
         back = None if file.back is None else min(file.back * along, 5.0)
         given = {"along": min(file.along * along, 5.0), "across": min(file.across * across, 5.0)}

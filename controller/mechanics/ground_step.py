@@ -1,9 +1,8 @@
-"""The ground step: a skeleton in plan is placed on the ground ([PT] 2.6.5).
+"""The ground step: place a skeleton in plan on the ground ([PT] 2.6.5).
 
-From the tail on, each next point lies on the vertical half circle of radius r in direction Theta,
-where that meets the surface raised by half the local body height. Correction: the text meets the
-bare ground and raises the points afterwards, which changes segment lengths on a tapered body; here
-the surface is raised first, so they are exact.
+From the tail, each next point is the intersection of a vertical half circle of radius r in
+direction Theta with the surface raised by half the local body height. Correction: the paper uses
+the bare ground and raises the points afterwards, which changes segment lengths on a tapered body.
 """
 
 from dataclasses import dataclass
@@ -46,29 +45,29 @@ class GroundedSkeleton:
 def bridged(ground: HeightField, radius_m: float) -> HeightField:
     """Return the ground that a ball of ``radius_m`` can touch from above.
 
-    Links lie over what is narrower than they are long: a trench, the corner below a step. (A grey
+    Links bridge features narrower than their length: a trench, the corner below a step. (Grey
     closing with a ball; Serra 1982.)
     """
     reach = int(radius_m / ground.spacing_m)
     across = np.arange(-reach, reach + 1) * ground.spacing_m
     square = radius_m**2 - across[:, None] ** 2 - across**2
-    ball: Any = np.sqrt(np.maximum(square, 0.0)) - radius_m  # scipy's stubs know whole numbers only
+    ball: Any = np.sqrt(np.maximum(square, 0.0)) - radius_m  # scipy's stubs accept integers only
     z_m = grey_closing(ground.z_m, footprint=square >= 0.0, structure=ball, mode="nearest")
     return HeightField(z_m, ground.spacing_m, ground.x0_m, ground.y0_m)
 
 
 def half_heights_m(robot: RobotConfig, segments: int) -> Floats:
-    """Half the body's height at the points of a skeleton (segments + 1,): the robot's profile."""
+    """Half the body's height at the points (segments + 1,) of a skeleton."""
     return np.array(robot.radii_m(segments + 1))
 
 
 class GroundStep:
     """Places skeletons on one ground; ``None`` is a level floor at height 0.
 
-    A crossing always exists while neighbouring half heights differ by less than a segment: the
-    half circle starts below the raised surface and ends above it. It is the only one where the
-    surface is nowhere steeper than 45 degrees; beyond, the one found from the pitch of the segment
-    before is taken. Beyond the field's border its edge goes on level.
+    A crossing exists if neighbouring half heights differ by less than a segment: the half circle
+    starts below the raised surface and ends above it. It is unique where the surface is nowhere
+    steeper than 45 degrees; elsewhere the search starts from the previous point's plane. The ground
+    continues level beyond the field.
     """
 
     def __init__(self, ground: HeightField | None) -> None:
@@ -87,10 +86,10 @@ class GroundStep:
 
         Args:
             angles_rad: (N,) or (T, N) tangent angles, head first.
-            known_m: (2,) or (T, 2) where the tail end (or the head) is in plan.
-            segment_m: r, (N,) or the same of all; 0 keeps a point where the one before it is.
+            known_m: (2,) or (T, 2) position of the known end in plan.
+            segment_m: r, (N,) or scalar; 0 puts two points in one place.
             half_height_m: (N + 1,) or scalar, half the body's height at each point.
-            known: which end ``known_m`` is.
+            known: the end at ``known_m``.
 
         """
         angles = np.atleast_2d(angles_rad)
@@ -146,10 +145,10 @@ def _place(
     pitch: Floats,
     gap: Floats,
 ) -> None:
-    """Write points (T, N + 1, 3), pitch (T, N) and gap (T, N + 1), from the known end on.
+    """Write points (T, N + 1, 3), pitch (T, N) and gap (T, N + 1), from the known end.
 
-    Each tilt is found by Newton's method, which is exact within a triangle of the surface, inside a
-    bracket that bisects. It begins at the crossing with the plane of the point before.
+    Newton's method finds each tilt; it is exact within a triangle of the surface. A bisected
+    bracket guards it. It starts at the crossing with the plane of the previous point.
     """
     frames, segments = cosines.shape
     sign, step = (1.0, -1) if from_tail else (-1.0, 1)

@@ -11,12 +11,12 @@ _STILL_M_S = 1e-4
 def friction_n(
     velocity_m_s: Floats, headings_rad: Floats, friction: FrictionConfig, weight_n: float
 ) -> Floats:
-    """Force (L, 2) of level ground on links that slide, each bearing ``weight_n``.
+    """Force (L, 2) of level ground on sliding links.
 
     Args:
         velocity_m_s: (L, 2) of the link centres.
         headings_rad: (L,) link headings.
-        friction: the ellipse: the force points against the velocity weighted by its axes.
+        friction: the ellipse; the force opposes the velocity weighted by its axes.
         weight_n: on each link.
 
     """
@@ -31,10 +31,9 @@ def friction_n(
 def yaw_load_n_m(
     centres_m: Floats, headings_rad: Floats, link_lengths_m: Floats, force_n: Floats
 ) -> Floats:
-    """Moment (J,) about the vertical that each joint must hold, if nothing is accelerated.
+    """Moment (J,) about the vertical that each joint holds, without acceleration.
 
-    The part of the body behind joint j is in balance under its ground forces and the joint: the
-    moment of those forces about the joint is what the joint carries.
+    It is the moment about the joint of the ground forces on the body behind it.
 
     Args:
         centres_m: (L, 2) link centres, head first.

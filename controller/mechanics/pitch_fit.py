@@ -1,8 +1,8 @@
 """The pitch fit: pitch goals that follow uneven ground ([PT] 2.6.5 for a chain of links).
 
-The ground step places the links' middle line on the ground; pitch goals then bring the link centres
-as near to it as the robot can. A robot without pitch joints can only tilt as a whole, and the
-residual is the misfit.
+The ground step places the links' middle line on the ground. Pitch goals bring the link centres as
+near to it as possible; the residual is the misfit. A robot without pitch joints only tilts as a
+whole.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.drivers.least_squares import least_squares
 
-_REGULAR = 0.05  # of a link length: a straight body's roll changes no height; goals stay small
+_REGULAR = 0.05  # of a link length: keeps goals small if roll changes no height
 
 
 @dataclass(frozen=True, slots=True)
 class PitchFit:
-    """Pitch goals, and how well the body then lies."""
+    """Pitch goals and their fit."""
 
     goal_rad: Floats
     """(J,) goals, positive raises the head side; 0 on yaw joints."""
@@ -40,7 +40,7 @@ class PitchFitter:
     """Pitch goals of one robot on one ground; ``None`` is a level floor."""
 
     def __init__(self, robot: RobotConfig, ground: HeightField | None, gain: float = 1.0) -> None:
-        """Set up for goals ``gain`` times those of the fit."""
+        """``gain`` scales the fitted goals."""
         self._step, self._gain = GroundStep(ground), gain
         self._lengths_m = np.array(robot.link_lengths_m)
         self._link_m = robot.mean_link_length_m
@@ -53,15 +53,15 @@ class PitchFitter:
         self._behind = behind.astype(float)
 
     def change_ground(self, ground: HeightField) -> None:
-        """Fit to another ground from now on."""
+        """Use another ground from now on."""
         self._step = GroundStep(ground)
 
     def __call__(self, head_in_world_m: ArrayLike, heading_rad: Floats) -> PitchFit:
         """Fit the chain to the ground under it.
 
-        Heights of link centres are linear in the joints for the slopes that [PT] allows (25
-        degrees): a joint raises what is behind it by its distance along the joint's heading. The
-        body's own height, roll and pitch are free, so the fit is one small least squares.
+        At the slopes that [PT] allows (25 degrees), heights of link centres are linear in the
+        joints: a joint raises the links behind it by their distance along its heading. The body's
+        height, roll and pitch are free. One small least-squares problem gives the fit.
 
         Args:
             head_in_world_m: (2,) centre of the head link in plan.

@@ -1,9 +1,8 @@
-"""The three rigid velocities of a planar body whose shape changes on Coulomb friction.
+"""The rigid velocity (vx, vy, omega) of a planar body whose shape changes on Coulomb friction.
 
-Without inertia the ground's forces and moment sum to zero; with the Coulomb ellipse that is the
-minimum of the dissipated power, which is convex in (vx, vy, omega), so Newton's method finds it.
-On a slope gravity's power, linear in them, is taken off: still convex, but without a minimum where
-the slope is more than friction holds.
+Without inertia the ground's forces and moment sum to zero. With the Coulomb ellipse this is the
+minimum of the dissipated power, which is convex, so Newton's method finds it. On a slope gravity's
+power, linear in the velocity, is subtracted; there is no minimum if the slope exceeds friction.
 """
 
 import numpy as np
@@ -33,7 +32,7 @@ _SLIDES = 9 * LANES
 
 
 class NoBalanceError(ArithmeticError):
-    """The slope's load is more than friction holds: without inertia, an infinite velocity."""
+    """The slope's load exceeds friction: without inertia, the velocity is infinite."""
 
 
 def rigid_velocity(
@@ -52,17 +51,17 @@ def rigid_velocity(
         points_m: (L, 2) link centres in the body frame.
         headings_rad: (L,) link headings in the body frame.
         shape_m_s: (L, 2) velocities of the links relative to the body frame.
-        friction: the ellipse; every link carries the same weight.
+        friction: the ellipse.
         guess: start of the iteration, the last solution in a sequence.
-        tangential: (L, 2) part of gravity along the ground on each link, in the body frame, in
-            weights of a link: ``sin(slope)`` down the slope. None is level ground.
+        tangential: (L, 2) gravity along the ground on each link, in the body frame, in weights of a
+            link: ``sin(slope)`` down the slope. None is level ground.
         normal: (L,) load of each link on the ground, in weights of a link: ``cos(slope)``.
 
     Returns:
         (3,) m/s, m/s, rad/s.
 
     Raises:
-        NoBalanceError: the slope's load is more than friction can hold; the body slides.
+        NoBalanceError: the slope's load exceeds friction; the body slides.
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
@@ -87,19 +86,19 @@ def inertial_velocity(
 ) -> Floats:
     """``rigid_velocity`` of a body with inertia, at the end of a step (implicit Euler).
 
-    The power gains half the links' change of velocity squared, ``1 / (g step)`` per weight, so that
-    a body that nothing holds slides ever faster instead of at once infinitely fast.
+    The power gains half the squared change of the links' velocity, times ``1 / (g step)`` per
+    weight. A body beyond the friction limit then accelerates at a finite rate.
 
     Args:
         points_m: as in ``rigid_velocity``.
-        headings_rad: likewise.
-        shape_m_s: likewise.
-        friction: likewise.
+        headings_rad: as in ``rigid_velocity``.
+        shape_m_s: as in ``rigid_velocity``.
+        friction: as in ``rigid_velocity``.
         before_m_s: (L, 2) velocities of the links at the start of the step, in the body frame.
-        step_s: of time.
+        step_s: duration.
         guess: as in ``rigid_velocity``.
-        tangential: likewise.
-        normal: likewise.
+        tangential: as in ``rigid_velocity``.
+        normal: as in ``rigid_velocity``.
 
     Returns:
         (3,) m/s, m/s, rad/s.
@@ -113,11 +112,10 @@ def inertial_velocity(
 
 
 def link_table(links: int, rows: int = OTHERS) -> Floats:
-    """Zeros (n,) for the numbers of ``links`` links; ``rows`` of all groups of ``LANES`` links.
+    """Zeros (n,) for a table of ``links`` links with ``rows`` numbers per group.
 
-    The links stand in groups of ``LANES``: number ``k`` of a row that begins at ``ROW`` is at
-    ``k // LANES * rows + ROW + k % LANES``. Places beyond the last link stay zero: they bear
-    nothing.
+    Groups have ``LANES`` links: number ``k`` of a row that begins at ``ROW`` is at ``k // LANES *
+    rows + ROW + k % LANES``. Places beyond the last link stay zero and bear nothing.
     """
     return np.zeros(-(-links // LANES) * rows)
 
@@ -129,7 +127,6 @@ def _table(
     normal: Floats | None,
     before_m_s: Floats | None = None,
 ) -> Floats:
-    """A table of links given by arrays of any layout."""
     links = len(points_m)
     table = link_table(links)
     groups = table.reshape(-1, OTHERS)
@@ -176,15 +173,15 @@ def _minimise(
 def add_inertia(
     table: Floats, rows: int, links: int, step_s: float, linear: Floats, quadratic: Floats
 ) -> None:
-    """Inertia of a step in the power per weight of a link; as in ``inertial_velocity``.
+    """Add the inertia of a step to the power per weight of a link; see ``inertial_velocity``.
 
     Args:
-        table: of ``link_table``; centres, change of shape and movement before are read.
-        rows: of it.
-        links: how many.
-        step_s: of time.
+        table: from ``link_table``; centres, change of shape and previous movement are read.
+        rows: of the table.
+        links: number of links.
+        step_s: duration.
         linear: (3,) gains the part that is linear in (vx, vy, omega).
-        quadratic: (3, 3) becomes that of their products.
+        quadratic: (3, 3) out: coefficients of their products.
 
     """
     mass = 1.0 / (GRAVITY_M_S2 * step_s)
@@ -215,9 +212,9 @@ def _wrench(points_m: Floats, force: Floats) -> Floats:
 def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
-    They state how each link's velocity along and across itself grows with (vx, vy, omega), three
-    numbers each. They also contain the contribution of the change of the shape to the two, and the
-    lower triangle of the product of the first rows with their transpose.
+    They contain the derivatives of each link's velocity along and across itself by (vx, vy, omega),
+    the contribution of the change of shape to both, and the lower triangle of the product of the
+    first rows with their transpose.
     """
     for group in range(len(table) // rows):
         link = table[group * rows : (group + 1) * rows]
@@ -257,21 +254,21 @@ def _power(
     gradient: Floats,
     hessian: Floats,
 ) -> tuple[float, float]:
-    """Power that all links dissipate, less gravity's; and what they would if the shape stood still.
+    """Return the dissipated power less gravity's, and the power without a change of shape.
 
-    The contribution of each link is computed for ``LANES`` links at once, and added up in their
-    order, so that the bits do not depend on the processor.
+    ``LANES`` links are computed at once and added in their order, so that the bits do not depend on
+    the processor.
 
     Args:
-        table: of ``_set_up``.
-        rows: of it.
-        links: how many.
-        still: as ``_STILL_M_S``, weighted.
+        table: from ``_set_up``.
+        rows: of the table.
+        links: number of links.
+        still: ``_STILL_M_S``, weighted.
         linear: as in ``balance``.
-        quadratic: likewise.
-        w: (3,) where.
-        gradient: (3,) written.
-        hessian: (3, 3) its lower triangle is written.
+        quadratic: as in ``balance``.
+        w: (3,) velocity.
+        gradient: (3,) out.
+        hessian: (3, 3) out: its lower triangle.
 
     """
     x, y, turn = w[0], w[1], w[2]
@@ -320,7 +317,7 @@ def _power(
     "void(float64[:, ::1], float64[::1], float64[::1])", divides_by_zero=True, makes_arrays=False
 )
 def _solve(hessian: Floats, gradient: Floats, step: Floats) -> None:
-    """Solve for Newton's step (3,) by Cholesky without roots; no loops, as it is asked so often."""
+    """Solve for Newton's step (3,) by Cholesky without roots; unrolled for speed."""
     d0 = 1.0 / hessian[0, 0]
     l10, l20 = hessian[1, 0] * d0, hessian[2, 0] * d0
     d1 = 1.0 / (hessian[1, 1] - l10 * hessian[1, 0])
@@ -349,10 +346,10 @@ def balance(
     w: Floats,
     work: Floats,
 ) -> bool:
-    """Newton's method on the power, from ``w`` (3,) on, which is written; whether it has a minimum.
+    """Newton's method on the power from ``w`` (3,), in place; whether there is a minimum.
 
-    ``table`` is of ``link_table``, with ``rows``; ``linear`` (3,) is gravity's power per (vx, vy,
-    omega), ``quadratic`` (3, 3) that of inertia; ``work`` (6, 3) is overwritten.
+    ``table`` is from ``link_table``, with ``rows``. ``linear`` (3,) is gravity's power per (vx, vy,
+    omega), ``quadratic`` (3, 3) that of inertia. ``work`` (6, 3) is overwritten.
     """
     _set_up(table, rows, along, across)
     still = _STILL_M_S * across
@@ -386,7 +383,7 @@ def balance(
         best = now
         gain = linear[0] * w[0] + linear[1] * w[1] + linear[2] * w[2]
         if may_slide and rigid < (1.0 - 1e-9) * gain:
-            return False  # gravity outdoes friction ever faster in this direction
+            return False  # gravity exceeds friction at any speed in this direction
     return True
 
 
@@ -399,21 +396,21 @@ def planar_slide(
     across: float,
     load: Floats | None = None,
 ) -> tuple[float, float, float]:
-    """Where a body slides whose shape goes through ``n`` given ones.
+    """Return the slide of a body that passes through ``n`` shapes.
 
     Args:
         headings_rad: (n, L) of the links, about the body's.
         points_m: (n, L, 2) their centres about the body's, in its frame.
         step_s: (n - 1,) between the shapes.
-        heading_rad: of the body at the begin.
+        heading_rad: initial heading of the body.
         along: friction along the links.
-        across: likewise.
+        across: friction across the links.
         load: (n, L, 3) gravity on each link in weights of a link, x and y along the ground in the
             world and z into it. None: a level floor, on which every link carries the same weight.
 
     Returns:
-        Way (2) of the body's centre, m, and its heading at the end. Where friction holds the body
-        no more, it slides with inertia.
+        Displacement x, y of the body's centre, m, and its final heading. Where friction no longer
+        holds the body, it slides with inertia.
 
     """
     shapes, links = headings_rad.shape

@@ -1,9 +1,9 @@
-"""Rollout: where pieces of angle track would carry the body, on paper, before one is chosen.
+"""Rollouts: predict the motion of a body for pieces of angle track before one is chosen.
 
 The links' headings follow the track. In each step the rigid velocity balances Coulomb friction and
-the slope's pull under every link (``rigid_motion``), as in the forecast of a complete plan, but
-compiled and for many pieces at once. The balance knows no rate: lengths stand in place of times,
-except where nothing holds the body and it slides with inertia.
+the slope's pull under every link (``rigid_motion``). This is the forecast of a complete plan,
+compiled and for many pieces. The balance does not depend on speed; times matter only where a body
+slides with inertia.
 """
 
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ _BEYOND_M = 4.0
 
 @dataclass(frozen=True, slots=True)
 class PlanarPose:
-    """Where a body is in plan."""
+    """Position of a body in plan."""
 
     centre_m: Floats
     """(2,) centre of the links."""
@@ -56,7 +56,7 @@ class PlanarPose:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Drift of a body from the balance, per segment of pulse, in the frame of its mean line."""
+    """Deviation of a body from the balance, per segment of pulse, in the frame of its mean line."""
 
     ahead_m: float = 0.0
     left_m: float = 0.0
@@ -65,7 +65,7 @@ class Drift:
 
 @dataclass(frozen=True, slots=True)
 class TabulatedPath:
-    """A path as a table: a point every ``PATH_STEP_M``, and straight on beyond its end."""
+    """A path as a table: a point every ``PATH_STEP_M``, and straight beyond its end."""
 
     points_m: Floats
     """(n, 2)"""
@@ -78,7 +78,7 @@ class TabulatedPath:
     def of(
         cls, points_m: Floats, waypoint_m: Floats | None = None, waypoint_at: float = np.inf
     ) -> "TabulatedPath":
-        """Carry points (n, 2), ``PATH_STEP_M`` apart, on along the last direction."""
+        """Extend points (n, 2), ``PATH_STEP_M`` apart, along the last direction."""
         step = points_m[-1] - points_m[-2]
         step = step / np.hypot(step[0], step[1]) * PATH_STEP_M
         count = np.arange(1, round(_BEYOND_M / PATH_STEP_M) + 1)
@@ -98,12 +98,12 @@ class Rolled:
 
     @property
     def centre_m(self) -> Floats:
-        """(C, 2) at the end."""
+        """(C, 2) final centre."""
         return self.columns[:, :2]
 
     @property
     def offset_rad(self) -> Floats:
-        """(C,) at the end."""
+        """(C,) final offset."""
         return self.columns[:, 2]
 
     @property
@@ -113,22 +113,22 @@ class Rolled:
 
     @property
     def end_off_m(self) -> Floats:
-        """(C,) signed distance of the centre from the path at the end, positive to its left."""
+        """(C,) final signed distance of the centre from the path, positive to its left."""
         return self.columns[:, END_OFF]
 
     @property
     def head_off_m(self) -> Floats:
-        """(C,) that of the head link."""
+        """(C,) final signed distance of the head link."""
         return self.columns[:, HEAD_OFF]
 
     @property
     def heading_rad(self) -> Floats:
-        """(C,) mean heading at the end less the path's direction a little ahead of the centre."""
+        """(C,) final mean heading less the path's direction a little ahead of the centre."""
         return self.columns[:, HEADING]
 
     @property
     def passed_m(self) -> Floats:
-        """(C,) least distance of the centre from the next waypoint; 0 where it is not passed."""
+        """(C,) smallest distance of the centre from the next waypoint; 0 if it is not passed."""
         return self.columns[:, PASSED]
 
     @property
@@ -138,15 +138,15 @@ class Rolled:
 
     @property
     def time_s(self) -> Floats:
-        """(C,) that the joints need for it."""
+        """(C,) duration at the joints' speed."""
         return self.columns[:, TIME]
 
 
 class Followed:
-    """How a body that moves otherwise follows a path: measured as rollouts are."""
+    """Measures a body that follows a path otherwise, as rollouts are measured."""
 
     def __init__(self, path: TabulatedPath, path_at: int) -> None:
-        """Begin at the path's point with index ``path_at``."""
+        """Start at the path's point with index ``path_at``."""
         self._path, self._from, self._steps = path, path_at, 0
         self._state = np.zeros(STATE)
         self._state[3], self._state[10] = path_at, np.inf
@@ -158,7 +158,7 @@ class Followed:
         self._steps += 1
 
     def rolled(self, headings_rad: Floats, points_m: Floats) -> Rolled:
-        """Result for links that head so (L,) at the end, at points (L, 2) about the centre."""
+        """Return the result for final headings (L,) of links at points (L, 2) about the centre."""
         out, path = np.empty((1, COLUMNS)), self._path
         body = float(headings_rad.mean()), float(points_m[0, 0]), float(points_m[0, 1])
         given = path.points_m, self._from, path.waypoint_at
@@ -191,16 +191,16 @@ class Rollout:
         self.use_friction(friction)
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Roll out with this friction; pieces that have begun keep the earlier one."""
+        """Use this friction; pieces that have begun keep the earlier one."""
         self._body = np.array([friction.along, friction.across, self._speed_limit_rad_s])
 
     def change_ground(self, ground: HeightField) -> None:
-        """Roll out on another ground from now on."""
+        """Use another ground from now on."""
         self._field = np.ascontiguousarray(ground.z_m), ground.x0_m, ground.y0_m, ground.spacing_m
         self._level = bool(np.ptp(ground.z_m) == 0.0)
 
     def steepest(self, points_m: Floats) -> float:
-        """Greatest mean slope of the ground over ten points in a row of (n, 2)."""
+        """Largest mean slope (tangent) of the ground over ten consecutive points of (n, 2)."""
         slopes = np.array([plane(*self._field, float(x), float(y))[1:] for x, y in points_m])
         count = min(10, len(slopes))
         rows = np.lib.stride_tricks.sliding_window_view(slopes, count, axis=0).mean(axis=-1)
@@ -217,17 +217,17 @@ class Rollout:
         drift: Drift,
         room_of: "RolloutTree | None" = None,
     ) -> "RolloutTree":
-        """Where every rollout of a decision begins.
+        """Return the common start of a decision's rollouts.
 
         Args:
-            samples_rad: (M,) of the track, from at least a body before ``head``.
-            head: segments from the first sample to where the head is.
-            start: where the body is.
-            path: to measure by.
+            samples_rad: (M,) of the track, from at least a body length before ``head``.
+            head: segments from the first sample to the head.
+            start: pose of the body.
+            path: path to measure by.
             path_at: index of its point nearest to the centre.
-            cruise_segments_s: wanted speed of the pulse; joints at their speed limit slow it.
+            cruise_segments_s: preferred speed of the pulse; the joints' speed limit may slow it.
             drift: added to the balance.
-            room_of: a tree that is not used any more; its memory is taken over.
+            room_of: an unused tree whose memory is reused.
 
         """
         given = (
@@ -241,7 +241,7 @@ class Rollout:
 
 
 class RolloutTree:
-    """Rollouts from one pose on one track: the common part of pieces is rolled out once."""
+    """Rollouts from one pose on one track; the common part of pieces is rolled out once."""
 
     def __init__(
         self,
@@ -251,7 +251,7 @@ class RolloutTree:
         given: tuple[Any, ...],
         room_of: "RolloutTree | None" = None,
     ) -> None:
-        """Store arguments of ``Rollout.begin``, and those of ``roll_pieces`` in ``given``."""
+        """``given``: arguments of ``roll_pieces``; for the others see ``Rollout.begin``."""
         self._samples, self._head, self._given = samples_rad, head, given
         self._count = 0
         if room_of is None:
@@ -266,8 +266,8 @@ class RolloutTree:
         """Roll a body out over each piece.
 
         Args:
-            pieces_rad: (C, n) that would be appended.
-            pulse: segments that the head travels; None is to the end of the pieces.
+            pieces_rad: (C, n) samples to append.
+            pulse: segments that the head travels; None: to the end of the pieces.
 
         """
         count, length = pieces_rad.shape
@@ -284,7 +284,7 @@ class RolloutTree:
         return Rolled(out)
 
     def _make_room(self, count: int, length: int, steps: int) -> int:
-        """Allocate ``count`` more pieces; returns the place of the first."""
+        """Allocate ``count`` more pieces; return the index of the first."""
         fits = (length, steps + 1) == (self._pieces.shape[1], self._states.shape[1])
         if not fits:
             self._count = 0

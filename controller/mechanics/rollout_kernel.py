@@ -1,7 +1,4 @@
-"""The compiled loops of rollouts: tables of links, places on the path, and many pieces at once.
-
-``controller.mechanics.rollout`` explains the model and calls these loops.
-"""
+"""The compiled loops of rollouts; ``controller.mechanics.rollout`` explains the model."""
 
 import numpy as np
 
@@ -46,8 +43,8 @@ PATH_STEP_M = 0.01
 def _sine_cosine(x: float) -> tuple[float, float]:
     """Sine and cosine of x, within 2^-52 for up to 10^5 turns.
 
-    The polynomials of fdlibm (Sun Microsystems, 1993). A loop over them is made for several numbers
-    at once, and their bits do not depend on the library of a machine.
+    The polynomials of fdlibm (Sun Microsystems, 1993). The loop vectorises, and the bits do not
+    depend on a machine's library.
     """
     k = np.floor(x * 0.6366197723675814 + 0.5)  # quarters of a turn
     r = ((x - k * 1.57079632673412561417) - k * 6.07710050630396597660e-11) - (
@@ -72,7 +69,7 @@ def _sine_cosine(x: float) -> tuple[float, float]:
 
 @compiled("float64(float64[::1], float64[::1], float64)", makes_arrays=False)
 def _area(total: Floats, track: Floats, at: float) -> float:
-    """Integral of the track's angles from its start to a place."""
+    """Integral of the track's angles from its start to ``at``."""
     k = min(max(int(at), 0), len(track) - 1)
     return float(total[k] + (at - k) * track[k])
 
@@ -91,9 +88,9 @@ def _lay(
     groups: Floats,
     table: Floats,
 ) -> None:
-    """Write headings of the links and their centres about that of mass, in the track's frame.
+    """Write the links' headings and centres about the centre of mass, in the track's frame.
 
-    They are the table's of after a step; ``groups`` gets the headings of the groups of links.
+    They go into the rows after a step; ``groups`` gets the headings of the groups of links.
     """
     ahead = _area(total, track, head - edges[0])
     for g in range(len(groups)):
@@ -126,7 +123,7 @@ def _lay(
 
 @compiled("void(float64[::1], float64[::1], boolean)", makes_arrays=False)
 def _keep(table: Floats, moving: Floats, out: bool) -> None:
-    """Copy how the links move out of a table, or into it."""
+    """Copy the links' velocities out of a table, or into it."""
     for g in range(len(table) // ROWS):
         link, kept = table[g * ROWS : (g + 1) * ROWS], moving[2 * g * LANES :]
         for j in range(2 * LANES):
@@ -138,7 +135,7 @@ def _keep(table: Floats, moving: Floats, out: bool) -> None:
 
 @compiled("void(float64[::1])", makes_arrays=False)
 def _stand_there(table: Floats) -> None:
-    """Make of the body after the step the one before the next."""
+    """Make the state after a step the state before the next."""
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(3 * LANES):
@@ -147,7 +144,7 @@ def _stand_there(table: Floats) -> None:
 
 @compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)", makes_arrays=False)
 def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
-    """Place on the path near ``at``, and the signed distance there, positive to its left."""
+    """Index on the path near ``at``, and the signed distance, positive to its left."""
     last = len(path) - 2
     best, least = at, np.inf
     for k in range(max(at - _BACK, 0), min(at + _FORTH, last) + 1):
@@ -168,7 +165,7 @@ def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
 def note_place(
     state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt: float
 ) -> None:
-    """Record in a state (11,) that its body has come to (x, y) within ``dt``."""
+    """Record in a state (11,) that its body is at (x, y) after ``dt``."""
     state[0], state[1] = x, y
     state[3], state[4] = _nearest(path, int(state[3]), x, y)
     state[5] += state[4] * state[4]
@@ -181,7 +178,7 @@ def note_place(
     "float64(float64[::1], int64, float64, float64)", divides_by_zero=True, makes_arrays=False
 )
 def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> float:
-    """Write the body between two steps in the world, and how its links move; its mean heading."""
+    """Write the body between two steps, and its links' velocities; return its mean heading."""
     s, c = _sine_cosine(offset_rad)
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
@@ -206,7 +203,7 @@ def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> floa
 def _pulse_rate(
     here_rad: Floats, next_rad: Floats, step: float, cruise: float, limit_rad_s: float
 ) -> float:
-    """Segments a second from one set of group headings to the next, within the joints' speed."""
+    """Segments per second between two sets of group headings, within the joints' speed."""
     rate = cruise
     for g in range(len(here_rad) - 1):
         turn = abs(next_rad[g] - next_rad[g + 1] - here_rad[g] + here_rad[g + 1])
@@ -227,7 +224,7 @@ def _pull(
     links: int,
     linear: Floats,
 ) -> None:
-    """Write each link's load, and add the slope's force and moment on all, in mean link weights."""
+    """Write each link's load; add the slope's force and moment on all, in mean link weights."""
     for i in range(links):
         at = i // LANES * ROWS + i % LANES
         px, py = table[at + POINT_X], table[at + POINT_Y]
@@ -253,9 +250,9 @@ def _slide(
     velocity: Floats,
     work: Floats,
 ) -> None:
-    """Balance friction, with inertia where nothing holds the body; write how body and links move.
+    """Balance friction, with inertia beyond the friction limit; write body and link velocities.
 
-    ``velocity`` (3,) and what moves in the table are those of the step before; ``work`` (9, 3).
+    ``velocity`` (3,) and the table's velocities are those of the previous step; ``work`` is (9, 3).
     """
     quadratic = work[6:]
     quadratic[:] = 0.0
@@ -289,7 +286,7 @@ def write_result(
 ) -> None:
     """Write the columns of ``Rolled`` (10,) from the state (11,) after all steps.
 
-    ``heading`` is the links' mean, and the head link is at (head_x, head_y) about the centre, both
+    ``heading`` is the links' mean; the head link is at (head_x, head_y) about the centre. Both are
     in the track's frame.
     """
     x, y, phi, place = state[0], state[1], state[2], state[3]
@@ -308,9 +305,9 @@ def write_result(
 
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)", makes_arrays=False)
 def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
-    """Return the earlier piece with the longest equal beginning, and its samples; -1: not found.
+    """Return the earlier piece with the longest equal beginning (or -1), and its samples.
 
-    Among equally long ones it is the first: its own common part is known.
+    Of equal lengths the first is returned, because its common part is known.
     """
     best, longest = -1, -1
     for other in range(piece):
@@ -353,34 +350,34 @@ def roll_pieces(
     movings: Floats,
     out: Floats,
 ) -> None:
-    """Roll out pieces (P, n) from number ``before`` on; ``out`` (C, 10) are columns of ``Rolled``.
+    """Roll out pieces (P, n) from number ``before``; ``out`` (C, 10) are columns of ``Rolled``.
 
     Args:
-        samples: as in ``Rollout.begin``, and so on.
-        pieces: those before, too.
-        before: how many have been rolled out before.
+        samples: as in ``Rollout.begin``.
+        pieces: including those before.
+        before: number of pieces already rolled out.
         head: place on the track.
-        step: of the head.
-        start: (3,) place of the body, and turn of the track.
+        step: of the head, segments.
+        start: (3,) position of the body, and turn of the track.
         z_m: the ground.
         x0: its corner.
-        y0: likewise.
+        y0: its corner.
         spacing: of its samples.
-        level: whether it is all of one height.
-        table: of the links: half lengths and weights are read, all else is overwritten.
+        level: whether all heights are equal.
+        table: of the links: half lengths and weights are read, the rest is overwritten.
         edges: of the groups of links.
         group: (L,) of each link.
         body: (3,) friction along and across; speed limit of the joints.
         path: (m, 2) points.
-        path_at: place on it.
-        waypoint: (3,) the next waypoint, and its place on the path.
-        cruise: wanted segments a second.
+        path_at: index on the path.
+        waypoint: (3,) the next waypoint, and its index on the path.
+        cruise: preferred segments per second.
         drift: (3,) added to each step.
-        states: (P, steps + 1, 11) of each piece before each step, and at its end. The numbers are
-            the body's place (2) and turn, place on the path, distance from it, sum of its squares,
-            time, velocity (3), and the least square of its distance from the waypoint.
-        movings: (P, steps + 1, m) velocities of the links; kept as ``states`` are.
-        out: written.
+        states: (P, steps + 1, 11) of each piece before each step, and at its end: position (2) and
+            turn, index on the path, distance from it, sum of squared distances, time, velocity (3),
+            and smallest squared distance from the waypoint.
+        movings: (P, steps + 1, m) velocities of the links, stored like ``states``.
+        out: results.
 
     """
     known, new, links, steps = len(samples), pieces.shape[1], len(group), states.shape[1] - 1

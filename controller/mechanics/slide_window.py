@@ -1,9 +1,9 @@
 """Friction from noisy poses of the head over a window of time.
 
-The joints give the shape of the body in each cycle, and the balance of friction gives how a body of
-these shapes moves. The pose of the head is measured many times in the window, each time with noise.
-The start of the body and the errors of the model are unknown as well; they are estimated together
-with the friction (generalised least squares), so that noise does not look like friction.
+The joints give the body's shape in each cycle, and the balance of friction predicts its motion.
+Each head pose has noise. The start of the body and the errors of the model are unknown too;
+generalised least squares estimates them together with the friction, so that noise does not look
+like friction.
 """
 
 from dataclasses import dataclass
@@ -102,12 +102,12 @@ class SlideWindow:
     def evidence(
         self, readings: HeadReadings, track: Floats, by_ratio: Floats, by_both: Floats | None = None
     ) -> SlideEvidence | None:
-        """Return what the readings show about the friction; None if they are too few.
+        """Return the readings' evidence about the friction; None if they are too few.
 
         Args:
             readings: within the window.
-            track: of ``track``, under the friction that the filter estimates.
-            by_ratio: likewise, one step farther along the filter's second axis.
+            track: from ``track``, under the friction that the filter estimates.
+            by_ratio: from ``track``, one step along the filter's second axis.
             by_both: likewise along its first axis; None on a level floor, where it has no effect.
 
         """
@@ -143,12 +143,11 @@ class SlideWindow:
 def _model_covariance(heads: Floats, track: Floats, kept: np.ndarray) -> Floats:
     """Return the covariance (3 B, 3 B) of heads (B, 3) by errors of start and model.
 
-    An error of the model in a bin moves or turns the body, about its centre there, in that and all
-    later bins.
+    A model error in a bin moves or turns the body about its centre, in that bin and all later ones.
 
     Args:
         heads: predicted, mean of each bin that counts.
-        track: (K - 1, 3) body at the begin of each bin.
+        track: (K - 1, 3) body at the start of each bin.
         kept: (B,) bins that count.
 
     """

@@ -1,4 +1,4 @@
-"""The load of a slope on a planar body: less on the ground, and gravity's part down the slope."""
+"""The load of a slope on a planar body: normal to the ground and down the slope."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def slope_load(ground: HeightField | None, link_m: Floats) -> tuple[Floats, Floa
 
     Args:
         ground: None is a level floor.
-        link_m: (L, 2 or more) link centres in the world; each stands on the triangle under it.
+        link_m: (L, 2 or more) link centres in the world.
 
     """
     if ground is None:

@@ -1,9 +1,9 @@
-"""How fast the synthesised body goes: viscous and Coulomb friction against its bends ([PT] 2.6.3).
+"""Speed of the synthesised body: viscous and Coulomb friction against its bends ([PT] 2.6.3).
 
 ``dv/dt = max(0, c3 K - c4 |dO/dt|) - c1 v - c2`` with K the standard deviation of the skeleton
-angles and O the heading (Eq. 8-9). Corrections: Eq. 9 equates norms, by which no body ever slows
-down; here the acceleration is signed. ``v >= 0``, as friction never pushes backwards at rest. The
-printed constants have a length unit that the text does not name; here it is declared.
+angles and O the heading (Eq. 8-9). Corrections: Eq. 9 equates norms, so a body never slows down;
+here the acceleration is signed. ``v >= 0``: friction never pushes backwards at rest. The unit of
+length of the printed constants must be given.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class SpeedLaw:
         return cls(1.0, 0.5 * unit_m, 6.0 * unit_m, c4 * unit_m)
 
     def steady_m_s(self, bend_rad: ArrayLike, turn_rad_s: ArrayLike = 0.0) -> Floats:
-        """Speed at which nothing changes, ``(c3 K - c4 |O'| - c2) / c1``, or rest."""
+        """Steady speed ``(c3 K - c4 |O'| - c2) / c1``, at least 0."""
         free = self._push(bend_rad, turn_rad_s) - self.coulomb_m_s2
         return np.asarray(np.maximum(free, 0.0) / self.viscous_1_s)
 
@@ -77,9 +77,9 @@ def identify(
     acceleration_m_s2: Floats | None = None,
     viscous_1_s: float = 1.0,
 ) -> Identified:
-    """Fit the law to samples (S,) of a run, in simulation or measured, by bounded least squares.
+    """Fit the law to samples (S,) of a run by bounded least squares.
 
-    Steady samples hold only ratios to c1, so without accelerations c1 is ``viscous_1_s``.
+    Steady samples contain only ratios to c1; without accelerations c1 is ``viscous_1_s``.
 
     Raises:
         ValueError: fewer moving samples than constants.

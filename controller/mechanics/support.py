@@ -1,10 +1,9 @@
 """Support: weight that the ground bears under each link, from the torque of the joints.
 
-Quasi-static, with vertical support forces: the part of the body behind a pitch joint is in balance
-under its weight, the support under it and the joint's torque. So the torques are linear in the
-support; the whole body's balance of force and of moments adds three equations. There are fewer
-equations than links; but the ground only pushes, and least squares that keep to that (C. L. Lawson,
-R. J. Hanson, Solving Least Squares Problems, 1974, by scipy) find the few links that bear.
+Quasi-static, with vertical support forces: weight, support and the joint's torque balance on the
+body behind each pitch joint. The torques are linear in the support; the whole body adds three
+equations. Links outnumber equations, but the ground only pushes. Non-negative least squares (C. L.
+Lawson, R. J. Hanson, Solving Least Squares Problems, 1974) finds the few links that bear.
 """
 
 import numpy as np
@@ -31,8 +30,8 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
 
     Args:
         robot: links and joints.
-        body: where the links are.
-        torque_n_m: (J,) of the servos on the joints; only those of pitch joints are used.
+        body: poses of the links.
+        torque_n_m: (J,) of the servos; only pitch joints are used.
 
     """
     links = robot.joint_count + 1
@@ -53,6 +52,6 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
 
 
 def lifted(robot: RobotConfig, bears_n: Floats) -> Bools:
-    """Whether each link is lifted, by the force that the ground bears; any shape."""
+    """Whether each link is lifted, from the supporting force; any shape."""
     weight_n = robot.mean_link_mass_kg * link_weights(robot) * GRAVITY_M_S2
     return np.asarray(bears_n < LIFTED_SHARE * weight_n)

@@ -1,4 +1,4 @@
-"""Thrust of a joint motion: the forward speed that the traction model predicts for it."""
+"""Thrust of a joint motion: the forward speed predicted by the traction model."""
 
 import numpy as np
 
@@ -18,8 +18,8 @@ def forward_speed_m_s(
 ) -> float:
     """Return the mean speed of the links in the direction of the body's mean heading.
 
-    The quasi-static balance of friction on a level floor gives the velocity of each link. A
-    standing wave has about 0, a body that goes backwards a negative speed.
+    The quasi-static balance of friction on a level floor gives each link's velocity. A standing
+    wave has about 0, a backward motion a negative speed.
 
     Args:
         robot: chain of links.

@@ -25,11 +25,10 @@ _LINKS = 20
 def quasi_static_gain(
     skeleton_rad: Floats, friction: FrictionConfig, links: int = _LINKS
 ) -> Floats:
-    """Gain (S,) of each shape (S, N) at the moment at which the body shows it.
+    """Gain (S,) of each shape (S, N) at the moment at which the body has it.
 
-    The angles move tailwards along the body at pulse speed u. The rigid velocity that balances the
-    friction of ``links`` links carries the body forward at ``eta_q u``. 1 is a body that never
-    slips, below 0 it goes backwards.
+    The angles move tailwards along the body at pulse speed u. Balanced friction on ``links`` links
+    moves the body forward at ``eta_q u``: 1 without slip, below 0 backwards.
     """
     shapes = np.atleast_2d(skeleton_rad)
     points = shapes.shape[-1]
@@ -46,7 +45,7 @@ def quasi_static_gain(
     turning = -at_links(np.gradient(shapes, axis=1))
     along = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     across = np.stack([-np.sin(heading), np.cos(heading)], axis=-1) * turning[..., None]
-    size = points / links  # link length in segments: the unit of length here
+    size = points / links  # link length in segments, the unit of length here
     place = -size * (np.cumsum(along, axis=1) - 0.5 * along)
     change = -size * (np.cumsum(across, axis=1) - 0.5 * across)
     velocity = rigid_velocities(place / points, heading, change / points, friction)[:, None]

@@ -1,1 +1,1 @@
-"""Motion sources: everything that moves joints, and the joins from one source to another."""
+"""Motion sources: everything that moves joints, and changes from one source to another."""

@@ -1,16 +1,16 @@
 """Joining one motion to another without a step.
 
-At the moment of the join the joints differ from the new source by an error in angle and in speed.
-The new source runs from then on, and the error dies out along a polynomial that begins with exactly
-that angle and speed: the sum is C1 whatever the two sources are. Where the sum would be too fast
-the new source starts at a slower rate, down to rest, and speeds up meanwhile:
+At the join the joints differ from the new source by an error in angle and in speed. The new source
+runs, and the error decays along a polynomial that starts with exactly that angle and speed: the sum
+is C1 for any two sources. If the sum would be too fast, the new source starts at a slower rate,
+down to rest, and speeds up meanwhile:
 
     q(t) = target(s(t)) + e(t),   s' = r0 + (1 - r0) S((x - d) / (1 - d)),   x = t / T
     e(t) = e0 + v0 B(t) - (e0 + v0 T_b / 2) P(x),   P(x) = 10 x^3 - 15 x^4 + 6 x^5
 
 with S(y) = 3 y^2 - 2 y^3, 0 below 0 and 1 above 1, and d = ``DELAY``. B brakes the error's speed
-within ``T_b``. T is the shortest for which the largest speed and acceleration that the target
-states, and those of the error, keep together within the limits.
+within ``T_b``. T is the shortest time in which target and error together keep the limits of speed
+and acceleration.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ TOLERANCE = 0.02
 """A target at its limits and the last of an error add up to a little more than a limit."""
 DELAY = 0.3
 """Share of a join before a slowed target speeds up: most of the error should be gone by then."""
-callable_in_loops(cubic)  # the loops below call them
+callable_in_loops(cubic)  # the compiled loops below call them
 callable_in_loops(cubic_slope)
 _X = np.linspace(0.0, 1.0, 25)
 _Z = np.maximum(0.0, (_X - DELAY) / (1.0 - DELAY))
@@ -51,19 +51,19 @@ _SHAPES = np.array(
 def shortest_join_s(
     rate: float, error_rad: Floats, error_rad_s: Floats, pace: Pace, limit: Pace
 ) -> tuple[float, float]:
-    """Time of a join to a target that starts at ``rate``, and of the brake of the error's speed.
+    """Return the durations of a join to a target that starts at ``rate``, and of its brake.
 
-    The brake is as long as its acceleration asks for, but at most half of the join.
+    The brake is at most half of the join.
 
     Args:
         rate: 0 to 1.
-        error_rad: (J,) that has to die out.
-        error_rad_s: (J,) how fast it grows at first.
+        error_rad: (J,) error to remove.
+        error_rad_s: (J,) its initial speed.
         pace: of the target.
         limit: of the robot.
 
     Returns:
-        one of ``DURATIONS_S``, or NaN where none is long enough; the brake, s.
+        One of ``DURATIONS_S``, or NaN if none is long enough; the brake, s.
 
     """
     brakes = (1.5 * np.abs(error_rad_s) / (BRAKE_SHARE * limit.acceleration_rad_s2)).max()
@@ -83,7 +83,7 @@ def shortest_join_s(
 def _within(
     duration: float, shapes: Floats, rate: float, brake: float, joins: Floats, limits: Floats
 ) -> bool:
-    """Whether the most that target and error can be together stays within the limits."""
+    """Whether the largest sum of target and error keeps the limits."""
     error, error_speed, speed, acceleration = joins[0], joins[1], joins[2], joins[3]
     for i in range(shapes.shape[1]):
         r = rate + (1.0 - rate) * shapes[1, i]
@@ -121,7 +121,7 @@ LONGEST_JOIN_S = (0.5, 1.0, 1.6, np.inf)
 
 @dataclass(frozen=True, slots=True)
 class Join:
-    """Numbers of one join."""
+    """Parameters of one join."""
 
     rate: float
     """r0"""
@@ -133,7 +133,7 @@ class Join:
     """(J,) v0"""
 
     def source_time_s(self, t_s: float) -> float:
-        """How far the target has gone by ``t_s``."""
+        """Time of the target's own motion at ``t_s``."""
         x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
         y = max(0.0, (x - DELAY) / (1.0 - DELAY))
         sped_up = (1.0 - self.rate) * (1.0 - DELAY) * cubic_sum(y)
@@ -166,10 +166,10 @@ class Join:
 def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limit: Pace) -> Join:
     """Choose rate and duration of a join from joints at an angle and speed (J,) to ``target``.
 
-    A joint that is faster than its limit is taken to be at it: no join could begin otherwise.
+    A speed beyond its limit is clipped: otherwise no join could begin.
 
     Raises:
-        ValueError: the target itself asks for more than ``limit``.
+        ValueError: the target itself exceeds ``limit``.
 
     """
     error = angle_rad - target.goal_rad()
@@ -186,7 +186,7 @@ def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limi
 
 
 class Blend(MotionWrapper):
-    """A motion source: a target while it is joined to the joints' motion, and afterwards."""
+    """A motion source: joins the joints' motion to a target, then follows the target."""
 
     def __init__(
         self, angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limit: Pace
@@ -194,7 +194,7 @@ class Blend(MotionWrapper):
         """Join joints at an angle and a speed (J,) to ``target``.
 
         Raises:
-            ValueError: the target itself asks for more than ``limit``.
+            ValueError: the target itself exceeds ``limit``.
 
         """
         super().__init__(target)
@@ -213,20 +213,20 @@ class Blend(MotionWrapper):
         return self.over and self.target.done
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return np.asarray(self.target.goal_rad() + self.join.error_at(self._t_s)[0])
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         rate = self.join.source_rate(self._t_s)
         return np.asarray(rate * self.target.velocity_rad_s() + self.join.error_at(self._t_s)[1])
 
     def pace(self) -> Pace:
-        """The robot's limits while it joins, and the target's own pace afterwards."""
+        """The robot's limits during the join, then the target's pace."""
         return self.target.pace() if self.over else self._limit
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         if self.over:
             return self.target.step(dt_s, view)
         before_s = self.join.source_time_s(self._t_s)

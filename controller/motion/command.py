@@ -17,14 +17,14 @@ LINE_BYTES: Final = 1 << 20
 
 
 class JointGoals(NamedTuple):
-    """Go to these angles as fast as the limits allow; joints not named keep their goals."""
+    """Move to these angles as fast as the limits allow; other joints keep their goals."""
 
     joints: Sequence[str]
     position_rad: Sequence[float]
 
 
 class JointTrajectory(NamedTuple):
-    """Go through these points at these times; joints not named stop where they are."""
+    """Pass these points at these times; other joints stop."""
 
     joints: Sequence[str]
     time_s: Floats
@@ -44,7 +44,7 @@ class StartGait(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """Go along the body and turn; a command that nobody renews ends in rest."""
+    """Move along the body and turn; without renewal the body comes to rest."""
 
     forward_m_s: float
     turn_rad_s: float
@@ -52,14 +52,14 @@ class Velocity(NamedTuple):
 
 
 class GoTo(NamedTuple):
-    """Go to a point of the ground; waypoints that are left are left out."""
+    """Go to a point of the ground; drop the remaining waypoints."""
 
     x_m: float
     y_m: float
 
 
 class HoldStill(NamedTuple):
-    """Come to rest where the joints are."""
+    """Come to rest at the present angles."""
 
 
 class Refused(NamedTuple):

@@ -1,7 +1,7 @@
-"""Joints that another program commands while they move: goals, trajectories, gaits, velocities.
+"""Joints that another program commands during a run: goals, trajectories, gaits, velocities.
 
-Whatever comes is checked whole before a joint follows it, and refused whole. From one command to
-the next the joints go on from the angles and the speeds that they have.
+A command is accepted or rejected as a whole. Between commands the joints continue from their
+present angles and speeds.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -52,12 +52,12 @@ class _Mode(Protocol):
         ...
 
     def step(self, dt_s: float, view: BodyView) -> None:
-        """Go on by ``dt_s``."""
+        """Advance by ``dt_s``."""
         ...
 
 
 class _Follow:
-    """Joints go to their goals, and stay."""
+    """Joints move to their goals and stay."""
 
     def __init__(self, now: JointsNow, limits: JointLimits) -> None:
         """Come to rest as soon as the limits allow."""
@@ -96,7 +96,7 @@ class _Follow:
 
 
 class _Through:
-    """Joints go along a spline in time."""
+    """Joints follow a spline in time."""
 
     def __init__(self, spline: PPoly, end_s: float) -> None:
         self._spline, self._end_s, self._now_s = spline, end_s, 0.0
@@ -127,7 +127,7 @@ class _BySource:
 
 
 class Commanded:
-    """A motion source that holds the pose it finds until another program commands it."""
+    """A motion source that holds the initial pose until another program commands it."""
 
     needs = Needs()
     done = False
@@ -142,17 +142,17 @@ class Commanded:
         timeout_s: float = TIMEOUT_S,
         gait: Gait | None = None,
     ) -> None:
-        """Put ``commands`` in charge of a robot.
+        """Let ``commands`` control a robot.
 
         Args:
             robot: its limits are kept.
-            joints: J names by which commands call its joints, head first.
-            commands: returns the commands since the last call, the oldest first; returns at once.
-            on_event: called with ("command", text) for an action that begins or ends, ("refused",
-                text) and ("stale", text).
-            timeout_s: after this time the joints stop on their way to goals that nobody renews, and
-                the body comes to rest if nobody renews its velocity; infinite: they never do.
-            gait: to begin with; None: hold.
+            joints: J names of its joints in commands, head first.
+            commands: returns the commands since the last call, oldest first, without waiting.
+            on_event: called with ("command", text) when an action begins or ends, ("refused", text)
+                and ("stale", text).
+            timeout_s: without renewal, joints stop on their way to goals after this time, and a
+                moving body comes to rest; infinite disables this.
+            gait: initial gait; None: hold.
 
         """
         self._robot, self._commands, self._on_event = robot, commands, on_event
@@ -172,25 +172,25 @@ class Commanded:
         self._refusals = Refusals(lambda why: on_event("refused", why))
 
     def start_at(self, joint_rad: Floats) -> None:
-        """Begin from joints at these angles (J,), held within their limits."""
+        """Start from joints at these angles (J,), clipped to their limits."""
         most = self._limits.angle_rad
         held = np.clip(joint_rad, -most, most)
         self._mode = _Follow(JointsNow(held, np.zeros(len(held))), self._limits)
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return self._mode.now().angle_rad
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         return self._mode.now().speed_rad_s
 
     def pace(self) -> Pace:
-        """The robot's limits: later commands are unknown."""
+        """The robot's limits, because later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Execute the commands that have arrived, then go on by ``dt_s``."""
+        """Execute new commands, then advance by ``dt_s``."""
         self._time_s += dt_s
         if self._first is not None:
             self._take(StartGait(self._first))
@@ -250,7 +250,7 @@ class Commanded:
             self._refusals.add(error.faults[0], self._time_s)
 
     def _follow(self) -> _Follow:
-        """Go on to the goals that the joints have, or else to a stop."""
+        """Continue to the present goals, or else stop."""
         if not isinstance(self._mode, _Follow):
             self._mode = _Follow(self._mode.now(), self._limits)
         return self._mode
@@ -300,7 +300,7 @@ class Commanded:
         return self._driven.anew()
 
     def _join(self, make: Callable[[], MotionSource], view: BodyView) -> None:
-        """Join a source where no joint leaves its range by that; else go towards its first pose."""
+        """Join a source if every joint stays in its range; else move towards its first pose."""
         tried, most_rad = self._blend(make()), self._limits.angle_rad
         first_rad = tried.target.goal_rad()
         within = (np.abs(tried.goal_rad()) <= most_rad + _REACHED_RAD).all()
@@ -317,6 +317,6 @@ class Commanded:
         follow.left_s = None
 
     def _blend(self, source: MotionSource) -> Blend:
-        """Join a source to the current motion of the joints."""
+        """Join a source to the present motion of the joints."""
         now = self._mode.now()
         return Blend(now.angle_rad, now.speed_rad_s, source, Pace.limit(self._robot))

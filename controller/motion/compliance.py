@@ -1,10 +1,10 @@
 """Shape compliance: joint goals that yield to the load on the joints, from measured current.
 
-An admittance between a motion source and the safety layer, as in M. Travers, J. Whitman,
-H. Choset, Shape-based coordination in locomotion control, IJRR 2018: shape parameters beta give way
-by ``B beta' + K beta = J^T tau``. Here the parameters are the joint angles themselves, or one
-factor on the bends of each window of the body: their two ends of coordination. Ours: no inertia
-(a current is read 50 times a second), torques in amperes, windows that stay on the body.
+An admittance between motion source and safety layer, after M. Travers, J. Whitman, H. Choset,
+Shape-based coordination in locomotion control, IJRR 2018: shape parameters beta follow ``B beta' +
+K beta = J^T tau``. Here beta is the joint angles, or one factor on the bends of each window of the
+body. Ours: no inertia (a current is read 50 times a second), torques in amperes, windows fixed to
+the body.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ _STRAIGHT_RAD = 0.1
 
 
 class Compliance:
-    """State of the admittance of one robot; steps once a cycle, after the motion source."""
+    """State of the admittance of one robot; one step per cycle, after the motion source."""
 
     def __init__(self, config: ComplianceConfig, robot: RobotConfig) -> None:
         self._config = config
@@ -32,14 +32,14 @@ class Compliance:
 
     @property
     def yield_rad(self) -> Floats:
-        """(J,) distance of the goals from those of the motion."""
+        """(J,) difference of the goals from those of the motion."""
         return self._yield_rad
 
     def step(self, goal_rad: Floats, state: JointState, dt_s: float) -> Floats:
-        """Return the goals (J,) that have yielded for ``dt_s`` to the currents in ``state``.
+        """Return goals (J,) that have yielded for ``dt_s`` to the currents in ``state``.
 
-        A joint that this cycle did not read keeps its yield: an old current moves nothing. Goals
-        inside the joints' range stay inside.
+        A joint without a reading in this cycle keeps its yield. Goals inside the joints' range stay
+        inside.
         """
         config = self._config
         excess_a = _beyond(state.current_a, config.deadband_a)
@@ -51,7 +51,7 @@ class Compliance:
             rest_rad = load_a / config.stiffness_a_rad
             wanted_rad = keep * self._yield_rad + (1.0 - keep) * rest_rad
         wanted_rad = np.clip(wanted_rad, -config.yield_limit_rad, config.yield_limit_rad)
-        # a joint at its limit does not wind up beyond it
+        # prevents wind-up beyond a joint limit
         wanted_rad = np.clip(
             wanted_rad,
             np.minimum(-self._limit_rad - goal_rad, 0.0),
@@ -63,14 +63,14 @@ class Compliance:
         return np.asarray(goal_rad + self._yield_rad)
 
     def _keep(self, dt_s: float) -> float:
-        """Share of a yield that is left after ``dt_s`` without load."""
+        """Share of a yield that remains after ``dt_s`` without load."""
         return float(np.exp(-dt_s * self._config.stiffness_a_rad / self._config.damping_a_s_rad))
 
     def _scaled(self, goal_rad: Floats, load_a: Floats, valid: Bools, dt_s: float) -> Floats:
-        """(J,) yield of windows that scale: the joint admittance, projected on the bends in each.
+        """(J,) yield of scaled windows: the joint admittance, projected on the bends in each.
 
-        With ``x = P beta`` the joints' law ``b x' + k x = load`` becomes ``P^T P (b beta' + k beta)
-        = P^T load``. Windows have no joint in common, so ``P^T P`` is a sum of squares each.
+        With ``x = P beta`` the law ``b x' + k x = load`` becomes ``P^T P (b beta' + k beta) = P^T
+        load``. Windows share no joint, so ``P^T P`` is diagonal: a sum of squares each.
         """
         bends_rad = np.where(self._yields & valid, goal_rad, 0.0)
         windows = len(self._scale)
@@ -83,15 +83,15 @@ class Compliance:
 
 
 def chatters(config: ComplianceConfig, current_gain_a_rad: float, period_s: float) -> str | None:
-    """Why an admittance would chatter against a blocked shaft, as one line; None if it does not.
+    """Return why an admittance would chatter against a blocked shaft, or None.
+
+    A blocked shaft draws ``c (goal - shaft)``. The goal then returns by ``(c + k) dt / b`` of its
+    distance from rest in a cycle, which must not exceed 1.
 
     Args:
         config: the admittance.
         current_gain_a_rad: current of a servo per radian between its goal and its shaft.
         period_s: of the control cycle.
-
-    A blocked shaft draws ``c (goal - shaft)``. A goal that yields to it by the law above goes back
-    by ``(c + k) dt / b`` of its distance from rest in a cycle, which must not be over 1.
 
     """
     least = (current_gain_a_rad + config.stiffness_a_rad) * period_s

@@ -1,4 +1,4 @@
-"""The pattern generator as a motion: it changes gait within the robot's limits, without a jump."""
+"""The pattern generator as a motion: gait changes within the robot's limits, without a jump."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -33,7 +33,7 @@ MOST_SAMPLES = 600
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A pattern to go to, and how fast."""
+    """A target pattern and its gains."""
 
     pattern: Pattern
     gain: float
@@ -43,22 +43,22 @@ class Part:
 
     @property
     def time_s(self) -> float:
-        """Until it has settled."""
+        """Time until it has settled."""
         return SETTLE / min(self.gain, self.clock_gain)
 
     def begin(self, cpg: Cpg) -> None:
-        """Make it what the oscillators go to."""
+        """Set it as the target of the oscillators."""
         cpg.set_pattern(self.pattern, self.gain, self.clock_gain)
 
 
 def quickest_change(cpg: Cpg, pattern: Pattern, limit: Pace) -> tuple[tuple[Part, ...], Pace]:
-    """Choose the fastest change that stays within the limits: each is known in closed form.
+    """Choose the fastest change that keeps the limits; each is known in closed form.
 
-    Where a wide slow gait becomes a narrow fast one, or back, amplitude times frequency would pass
-    its limits in between: then the oscillators slow down, change, and speed up again.
+    Between a wide slow gait and a narrow fast one, amplitude times frequency may exceed the limits
+    of both. Then the oscillators slow down, change, and speed up again.
 
     Returns:
-        the parts of the change, one after the other, and the largest speeds in between.
+        The parts of the change in order, and the largest values during the change.
 
     """
     start = cpg.state()
@@ -104,7 +104,7 @@ DONE_RAD, DONE_RAD_S = 0.01, 0.02
 
 @dataclass(frozen=True, slots=True)
 class GaitTransition:
-    """A change of gait, computed and ready to begin."""
+    """A computed change of gait, ready to begin."""
 
     at_s: float
     """Start, in the motion's own time."""
@@ -117,7 +117,7 @@ class GaitTransition:
 
 
 class CpgMotion:
-    """Oscillators at rest at a pose, which adopt gaits one after the other and can stop."""
+    """Oscillators that start at rest, adopt gaits one after the other, and can stop."""
 
     def __init__(self, robot: RobotConfig, joint_rad: Floats) -> None:
         """Start at rest at ``joint_rad`` (J,)."""
@@ -134,34 +134,33 @@ class CpgMotion:
 
     @property
     def done(self) -> bool:
-        """Whether it has been stopped and lies still."""
+        """Whether it has been stopped and is at rest."""
         if not self._stopping or self._scheduled:
             return False
         far = np.abs(self.goal_rad() - self.cpg.pattern.offset_rad).max()
         return bool(far < DONE_RAD and np.abs(self.velocity_rad_s()).max() < DONE_RAD_S)
 
     def become(self, gait: Gait) -> float:
-        """Adopt a gait as the target, as fast as the limits allow; returns the duration, s.
+        """Adopt a gait as fast as the limits allow; return the duration, s.
 
         Raises:
-            InputError: joints are missing, or do not bend so far; nothing changes then.
+            InputError: joints are missing, or their limits are too small; nothing changes then.
 
         """
         return self._begin(self._plan(gait))
 
     def stop(self) -> float:
-        """Come to rest at the middle of each joint's swing; returns the duration, s."""
+        """Come to rest at the middle of each joint's swing; return the duration, s."""
         return self._begin(self._plan(None))
 
     def schedule(self, changes: Sequence[tuple[float, Gait | None]]) -> float:
-        """Adopt gaits, or rest for None, at rising times from now; returns the end of the last one.
+        """Adopt gaits, or rest for None, at rising times from now; return the end of the last, s.
 
-        All is computed here: the course of the oscillators on the motion's own time is known ahead,
-        so that nothing remains to be chosen while the motion runs. A later ``become`` or ``stop``
-        cancels the rest of the schedule.
+        The oscillators' course is known ahead, so all changes are computed here. A later ``become``
+        or ``stop`` cancels the rest of the schedule.
 
         Raises:
-            InputError: joints are missing, or do not bend so far; nothing changes then.
+            InputError: joints are missing, or their limits are too small; nothing changes then.
 
         """
         twin, planned, begin_s = copy(self), [], self._now_s
@@ -175,7 +174,7 @@ class CpgMotion:
         return over_s
 
     def _plan(self, gait: Gait | None) -> GaitTransition:
-        """Plan a change from how the oscillators go now."""
+        """Plan a change from the present state of the oscillators."""
         if gait is None:
             pattern, needs = Pattern.rest(self.cpg.pattern.offset_rad), self.needs
             settled = Pace.still(self.robot.joint_count)
@@ -187,7 +186,7 @@ class CpgMotion:
         return GaitTransition(self._now_s, parts, needs, settled, under_way, stops=gait is None)
 
     def _begin(self, change: GaitTransition) -> float:
-        """Begin a change; returns its duration, s."""
+        """Begin a change; return its duration, s."""
         self._scheduled = ()
         change.parts[0].begin(self.cpg)
         self._next = change.parts[1:]
@@ -198,15 +197,15 @@ class CpgMotion:
         return self._left_s
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return self.cpg.angle_rad()
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         return self.cpg.velocity_rad_s()
 
     def pace(self) -> Pace:
-        """Largest pace of the gait, of the change under way, and of those that are scheduled."""
+        """Largest pace of the gait and of present and scheduled changes."""
         ahead = [self._settled, *(p for c in self._scheduled for p in (c.under_way, c.settled))]
         if self._left_s > 0.0:
             ahead.append(self._change)
@@ -216,11 +215,11 @@ class CpgMotion:
         )
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         return self._advance(dt_s)
 
     def _advance(self, dt_s: float) -> Floats:
-        """Go on by ``dt_s``; a change begins at its own time, whatever the lengths of the steps."""
+        """Advance by ``dt_s``; a change begins at its own time, for any length of step."""
         end_s = self._now_s + dt_s
         while True:
             due_s = self._scheduled[0].at_s if self._scheduled else np.inf

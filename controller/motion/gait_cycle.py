@@ -1,4 +1,4 @@
-"""One gait in time: its phase runs as fast as asked, or as the robot's joints can follow."""
+"""One gait in time: its phase runs at the given rate, or as fast as the joints can follow."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from snakewalk.controller.motion.source import HEADROOM, Pace
 
 
 class GaitCycle:
-    """One gait with fixed parameters, running; slowed down where its joints would be too fast."""
+    """A running gait with fixed parameters, slowed down if its joints would be too fast."""
 
     done = False
 
@@ -19,7 +19,7 @@ class GaitCycle:
         """Check the gait against the robot.
 
         Raises:
-            InputError: joints are missing, or do not bend so far.
+            InputError: joints are missing, or their limits are too small.
 
         """
         gait.check(robot)
@@ -44,11 +44,11 @@ class GaitCycle:
 
     @property
     def frequency_hz(self) -> float:
-        """Cycles a second: as asked, or what the joints can follow."""
+        """Cycles per second: the given frequency, or the largest that the joints can follow."""
         return float(self.rate_rad_s / TURN)
 
     def goal_rad(self) -> Floats:
-        """(J,) at the phase now."""
+        """(J,) joint targets at the present phase."""
         return np.asarray(self.gait.joints_rad(self._robot, np.array([self.phase_rad]))[0])
 
     def velocity_rad_s(self) -> Floats:
@@ -58,10 +58,10 @@ class GaitCycle:
         return np.asarray((after - before) / 2e-4 * self.rate_rad_s)
 
     def pace(self) -> Pace:
-        """Largest over a cycle."""
+        """Largest values over a cycle."""
         return self._pace
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Turn the phase on."""
+        """Advance the phase by ``dt_s``."""
         self.phase_rad = (self.phase_rad + dt_s * self.rate_rad_s) % TURN
         return self.goal_rad()

@@ -1,4 +1,4 @@
-"""A gait that runs, changes live and stops, within the robot's limits; and a sequence of gaits."""
+"""A running gait that changes and stops within the robot's limits; and a sequence of gaits."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from snakewalk.controller.motion.wrapper import MotionWrapper
 
 
 class GaitMotion(MotionWrapper):
-    """A gait that starts from rest, whose parameters change without a step, and that can stop."""
+    """A gait that starts from rest, changes its parameters without a step, and can stop."""
 
     def __init__(
         self,
@@ -24,10 +24,10 @@ class GaitMotion(MotionWrapper):
         phase_rad: float = 0.0,
         duration_s: float | None = None,
     ) -> None:
-        """Make it ready at ``phase_rad``; after ``duration_s`` it comes to rest by itself.
+        """Prepare at ``phase_rad``; after ``duration_s`` the motion comes to rest.
 
         Raises:
-            InputError: joints are missing, or do not bend so far.
+            InputError: joints are missing, or their limits are too small.
 
         """
         self._robot = robot
@@ -51,34 +51,34 @@ class GaitMotion(MotionWrapper):
 
     @property
     def frequency_hz(self) -> float:
-        """Cycles a second now."""
+        """Present cycles per second."""
         return self._cycle.frequency_hz * self._stop_profile.rate
 
     @property
     def done(self) -> bool:
-        """Whether it has come to rest after ``stop`` or its duration."""
+        """Whether it rests after ``stop`` or its duration."""
         return self._stop_profile.over
 
     @property
     def stopping(self) -> bool:
-        """Whether it is coming to rest, or has."""
+        """Whether it is coming to rest, or rests."""
         return self._stop_profile.begun
 
     def change(self, **values: Any) -> float:
-        """Give parameters new values, at the phase now; returns the time until they are in force.
+        """Change parameters at the present phase; return the duration of the change, s.
 
         Raises:
-            InputError: no such parameter, out of range, or beyond the joints; nothing changes then.
+            InputError: unknown parameter, out of range, or beyond the joints; nothing changes then.
 
         """
         kept = self.gait.params.model_dump()
         return self.become(type(self.gait).of(kept | values))
 
     def become(self, gait: Gait) -> float:
-        """Change to another gait at the present phase; returns the duration, s.
+        """Change to another gait at the present phase; return the duration, s.
 
         Raises:
-            InputError: joints are missing, or do not bend so far; nothing changes then.
+            InputError: joints are missing, or their limits are too small; nothing changes then.
 
         """
         cycle = GaitCycle(gait, self._robot, self.phase_rad)
@@ -91,11 +91,11 @@ class GaitMotion(MotionWrapper):
         self._stop_profile.stop()
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) present speeds of the joint targets."""
         return self._stop_profile.rate * self._switch.velocity_rad_s()
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         if self._remaining_s is not None:
             self._remaining_s -= dt_s
             if self._remaining_s <= 0.0:
@@ -109,14 +109,14 @@ class GaitSequence(MotionWrapper):
     """Runs a ``GaitMotion`` through gaits."""
 
     def __init__(self, motion: GaitMotion, changes: Sequence[tuple[float, Gait]]) -> None:
-        """Adopt gaits at rising times on the motion's own time; all suit its robot."""
+        """Adopt gaits at rising times of the motion's own time; all must suit its robot."""
         super().__init__(motion)
         self.motion = motion
         self._changes = list(changes)
         self._now_s = 0.0
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Change gait if it is time to, then go on by ``dt_s``."""
+        """Change the gait if due, then advance by ``dt_s``."""
         while self._changes and self._now_s >= self._changes[0][0] - 1e-9:
             self.motion.become(self._changes.pop(0)[1])
         self._now_s += dt_s

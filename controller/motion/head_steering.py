@@ -1,4 +1,4 @@
-"""Head steering: the neck makes up for the body's motion, so that the head keeps its direction."""
+"""Head steering: the neck compensates the body's motion, so that the head keeps its direction."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ RANGE_SHARE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class HeadTarget:
-    """Where the head points: along a heading in the world, or at a point in it."""
+    """Direction of the head: a heading in the world, or towards a point."""
 
     heading_rad: float | None = None
     point_m: tuple[float, float] | None = None
@@ -35,7 +35,7 @@ class HeadTarget:
 
 
 class HeadSteering(MotionWrapper):
-    """Another source with its first yaw joints, the neck, taken over."""
+    """Another source whose first yaw joints, the neck, are controlled here."""
 
     def __init__(
         self, source: MotionSource, robot: RobotConfig, target: HeadTarget, neck_joints: int = 2
@@ -43,7 +43,7 @@ class HeadSteering(MotionWrapper):
         """Control the first ``neck_joints`` yaw joints of ``source``.
 
         Raises:
-            InputError: the robot has no yaw joint, or lacks what the source needs.
+            InputError: the robot has no yaw joint, or lacks joints that the source needs.
 
         """
         super().__init__(source)
@@ -68,15 +68,15 @@ class HeadSteering(MotionWrapper):
         return Needs(yaw=True, pitch=needs.pitch, wheels=needs.wheels)
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return self._with_neck(self.source.goal_rad(), self._limiter.angle_rad)
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         return self._with_neck(self.source.velocity_rad_s(), self._limiter.speed_rad_s)
 
     def pace(self) -> Pace:
-        """The source's, and all that the robot allows in the neck."""
+        """The source's pace, and the robot's limits in the neck."""
         pace, limit = self.source.pace(), Pace.limit(self._robot)
         return Pace(
             self._with_neck(pace.speed_rad_s, limit.speed_rad_s[self._neck]),
@@ -84,7 +84,7 @@ class HeadSteering(MotionWrapper):
         )
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s``; the neck makes up for the heading of the link behind it."""
+        """Advance by ``dt_s``; the neck compensates the heading of the link behind it."""
         goal = self.source.step(dt_s, view)
         shoulders = float(view.headings_rad[self._neck[-1] + 1])
         if self._last_rad is not None and dt_s > 0.0:

@@ -1,7 +1,6 @@
 """Joint angles over time from another program's file, and their mapping to a robot's joints.
 
-A reader is a plug-in of the kind ``joints``: a class with ``accepts`` and ``read``
-(``docs/how-to/add-a-plug-in.md``).
+A reader is a plug-in of the kind ``joints`` (``docs/how-to/add-a-plug-in.md``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,10 +50,10 @@ class JointMotion:
 
 
 class JointReader(Protocol):
-    """Reader of a kind of file, as a plug-in of the kind ``joints`` provides it."""
+    """Reader of a kind of file, provided by a plug-in of the kind ``joints``."""
 
     def accepts(self, path: Path, head: bytes) -> bool:
-        """Whether a path is of this kind; ``head`` are its first bytes, none of a folder."""
+        """Whether a path is of this kind; ``head`` contains its first bytes, empty for a folder."""
         ...
 
     def read(self, path: Path, request: JointRequest) -> JointMotion:
@@ -68,7 +67,7 @@ class JointReader(Protocol):
 
 
 def likely_unit(angles: Floats) -> tuple[str, float]:
-    """Return the unit that angles without one probably have, and the largest of them."""
+    """Return the probable unit of angles without one, and the largest angle."""
     largest = float(np.nanmax(np.abs(angles), initial=0.0))
     return ("deg" if largest > 2.0 * np.pi else "rad"), largest
 
@@ -80,10 +79,11 @@ def joint_motion(
     joint_rad: Floats,
     notes: Sequence[str] = (),
 ) -> JointMotion:
-    """Check and clean angles (T, K): rows without a value are left out and counted.
+    """Check angles (T, K); drop and count rows without a value.
 
     Raises:
-        InputError: names repeat, times do not increase, or fewer than two rows are left.
+        InputError: too many angles, repeated names, times that do not increase, or fewer than two
+            rows.
 
     """
     twice = sorted({name for name in names if list(names).count(name) > 1})
@@ -117,15 +117,15 @@ def joint_motion(
 def onto_robot(
     motion: JointMotion, robot: RobotConfig, asked: Mapping[str, str], where: str
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Angles (T, J) in the order of a robot's joints, and lines about the mapping.
+    """Return angles (T, J) in the order of a robot's joints, and lines about the mapping.
 
-    Joints that ``asked`` names come first; then those of equal names. If no name is equal, as many
-    joints as the robot has are taken in their order.
+    ``asked`` has priority, then equal names. If no name is equal and the numbers of joints agree,
+    joints are mapped in their order.
 
     Args:
-        motion: of a file.
-        robot: whose joints move.
-        asked: name in the file of robot joints.
+        motion: from a file.
+        robot: its joints move.
+        asked: name in the file for a robot joint.
         where: name of the file in messages.
 
     Raises:

@@ -1,8 +1,7 @@
-"""A live operator as a motion source: keys change a gait's parameters, the gait itself, its rate.
+"""A live operator as a motion source: keys change a gait, its parameters and its rate.
 
-Keys come as names from a keyboard, a gamepad, the page or a test, values as ``PARAMETER=VALUE``.
-Their effects go through the same joins as any other change of motion, so an operator can never
-cause a step.
+Keys are names, from a keyboard, a gamepad, the page or a test; values are ``PARAMETER=VALUE``.
+Changes use the joins of all motion sources, so an operator cannot cause a step.
 """
 
 import math
@@ -40,7 +39,7 @@ _KEYS_MAX = 100
 
 
 class Operator(MotionWrapper):
-    """Runs a gait, and changes it by keys."""
+    """Runs a gait and changes it by keys."""
 
     def __init__(
         self,
@@ -50,17 +49,17 @@ class Operator(MotionWrapper):
         on_event: Callable[[str, str], None],
         held: Callable[[], bool] = lambda: True,
     ) -> None:
-        """Put ``keys`` in charge of ``motion``.
+        """Let ``keys`` control ``motion``.
 
         Args:
-            motion: the gait to begin with.
-            robot: for the gaits to change to.
+            motion: the first gait.
+            robot: gaits must suit it.
             keys: names of ``KEYS`` pressed since the last call, ``PARAMETER=VALUE`` and
-                ``gait=NAME``; others are ignored, and so is ``t``, which is for the owner of the
-                torque.
+                ``gait=NAME``; others are ignored, also ``t``, which the owner of the torque
+                handles.
             on_event: called with ("operator", text) for an action that was done or refused.
-            held: whether the dead man's button is held; while it is not, the body stands in its
-                shape, whatever else was pressed.
+            held: whether the dead man's button is held; otherwise the body stands in its shape,
+                whatever else is pressed.
 
         """
         super().__init__(motion)
@@ -79,15 +78,15 @@ class Operator(MotionWrapper):
         return list(self._ranges())[self._chosen]
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) present speeds of the joint targets."""
         return self._rate * self.motion.velocity_rad_s()
 
     def pace(self) -> Pace:
-        """The robot's limits: the operator's later commands are unknown."""
+        """The robot's limits, because later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Carry out the keys pressed, then go on by ``dt_s``."""
+        """Execute the pressed keys, then advance by ``dt_s``."""
         self._time_s += dt_s
         keys = list(self._keys())
         for key in keys[:_KEYS_MAX]:
@@ -129,7 +128,7 @@ class Operator(MotionWrapper):
             self._report("stop")
 
     def _assign(self, name: str, text: str) -> None:
-        """Carry out ``NAME=TEXT``."""
+        """Execute ``NAME=TEXT``."""
         if name == "gait":
             self._become(text)
             return
@@ -147,7 +146,7 @@ class Operator(MotionWrapper):
         self._set(name, getattr(self.motion.gait.params, name) + step)
 
     def _set(self, name: str, value: float) -> None:
-        """Change a parameter, to the end of its range at most."""
+        """Change a parameter, within its range."""
         span = self._ranges()[name]
         value = min(max(value, span.low), span.high)
         self._change(**{name: span.kind(round(value, 6))})

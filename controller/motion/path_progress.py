@@ -12,7 +12,7 @@ from snakewalk.controller.motion.source import MotionSource
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """Shape that a walk has chosen, and from how many."""
+    """Shape chosen by a walk, and the number of candidates."""
 
     state: int
     heading_error_rad: float
@@ -37,12 +37,12 @@ class PathProgress(Protocol):
 
     @property
     def missed(self) -> int:
-        """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
+        """Number of new paths: a waypoint was passed by, or the body was off the path or stuck."""
         ...
 
     @property
     def replanned(self) -> str | None:
-        """Why another path was laid in the last step, if one was."""
+        """Reason for a new path in the last step, or None."""
         ...
 
     @property
@@ -52,35 +52,35 @@ class PathProgress(Protocol):
 
     @property
     def pulse_m_s(self) -> float:
-        """How fast the shape travels along the body; 0 where this does not predict the speed."""
+        """Speed of the shape along the body; 0 where it does not predict the body's speed."""
         ...
 
     @property
     def decision(self) -> Decision | None:
-        """Decision of the last step, if there was one."""
+        """Decision of the last step, or None."""
         ...
 
     def path_m(self, count: int) -> Floats:
-        """(count, 2) points along the path in force."""
+        """(count, 2) points along the present path."""
         ...
 
     def begin(self, view: BodyView) -> Floats:
-        """Fit the first shape to the ground under the body; returns the first targets (J,)."""
+        """Fit the first shape to the ground under the body; return the first targets (J,)."""
         ...
 
 
 @runtime_checkable
 class OpenWaypoints(Protocol):
-    """Optional interface of a motion along a path whose waypoints are set during the run."""
+    """Optional interface of a path motion whose waypoints are set during the run."""
 
     @property
     def waypoints_m(self) -> Floats:
-        """(w, 2) in force, those reached first; another array when they change."""
+        """(w, 2) present waypoints, reached ones first; a new array after each change."""
         ...
 
 
 class NoPath:
-    """Progress of a motion that follows no path."""
+    """Progress of a motion without a path."""
 
     reached = missed = 0
     along_m = float("nan")
@@ -96,10 +96,10 @@ class NoPath:
         return np.full((count, 2), np.nan)
 
     def begin(self, view: BodyView) -> Floats:
-        """(J,) where the source begins, whatever the ground."""
+        """(J,) initial targets of the source, for any ground."""
         return self._source.goal_rad()
 
 
 def path_progress(source: MotionSource) -> PathProgress:
-    """Return the source itself where it follows a path, and ``NoPath`` elsewhere."""
+    """Return the source itself if it follows a path, else ``NoPath``."""
     return source if isinstance(source, PathProgress) else NoPath(source)

@@ -1,10 +1,10 @@
-"""A learnt policy as a file: a wave, and a small network that changes it while it runs.
+"""A learnt policy as a file: a wave, and a small network that changes it during the run.
 
-The wave is an oscillator whose phase all joints share. A policy without a network runs its wave
-unchanged, with its two feedbacks: bends against the heading's error, and reflexes to the following
-errors of the joints. After G. Bellegarda, A. Ijspeert, CPG-RL: Learning Central Pattern Generators
-for Quadruped Locomotion, IEEE Robotics and Automation Letters 7 (4), 12547-12554, 2022: actions of
-a network are the oscillators' parameters.
+The wave is an oscillator with one phase for all joints. Without a network the wave stays, with two
+feedbacks: bends against the heading's error, and reflexes to the joints' following errors. After G.
+Bellegarda, A. Ijspeert, CPG-RL: Learning Central Pattern Generators for Quadruped Locomotion, IEEE
+Robotics and Automation Letters 7 (4), 12547-12554, 2022: a network's actions are the oscillators'
+parameters.
 """
 
 import json
@@ -61,7 +61,7 @@ class PolicyWave(Strict):
 
     @classmethod
     def of(cls, values: Floats) -> Self:
-        """Return the wave of values (P,), cut at their ranges, with as many digits as a file's."""
+        """Return the wave of values (P,), clipped to their ranges and rounded as in a file."""
         held = np.clip(values, *WAVE_ENDS)
         at, fields = 0, {}
         for key, value in cls().model_dump().items():
@@ -126,10 +126,10 @@ class Policy(Strict):
         return self
 
     def check(self, robot: RobotConfig) -> None:
-        """Refuse a robot whose joints are not those that the network observes.
+        """Reject a robot whose joints differ from those that the network observes.
 
         Raises:
-            InputError: one line.
+            InputError: the joints differ.
 
         """
         if self.network and self.observation != observation_names(robot):
@@ -139,7 +139,7 @@ class Policy(Strict):
             )
 
     def toml(self) -> str:
-        """The file: TOML, numbers in six digits."""
+        """The file as TOML, numbers with six digits."""
         data = self.model_dump()
         tables = {key: data.pop(key) for key in ("origin", "wave", "network")}
         lines = [f"{key} = {json.dumps(value)}" for key, value in data.items()]
@@ -164,12 +164,12 @@ def load_policy(name_or_path: str) -> Policy:
 
 
 def save_policy(policy: Policy, path: Path) -> None:
-    """Write a policy's file."""
+    """Write a policy file."""
     path.write_text(policy.toml(), encoding="utf-8")
 
 
 def observation_names(robot: RobotConfig) -> tuple[str, ...]:
-    """Name of each number that a network observes on a robot, with its unit."""
+    """Name, with unit, of each number that a network observes on a robot."""
     kinds = ("measured", "goal")
     joints = [f"{of}_joint{k}_rad" for of in kinds for k in robot.yaw_joints]
     return ("phase_cos", "phase_sin", "heading_cos", "heading_sin", *joints)

@@ -1,8 +1,7 @@
-"""A learnt policy that runs: it observes joints and heading, and moves within the robot's limits.
+"""A running policy: it observes joints and heading, and moves within the robot's limits.
 
-All that it observes a robot has without a camera: measured angles, its own last goals, its phase,
-and a heading (of an IMU, of a pose, or by dead reckoning). So what runs is what was trained: the
-environment of the training steps this motion.
+All observations are available without a camera: measured angles, its last goals, its phase, and a
+heading (from an IMU, a pose, or dead reckoning). The training environment steps this same motion.
 """
 
 from math import cos, sin
@@ -26,17 +25,17 @@ CHANGE_S = 0.1
 
 
 class PolicyMotion:
-    """A policy on a robot; it begins with a straight body at rest."""
+    """A policy on a robot; it starts with a straight body at rest."""
 
     needs = Needs(yaw=True, wheels=True)
 
     def __init__(
         self, policy: Policy, robot: RobotConfig, *, duration_s: float = float("inf")
     ) -> None:
-        """Make it ready; after ``duration_s`` it comes to rest by itself.
+        """Prepare; after ``duration_s`` the motion comes to rest.
 
         Raises:
-            InputError: the robot lacks yaw joints, or has others than the network observes.
+            InputError: the robot lacks yaw joints, or its joints differ from those observed.
 
         """
         self.needs.check(robot, f"policy {policy.name}")
@@ -77,23 +76,23 @@ class PolicyMotion:
 
     @property
     def done(self) -> bool:
-        """Whether it has come to rest after its duration."""
+        """Whether it rests after its duration."""
         return self._stop_profile.over
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return self._of_all(self._limiter.angle_rad)
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         return self._of_all(self._stop_profile.rate * self._limiter.speed_rad_s)
 
     def pace(self) -> Pace:
-        """The robot's limits, but for the headroom."""
+        """The robot's limits times the headroom."""
         return self._pace
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Observe, and go on by ``dt_s``."""
+        """Observe, and advance by ``dt_s``."""
         self._remaining_s -= dt_s
         if self._remaining_s <= 0.0:
             self._stop_profile.stop()
@@ -107,7 +106,7 @@ class PolicyMotion:
         return self.act(np.zeros(len(self._wave)), part_s)
 
     def observe(self, view: BodyView) -> Floats:
-        """Measure the body; returns the observation of a network, as ``observation_names``."""
+        """Measure the body; return a network's observation, as ``observation_names``."""
         self._measured_rad = chain_angles_rad(self._robot, view)[self._yaw]
         self._heading_rad = view.heading_rad
         told = [cos(self._phase_rad), sin(self._phase_rad)]
@@ -115,9 +114,9 @@ class PolicyMotion:
         return np.concatenate([told, self._measured_rad, self._limiter.angle_rad])
 
     def act(self, action: Floats, dt_s: float) -> Floats:
-        """Change the wave by an action (P,), -1 to 1, and go on by ``dt_s``; returns targets (J,).
+        """Change the wave by an action (P,), -1 to 1, and advance by ``dt_s``; return targets (J,).
 
-        The wave follows the action within ``CHANGE_S``.
+        The wave follows the action with time constant ``CHANGE_S``.
         """
         target = np.clip(self._start + WAVE_SPAN * np.clip(action, -1.0, 1.0), *WAVE_ENDS)
         self._wave += (1.0 - np.exp(-dt_s / CHANGE_S)) * (target - self._wave)
@@ -137,7 +136,7 @@ class PolicyMotion:
         return self.goal_rad()
 
     def _mean_heading(self, cycles: float) -> float:
-        """Return the heading without its swing: a running mean of about a cycle."""
+        """Return the heading without its swing: a running mean over about a cycle."""
         if np.isnan(self._mean_heading_rad):
             self._mean_heading_rad = self._heading_rad
         off = (self._heading_rad - self._mean_heading_rad + np.pi) % TURN - np.pi
@@ -151,6 +150,6 @@ class PolicyMotion:
 
 
 def _hats(count: int, place: Floats) -> Floats:
-    """(count, n) weights of values at ``count`` knots from 0 to 1, interpolated at places (n,)."""
+    """(count, n) weights that interpolate values at ``count`` knots from 0 to 1 at places (n,)."""
     knots = np.linspace(0.0, 1.0, count)
     return np.array([np.interp(place, knots, row) for row in np.eye(count)])

@@ -21,9 +21,9 @@ class RateLimiter:
         self._gain = gain_per_s
 
     def step(self, dt_s: float, target_rad: Floats) -> Floats:
-        """Go on by ``dt_s`` towards ``target_rad`` (n,); returns the angles (n,).
+        """Advance by ``dt_s`` towards ``target_rad`` (n,); return the angles (n,).
 
-        The speed asked is never one from which the joint could not stop at the target.
+        The joint can always stop at the target from the requested speed.
         """
         if dt_s <= 0.0:
             return self.angle_rad

@@ -21,15 +21,16 @@ _RAMP_SAMPLES: Final = 400
 class Recorded:
     """Plays (T, J) joint angles once, from rest to rest.
 
-    The animal was not at rest when the recording began. So the clock of the playback is: it comes
-    to its rate along a quintic, and back to rest; the angles stay those of the recording.
+    A recording need not start at rest. The playback's clock ramps up to its rate along a quintic,
+    and down to rest; the angles stay those of the recording.
     """
 
     def __init__(self, robot: RobotConfig, time_s: Floats, joint_rad: Floats) -> None:
         """Spline ``joint_rad`` (T, J) over ``time_s`` (T,), T at least 2.
 
         Raises:
-            InputError: times that do not grow, another number of joints, or joints bent too far.
+            InputError: times do not increase, another number of joints, or angles beyond the
+                limits.
 
         """
         if joint_rad.shape != (len(time_s), robot.joint_count) or len(time_s) < 2:
@@ -87,20 +88,20 @@ class Recorded:
         return self._now_s >= self.duration_s
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return np.asarray(self._spline(self._place(self._now_s)[0]), dtype=float)
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         place_s, rate = self._place(self._now_s)
         return np.asarray(self._spline(place_s, 1) * rate, dtype=float)
 
     def pace(self) -> Pace:
-        """Largest of the whole recording."""
+        """Largest values of the whole recording."""
         return self._pace
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Play on by ``dt_s``; at the end it stays."""
+        """Advance by ``dt_s``, up to the end."""
         self._now_s = min(self._now_s + dt_s, self.duration_s)
         return self.goal_rad()
 
@@ -115,7 +116,7 @@ class Recorded:
         return self._start_s + (done_s if now_s <= left_s else self._length_s - done_s), rate
 
     def _ramp_acceleration_rad_s2(self) -> Floats:
-        """Largest acceleration (J,) of the joints while the clock comes to its rate or to rest."""
+        """Largest acceleration (J,) of the joints during the clock's ramps."""
         x = np.linspace(0.0, 1.0, _RAMP_SAMPLES)[:, None]
         done_s = self._ramp_s * quintic_sum(x[:, 0]) / self.slowed
         rate, growth = quintic(x) / self.slowed, quintic_slope(x) / self._ramp_s / self.slowed

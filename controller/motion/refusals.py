@@ -1,4 +1,4 @@
-"""Reports of rejected commands: one line each, and never more than a person can read."""
+"""Reports of rejected commands, limited to a readable rate."""
 
 from collections.abc import Callable
 from typing import Final
@@ -16,7 +16,7 @@ TEXT_MAX: Final = 300
 
 
 class Refusals:
-    """Passes on why commands were rejected, at a limited rate."""
+    """Passes on reasons for rejections, at a limited rate."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
@@ -40,7 +40,7 @@ class Refusals:
         self._report(text)
 
     def step(self, time_s: float) -> None:
-        """Report how many rejections were counted, once ``QUIET_S`` is over."""
+        """Report the number of counted rejections, once ``QUIET_S`` is over."""
         if self._lines and time_s - self._begin_s >= QUIET_S:
             if self._unreported:
                 self._report(f"{self._unreported} more commands were rejected")

@@ -1,4 +1,4 @@
-"""The one interface of everything that moves joints: walker, gait, recording, live operator."""
+"""The interface of everything that moves joints: walker, gait, recording, live operator."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -16,7 +16,7 @@ HEADROOM = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """Largest joint speeds: those that a source will request, or those that a robot allows."""
+    """Largest speeds and accelerations of joints, of a source or of a robot's limits."""
 
     speed_rad_s: Floats
     """(J,)"""
@@ -25,7 +25,7 @@ class Pace:
 
     @staticmethod
     def limit(robot: RobotConfig) -> "Pace":
-        """Return what a plan may ask of ``robot``."""
+        """Return the limits of ``robot`` for plans."""
         ones = np.ones(robot.joint_count)
         return Pace(
             robot.joint_speed_limit_rad_s * ones, robot.joint_acceleration_limit_rad_s2 * ones
@@ -33,14 +33,14 @@ class Pace:
 
     @staticmethod
     def still(joints: int) -> "Pace":
-        """Return the pace of joints that do not move."""
+        """Return the pace of joints at rest."""
         return Pace(np.zeros(joints), np.zeros(joints))
 
 
 class MotionSource(Protocol):
-    """Joint targets with time. A source keeps within the robot's limits by itself.
+    """Joint targets over time, within the robot's limits.
 
-    ``step`` with a shorter time is the same motion at a slower rate: joins and derating use that.
+    A ``step`` with a shorter time is the same motion at a slower rate; joins and derating use that.
     """
 
     @property
@@ -50,37 +50,37 @@ class MotionSource(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether it has come to its end and rests."""
+        """Whether it has ended and rests."""
         ...
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         ...
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) their present speeds."""
         ...
 
     def pace(self) -> Pace:
-        """How fast they will move at most, from now on."""
+        """Largest speeds and accelerations from now on."""
         ...
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` (0 or more) and return the new targets (J,)."""
+        """Advance by ``dt_s`` (0 or more) and return the new targets (J,)."""
         ...
 
 
 @runtime_checkable
 class StartsAnywhere(Protocol):
-    """A ``MotionSource`` may offer this, too: it begins where the joints are found."""
+    """Optional interface of a ``MotionSource`` that starts at the measured angles."""
 
     def start_at(self, joint_rad: Floats) -> None:
-        """Start at the angles (J,) that were measured before the first cycle."""
+        """Start at the angles (J,) measured before the first cycle."""
         ...
 
 
 class Hold:
-    """Joints that stay where they are."""
+    """Joints that stay at given angles."""
 
     needs = Needs()
     done = True
@@ -89,7 +89,7 @@ class Hold:
         self._joint_rad = np.array(joint_rad, dtype=float)
 
     def goal_rad(self) -> Floats:
-        """(J,) as given."""
+        """(J,) the given angles."""
         return self._joint_rad
 
     def velocity_rad_s(self) -> Floats:
@@ -97,9 +97,9 @@ class Hold:
         return np.zeros(len(self._joint_rad))
 
     def pace(self) -> Pace:
-        """None."""
+        """Zero speeds and accelerations."""
         return Pace.still(len(self._joint_rad))
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Stay."""
+        """Return the given angles."""
         return self._joint_rad

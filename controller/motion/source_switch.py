@@ -1,4 +1,4 @@
-"""Source switch: a motion source that changes from one source to another while it runs."""
+"""Source switch: a motion source that changes from one source to another during a run."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from snakewalk.controller.motion.wrapper import MotionWrapper
 
 
 class SourceSwitch(MotionWrapper):
-    """Begins at rest where its first source begins; ``join`` changes the source, C1."""
+    """Starts at rest at its first source; ``join`` changes the source, C1."""
 
     def __init__(self, robot: RobotConfig, first: MotionSource) -> None:
         first.needs.check(robot, "this motion")
@@ -28,15 +28,15 @@ class SourceSwitch(MotionWrapper):
 
     @property
     def blending(self) -> bool:
-        """Whether a join is under way."""
+        """Whether a join is in progress."""
         return not self._blend.over
 
     def join(self, source: MotionSource) -> float:
-        """Hand over to ``source``; returns the duration of the join, s.
+        """Change to ``source``; return the duration of the join, s.
 
         Raises:
             InputError: the robot lacks joints that it needs.
-            ValueError: it asks for more than the robot's limits.
+            ValueError: it exceeds the robot's limits.
 
         """
         source.needs.check(self._robot, "this motion")
@@ -45,5 +45,5 @@ class SourceSwitch(MotionWrapper):
         return blend.join.duration_s
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         return self._blend.step(dt_s, view)

@@ -1,6 +1,6 @@
-"""Stop profile: a motion comes to rest where it is, because its own time slows down to a stop.
+"""Stop profile: a motion comes to rest in its present shape, because its own time slows down.
 
-It goes on from there, or from half-way, as it slowed down.
+It can resume from rest, or during the stop, along the same profile.
 """
 
 from snakewalk.controller.kinematics.smoothstep import cubic
@@ -42,11 +42,11 @@ class StopProfile:
             self._since_stop_s = 0.0
 
     def go_on(self) -> None:
-        """Come back to full rate from now on."""
+        """Return to full rate from now on."""
         self._goes_on = self._since_stop_s is not None
 
     def step(self, dt_s: float) -> float:
-        """Go on by ``dt_s``; returns by how much the motion goes on."""
+        """Advance by ``dt_s``; return the advance of the motion's own time, s."""
         if self._since_stop_s is None:
             return dt_s
         before = self.rate

@@ -1,4 +1,4 @@
-"""Points in time that another program wants joints to go through: checked whole, then splined."""
+"""Timed points for joints from another program: checked as a whole, then splined."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class JointLimits:
 
     @staticmethod
     def of(robot: RobotConfig, names: Sequence[str]) -> "JointLimits":
-        """Return those of a robot whose joints commands call ``names``."""
+        """Return the limits of a robot whose joints have ``names`` in commands."""
         return JointLimits(
             tuple(names),
             robot.name,
@@ -58,10 +58,10 @@ class JointLimits:
         )
 
     def numbers(self, names: Sequence[str], what: str) -> JointNumbers:
-        """(K,) numbers of the joints named; ``joint0`` is accepted for the joint next to the head.
+        """(K,) numbers of the named joints; ``joint0`` also names the joint next to the head.
 
         Raises:
-            InputError: the name is missing, a joint is named twice, or a name is unknown.
+            InputError: there are no names, or one is repeated or unknown.
 
         """
         if not names:
@@ -84,7 +84,7 @@ class JointLimits:
         return np.array(joints, dtype=np.intp)
 
     def check_angles(self, angle_rad: Floats, joints: JointNumbers, what: str) -> None:
-        """Reject angles (N, K) that are not numbers, or that the joints (K,) cannot reach.
+        """Reject angles (N, K) that are not numbers, or beyond the limits of the joints (K,).
 
         Raises:
             InputError: names the first.
@@ -104,13 +104,13 @@ class JointLimits:
 def spline_through(
     trajectory: JointTrajectory, now: JointsNow, limits: JointLimits
 ) -> tuple[PPoly, float]:
-    """Spline from the present motion of the joints through the points; returns it, and its end, s.
+    """Return a spline from the joints' present motion through the points, and its end, s.
 
-    Positions alone make a cubic spline that ends at rest; with velocities it is a cubic, and with
-    accelerations a quintic from point to point.
+    Positions alone give a cubic spline that ends at rest; velocities give a cubic, accelerations a
+    quintic, from point to point.
 
     Raises:
-        InputError: points that make no trajectory, or one beyond a limit of the joints.
+        InputError: the points are malformed, or the spline exceeds a limit.
 
     """
     joints = limits.numbers(trajectory.joints, "trajectory")
@@ -124,7 +124,7 @@ def spline_through(
 
 
 def _checked(given: JointTrajectory) -> JointTrajectory:
-    """The same as arrays, if they are of one shape, finite, and in order of time."""
+    """Return it as arrays, if shapes agree, values are finite and times increase."""
     time_s = np.asarray(given.time_s, dtype=float)
     values = [None if v is None else np.asarray(v, dtype=float) for v in given[2:]]
     shape = (len(time_s), len(given.joints))
@@ -149,7 +149,7 @@ def _checked(given: JointTrajectory) -> JointTrajectory:
 
 
 def _without_first(given: JointTrajectory, angle_rad: Floats) -> JointTrajectory:
-    """Leave out a first point at 0 s, where the joints named are (K,)."""
+    """Drop a first point at 0 s, if the named joints (K,) are there."""
     if len(given.time_s) == 1:
         raise InputError("trajectory: its only point is at 0 s; say by when it is to be reached")
     away = np.abs(given.position_rad[0] - angle_rad)
@@ -163,7 +163,7 @@ def _without_first(given: JointTrajectory, angle_rad: Floats) -> JointTrajectory
 
 
 def _spline(given: JointTrajectory, joints: JointNumbers, now: JointsNow) -> PPoly:
-    """All joints from now on through the points."""
+    """Spline of all joints from now through the points."""
     knots_s = np.concatenate([[0.0], given.time_s])
     still = np.zeros(len(now.angle_rad))
 
@@ -184,10 +184,10 @@ def _spline(given: JointTrajectory, joints: JointNumbers, now: JointsNow) -> PPo
 
 
 def _quintics(h_s: Floats, q: Floats, v: Floats, a: Floats) -> Floats:
-    """(6, N, J) coefficients, highest first, of the quintics of (N, 1) long pieces.
+    """(6, N, J) coefficients, highest first, of quintics on pieces of length (N, 1).
 
-    They have the values, speeds and accelerations (N + 1, J) at both ends: ``scipy``'s
-    ``BPoly.from_derivatives`` makes the same in a hundred times the time.
+    They match values, speeds and accelerations (N + 1, J) at both ends. ``scipy``'s
+    ``BPoly.from_derivatives`` is a hundred times slower.
     """
     q0, v0, a0 = q[:-1], v[:-1] * h_s, a[:-1] * h_s**2
     q1 = q[1:] - q0 - v0 - 0.5 * a0
@@ -214,7 +214,7 @@ def _most(spline: PPoly, order: int) -> Floats:
 
 
 def _check_spline(spline: PPoly, limits: JointLimits) -> None:
-    """Refuse what bends, moves or accelerates more than a joint may, between the points too."""
+    """Reject a spline that exceeds a limit of angle, speed or acceleration."""
     for order, most, what, unit in (
         (0, limits.angle_rad, "bends to", "rad"),
         (1, limits.speed_rad_s, "moves at", "rad/s"),

@@ -1,4 +1,4 @@
-"""A gait that turns by one of its parameters, and the rate at which it may turn."""
+"""A gait with a turn parameter, and the rate at which the turn may change."""
 
 from typing import Final
 
@@ -15,13 +15,13 @@ TURN_PER_S2: Final = 1.0
 
 
 def turned(gait: Gait, key: str, turn: float) -> Gait:
-    """Return a gait whose parameter ``key`` is a turn, positive to the left."""
+    """Return the gait with parameter ``key`` set to a turn, positive to the left."""
     turn = -turn if gait.params.mirror else turn
     return type(gait)(gait.params.model_copy(update={key: turn}))
 
 
 def rate_beside_turn(gait: Gait, key: str, robot: RobotConfig, pace: Pace) -> float:
-    """Return the share of the gait's rate at which the joints can change the turn, too."""
+    """Return the share of the gait's rate that leaves the joints room to change the turn."""
     phases = np.linspace(0.0, TURN, CYCLE_SAMPLES)
     bent = turned(gait, key, 1.0).joints_rad(robot, phases) - gait.joints_rad(robot, phases)
     reach_rad = float(np.abs(bent).max())  # of a joint, for a turn of 1

@@ -1,9 +1,9 @@
 """A gait whose rate and bend follow commanded velocities of the body.
 
-A serpenoid body that does not slip sideways goes along itself by one wavelength in a cycle, and
-on an arc of the bend of its axis. So the rate of the phase follows the speed, the bend of the
-axis is rate of turn times length over speed, and a negative rate goes backward. Slip makes the
-body slower than commanded: speeds are not controlled by the pose.
+A serpenoid body without side slip advances by one wavelength per cycle, on an arc with the bend of
+its axis. The rate of the phase therefore follows the speed; the bend is turn rate times length over
+speed; a negative rate moves backward. Slip makes the body slower than commanded: there is no
+feedback of the pose.
 """
 
 import math
@@ -39,12 +39,12 @@ _KEY: Final = "turn_rad"
 
 
 class VelocityGait:
-    """A ``MotionSource`` that begins at rest; it moves when a velocity is commanded."""
+    """A ``MotionSource`` that starts at rest and moves when a velocity is commanded."""
 
     done = False
 
     def __init__(self, gait: Gait, robot: RobotConfig) -> None:
-        """Make it ready at phase 0, at rest.
+        """Prepare at phase 0, at rest.
 
         Raises:
             InputError: the gait follows no velocity, or bends joints beyond their limits.
@@ -77,16 +77,16 @@ class VelocityGait:
 
     @property
     def needs(self) -> Needs:
-        """The gait's needs."""
+        """Requirements of the gait."""
         return self._gait.needs
 
     @property
     def rests(self) -> bool:
-        """Whether the body is at rest and is to stay so."""
+        """Whether the body is at rest and will stay so."""
         return self._share == 0.0 and abs(float(self._rate.angle_rad[0])) < _AT_REST
 
     def follow(self, forward_m_s: float, turn_rad_s: float) -> None:
-        """Go along the body at a speed, and turn at a rate, positive to the left.
+        """Move along the body at a speed, and turn at a rate, positive to the left.
 
         Raises:
             InputError: a value is not a number, or the gait does not reach it.
@@ -109,7 +109,7 @@ class VelocityGait:
             self._bend_rad = turn_rad_s * length_m / forward_m_s
 
     def anew(self) -> "VelocityGait":
-        """Return one at rest that follows the same velocity."""
+        """Return a copy at rest with the same commanded velocity."""
         fresh = copy(self)
         fresh._bend = RateLimiter(np.zeros(1), TURN_RATE_PER_S, TURN_PER_S2)
         fresh._rate = RateLimiter(np.zeros(1), _RATE_PER_S, _RATE_PER_S2)
@@ -117,11 +117,11 @@ class VelocityGait:
         return fresh
 
     def stop(self) -> None:
-        """Come to rest in the shape that the body then has."""
+        """Come to rest in the shape at that time."""
         self._share = 0.0
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return self._joints_rad(self._phase_rad, float(self._bend.angle_rad[0]))
 
     def velocity_rad_s(self) -> Floats:
@@ -135,11 +135,11 @@ class VelocityGait:
         return np.asarray((after - before) / (2.0 * half_s))
 
     def pace(self) -> Pace:
-        """Return the pace at full speed, while rate and bend change."""
+        """Return the pace at full speed with changing rate and bend."""
         return self._pace
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
-        """Go on by ``dt_s`` and return the new targets (J,)."""
+        """Advance by ``dt_s`` and return the new targets (J,)."""
         before = float(self._rate.angle_rad[0])
         self._rate.step(dt_s, np.array([self._share]))
         self._bend.step(dt_s, np.array([self._bend_rad]))

@@ -1,4 +1,4 @@
-"""Base class of motion sources that move joints by another source."""
+"""Base class of motion sources that wrap another source."""
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.gaits.gait import Needs
@@ -6,9 +6,9 @@ from snakewalk.controller.motion.source import MotionSource, Pace
 
 
 class MotionWrapper:
-    """Part of a ``MotionSource`` that passes on what another source reports.
+    """Part of a ``MotionSource`` that delegates to another source.
 
-    A subclass provides ``step``, and overrides the methods in which it differs from the source.
+    A subclass provides ``step``, and overrides the methods in which it differs.
     """
 
     def __init__(self, wrapped: MotionSource) -> None:
@@ -22,15 +22,15 @@ class MotionWrapper:
 
     @property
     def done(self) -> bool:
-        """Whether the source has come to its end and rests."""
+        """Whether the source has ended and rests."""
         return self.wrapped.done
 
     def goal_rad(self) -> Floats:
-        """(J,) joint targets now."""
+        """(J,) present joint targets."""
         return self.wrapped.goal_rad()
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) speeds of the joint targets now."""
+        """(J,) their present speeds."""
         return self.wrapped.velocity_rad_s()
 
     def pace(self) -> Pace:

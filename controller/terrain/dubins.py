@@ -43,7 +43,7 @@ class DubinsCurves:
 
     @property
     def length_m(self) -> Floats:
-        """Lengths (n, 8) of the curves."""
+        """(n, 8) lengths of the curves."""
         return np.asarray(self.pieces_m.sum(axis=-1))
 
     def position(self, goal: int, kind: int, s_m: ArrayLike) -> Floats:

@@ -131,7 +131,7 @@ class _Knowledge:
         """
         graph, relief = self.cautious.graph, self.cautious.relief
         if graph is None or relief is None or not len(graph.nodes_m):
-            return points  # the planner has the words for it
+            return points  # the planner reports this
         near = np.hypot(*(graph.nodes_m - points[0]).T) <= within_m
         found, reach_m = [points[0]], _REACH_M
         for point in points[1:]:
