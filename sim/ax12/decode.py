@@ -95,7 +95,7 @@ class Decoder1:
         )
 
     def _outcome(self, error: int) -> str:
-        alarms = [each.name.lower().replace("_", " ") for each in self.errors if error & each]
+        alarms = [str(each.name).lower().replace("_", " ") for each in self.errors if error & each]
         return ", ".join(alarms) or "ok"
 
     def _decode(self, cell: RegisterRow, data: bytes) -> int:
