@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
+import scipy  # scipy.interpolate loads when it is first used
 from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.archive import read_arrays
@@ -210,5 +210,5 @@ def _refined(z: Floats, refine: int) -> Floats:
     rows, columns = np.arange(z.shape[0]), np.arange(z.shape[1])
     fine_rows = np.linspace(0, rows[-1], rows[-1] * refine + 1)
     fine_columns = np.linspace(0, columns[-1], columns[-1] * refine + 1)
-    spline = RectBivariateSpline(rows, columns, z)
+    spline = scipy.interpolate.RectBivariateSpline(rows, columns, z)
     return np.asarray(spline(fine_rows, fine_columns), dtype=float)

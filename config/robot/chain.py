@@ -201,7 +201,8 @@ class RobotConfig(JointValues):
             if formats != (first.protocol, first.byte_order, first.sync_read):
                 raise ValueError(
                     f"servo: {first.model} speaks {protocol_name(first)} and {model} "
-                    f"{protocol_name(facts)} or other words: one chain has servos of one series"
+                    f"{protocol_name(facts)} or other words: one chain has servos of one series; "
+                    "describe each make as a robot of its own"
                 )
             if facts.protocol == 1:
                 raise ValueError(

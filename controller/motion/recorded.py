@@ -3,7 +3,7 @@
 from typing import Final
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy  # scipy.interpolate loads when it is first used
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -40,7 +40,7 @@ class Recorded:
             )
         if not (np.diff(time_s) > 0.0).all():
             raise InputError("the times of a recording must grow")
-        self._spline = CubicSpline(time_s, joint_rad, bc_type="natural")
+        self._spline = scipy.interpolate.CubicSpline(time_s, joint_rad, bc_type="natural")
         fine = np.linspace(time_s[0], time_s[-1], 8 * len(time_s))
         reach, limit = np.abs(self._spline(fine)).max(axis=0), np.array(robot.limit_rad)
         if (reach > limit).any():

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, Self, get_args
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
+import scipy  # scipy.interpolate loads when it is first used
 from scipy.ndimage import distance_transform_edt, map_coordinates
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import cg
@@ -124,7 +124,7 @@ class ElevationMap:
         y = np.arange(high) * spacing_m / dy_m
         whole = z_m if known.all() else filled(z_m, ~known)
         order = min(3, rows - 1), min(3, columns - 1)
-        spline = RectBivariateSpline(
+        spline = scipy.interpolate.RectBivariateSpline(
             np.arange(rows), np.arange(columns), whole, kx=order[0], ky=order[1]
         )
         fine = np.asarray(spline(y, x), dtype=float)

@@ -3,8 +3,8 @@
 from typing import Self
 
 import numpy as np
+import scipy  # scipy.interpolate loads when it is first used
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -30,7 +30,7 @@ class SplinePath:
         if len(points) < 2:
             raise InputError("a path needs two different points: the start and a waypoint")
         chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        spline = CubicSpline(chord, points, bc_type="natural")
+        spline = scipy.interpolate.CubicSpline(chord, points, bc_type="natural")
         self._tabulate(spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1))))
 
     @classmethod

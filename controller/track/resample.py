@@ -1,7 +1,7 @@
 """Resampling to equal arc lengths: a midline becomes 100 segments and tangent angles."""
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy  # scipy.interpolate loads when it is first used
 
 from snakewalk.config.arrays import Floats
 
@@ -25,7 +25,7 @@ def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
         raise ValueError("a body needs 4 distinct points")
     kept = points[distinct]
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(kept, axis=0).T))])
-    spline = make_interp_spline(at, kept)
+    spline = scipy.interpolate.make_interp_spline(at, kept)
     fine = np.linspace(0.0, at[-1], segments * _FINE + 1)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))])
     equal = np.interp(np.linspace(0.0, arc[-1], segments + 1), arc, fine)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy  # scipy.interpolate loads when it is first used
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
@@ -237,7 +237,9 @@ def _between(
         low, high = np.ceil(at_s[0] * rate_hz - 1e-9), np.floor(at_s[-1] * rate_hz + 1e-9)
         grid = np.arange(int(low), int(high) + 1)
         even_s = np.clip(grid / rate_hz, at_s[0], at_s[-1])
-        bodies.append(make_interp_spline(at_s, points[own], k=min(3, len(own) - 1))(even_s))
+        bodies.append(
+            scipy.interpolate.make_interp_spline(at_s, points[own], k=min(3, len(own) - 1))(even_s)
+        )
         numbers.append(grid)
         middle = 0.5 * (at_s[1:] + at_s[:-1])
         nearest.append(own[np.searchsorted(middle, even_s)])

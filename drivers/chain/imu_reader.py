@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy  # scipy.spatial loads when it is first used
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import ImuConfig
@@ -23,7 +23,9 @@ class ImuReader:
     def __init__(self, bus: ChainBus, config: ImuConfig) -> None:
         self._bus, self._config, self._port = bus, config, bus.port_of(config.id)
         self._cycle = bus.device_block(config.id, IMU_TABLES[config.model].address, BLOCK_BYTES)
-        in_link = Rotation.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
+        in_link = scipy.spatial.transform.Rotation.from_euler(
+            "xyz", config.mounting_deg, degrees=True
+        ).as_matrix()
         self._to_link: Floats = np.asarray(in_link)
         self._filter = AttitudeFilter()
         self._measured_at_s = -np.inf

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy  # scipy.interpolate loads when it is first used
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
@@ -227,7 +227,7 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
     out = places.copy()
     for k in np.flatnonzero(able):
         seen = ~lost[k]
-        curve = CubicSpline(along[seen], places[k, seen])
+        curve = scipy.interpolate.CubicSpline(along[seen], places[k, seen])
         out[k, lost[k]] = curve(along[lost[k]])
         if lost[k, 0]:
             out[k, 0] = _beyond(out[k, 1], out[k, 2], out[k, 3], usual[0])
