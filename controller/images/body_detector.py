@@ -139,8 +139,9 @@ def make_detector(
     """Choose the background of a scene from a few frames spread over the recording.
 
     The default is the median of the frames. It shows the animal itself if the animal hardly moves
-    or the camera follows it. Another ground is used if more frames then agree on the body's length:
-    the median of frames with the animal painted out, a quantile of each pixel's values, or a ground
+    or the camera follows it. Another ground is used if more frames then agree on the body's
+    length. It is the median of frames with the animal painted out, a quantile of each pixel's
+    values, or a ground
     estimated in each frame alone.
 
     Args:

@@ -1,7 +1,8 @@
 """Equal chords along a curve: ``N`` consecutive points on it, first at A, last at B ([PT] 2.3).
 
 The order of methods: steepest descent on the chord ([PT] Algorithm 1, corrected in the errata);
-bisection if it does not settle; chords that end at a later crossing of their circle; the path of
+bisection if it does not settle. Then come chords that end at a later crossing of their circle;
+the path of
 the existence proof (``chord_path``). A curve without a solution is an error, never an unequal
 partition.
 """

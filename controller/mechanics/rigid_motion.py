@@ -2,7 +2,7 @@
 
 Without inertia the ground's forces and moment sum to zero. With the Coulomb ellipse this is the
 minimum of the dissipated power, which is convex, so Newton's method finds it. On a slope gravity's
-power, linear in the velocity, is subtracted; there is no minimum if the slope exceeds friction.
+power, linear in the velocity, is subtracted; a minimum is missing if the slope exceeds friction.
 """
 
 import numpy as np
@@ -213,7 +213,8 @@ def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
     They contain the derivatives of each link's velocity along and across itself by (vx, vy, omega),
-    the contribution of the change of shape to both, and the lower triangle of the product of the
+    the contribution of the change of shape to both. They also contain the lower triangle of the
+    product of the
     first rows with their transpose.
     """
     for group in range(len(table) // rows):

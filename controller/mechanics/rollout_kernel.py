@@ -307,7 +307,7 @@ def write_result(
 def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
     """Return the earlier piece with the longest equal beginning (or -1), and its samples.
 
-    Of equal lengths the first is returned, because its common part is known.
+    If lengths are equal, the first is returned, because its common part is known.
     """
     best, longest = -1, -1
     for other in range(piece):
@@ -373,7 +373,8 @@ def roll_pieces(
         waypoint: (3,) the next waypoint, and its index on the path.
         cruise: preferred segments per second.
         drift: (3,) added to each step.
-        states: (P, steps + 1, 11) of each piece before each step, and at its end: position (2) and
+        states: (P, steps + 1, 11) of each piece before each step, and at its end. The numbers are
+        position (2) and
             turn, index on the path, distance from it, sum of squared distances, time, velocity (3),
             and smallest squared distance from the waypoint.
         movings: (P, steps + 1, m) velocities of the links, stored like ``states``.

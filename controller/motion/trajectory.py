@@ -61,7 +61,7 @@ class JointLimits:
         """(K,) numbers of the named joints; ``joint0`` also names the joint next to the head.
 
         Raises:
-            InputError: there are no names, or one is repeated or unknown.
+            InputError: names are missing, repeated or unknown.
 
         """
         if not names:

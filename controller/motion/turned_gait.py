@@ -21,7 +21,7 @@ def turned(gait: Gait, key: str, turn: float) -> Gait:
 
 
 def rate_beside_turn(gait: Gait, key: str, robot: RobotConfig, pace: Pace) -> float:
-    """Return the share of the gait's rate that leaves the joints room to change the turn."""
+    """Return the share of the gait's rate that lets the joints change the turn, too."""
     phases = np.linspace(0.0, TURN, CYCLE_SAMPLES)
     bent = turned(gait, key, 1.0).joints_rad(robot, phases) - gait.joints_rad(robot, phases)
     reach_rad = float(np.abs(bent).max())  # of a joint, for a turn of 1

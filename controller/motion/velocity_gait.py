@@ -2,8 +2,8 @@
 
 A serpenoid body without side slip advances by one wavelength per cycle, on an arc with the bend of
 its axis. The rate of the phase therefore follows the speed; the bend is turn rate times length over
-speed; a negative rate moves backward. Slip makes the body slower than commanded: there is no
-feedback of the pose.
+speed; a negative rate moves backward. Slip makes the body slower than commanded: the pose is not
+fed back.
 """
 
 import math

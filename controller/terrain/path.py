@@ -91,7 +91,7 @@ class SplinePath:
     def first_pass(self, point_m: ArrayLike, from_s_m: float = 0.0) -> float:
         """Arc length, at ``from_s_m`` or later, of the first closest approach to a point.
 
-        Of passes that differ by less than a centimetre the first counts: a lap may end where it
+        If passes differ by less than a centimetre, the first counts: a lap may end where it
         began.
         """
         low = min(int(np.searchsorted(self._s, from_s_m - 1e-9)), len(self._s) - 1)
