@@ -22,7 +22,7 @@ IN_THE_TREE = {
     "add-a-gait": 1,
     "add-a-command": 1,
     "add-a-fault-kind": 2,
-    "add-a-measured-quantity": 6,
+    "add-a-measured-quantity": 7,
 }
 """Files that each extension touches."""
 OUTSIDE = ("add-a-motion-source", "add-a-pose-source")

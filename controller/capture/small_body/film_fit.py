@@ -168,7 +168,8 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
 
     The profile across the body shows where a body ends below the noise or the blur. A length that
     all frames share is wrong alike in all of them, so the median over the frames counts. It is
-    fitted to the pixels of both tips, so only a body that goes on beyond them counts.
+    fitted to the pixels of both tips, so only a body that goes on beyond them counts. For bodies
+    without a shared length, the noise of one frame's profile is larger than its tips' error.
 
     Args:
         film: the fitted film, the same end first in all frames.
@@ -189,13 +190,13 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
         return film
     beyond = np.array([beyond_tips_px(out[k].points_px, ends_px[k]) for k in known])
     usual = np.median(beyond, axis=0)
-    for k, own in zip(known, beyond, strict=True):
-        if film.body is not None:
-            tips = tips_error_px(np.maximum(usual, 0.0))
-            expected[k] = np.hypot(expected[k], tips)
-        else:
-            tips = tips_error_px(np.where(np.abs(own) > np.abs(usual), own, usual))
-            expected[k] = np.hypot(_WITHOUT_TIPS * expected[k], tips)
+    share = 1.0
+    if film.body is None:
+        share, tips = _WITHOUT_TIPS, tips_error_px(usual)
+    else:
+        tips = tips_error_px(np.maximum(usual, 0.0))
+    for k in known:
+        expected[k] = np.hypot(share * expected[k], tips)
         out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
     return replace(film, skeletons=tuple(out), expected_px=expected)
 

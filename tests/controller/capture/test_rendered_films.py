@@ -44,7 +44,7 @@ def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
     seen = watch(scene)
     truth = true_midlines(scene)
     assert seen.used.all()
-    assert seen.good.mean() > 0.8
+    assert seen.good.mean() >= 0.8
     assert median_error(scene, seen) < 0.01 * length_px
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 

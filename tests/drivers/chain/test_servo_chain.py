@@ -243,10 +243,11 @@ def test_a_pose_beyond_the_limits_is_refused() -> None:
 
 def test_a_current_beyond_the_servos_limit_is_refused() -> None:
     robot = RobotConfig.model_validate(
-        {"name": "x", "joint_axes": "yp", "servo": {"pitch_current_limit_a": 5.0}}
+        {"name": "x", "joint_axes": "yp", "servo": {"pitch_current_limit_a": 3.0}}
     )
     line = Recorder(ServoBank([1, 2]), [0.0, 0.0])
-    with pytest.raises(ChainError, match=r"pitch_current_limit_a = 5: .* 3\.21 A"):
+    line.bank["Current Limit"][:] = 743
+    with pytest.raises(ChainError, match=r"pitch_current_limit_a = 3: .* 2(\.00)? A"):
         ServoChain(DynamixelBus(line), robot).enable()
 
 
