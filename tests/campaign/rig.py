@@ -152,14 +152,14 @@ class ChangeWatch:
         self.lines.clear()
 
     def _look_for_cold_sensors(self, valid: np.ndarray) -> None:
-        """Count temperatures that read 0: each joint is reported once."""
+        """Count temperatures that read 0: the sensor of each joint is reported once."""
         rows = rows_by_id(self._bank)
         if rows is None:
             return
         is_cold = valid & (self._bank["Present Temperature"][rows] == 0)
         self._cold = {joint: count for joint, count in self._cold.items() if is_cold[joint]}
         for joint in set(np.flatnonzero(is_cold).tolist()) - self._cold_reported:
-            if any(f"{ROBOT.joint_label(joint)}: temperature reads 0" in x for x in self.reports):
+            if any(f"{ROBOT.joint_label(joint)}: temperature " in x for x in self.reports):
                 self._cold_reported.add(joint)
                 self.noticed += 1
                 continue
@@ -357,7 +357,7 @@ class Rig:
         now = self.line.bank["Goal Position"]
         later = self._joints(np.zeros_like(limp) if before is None else now != before)
         self.witness.raced += int((far & limp & later).sum())
-        self._sin("beyond_limit", far & limp & ~later)
+        self._sin("beyond_limit", far & limp & ~later & ~self._is_faked("Present Position"))
 
     def _check_goals(self, time_s: float, raw: np.ndarray) -> None:
         goal = self._units.position_rad(raw)
