@@ -44,6 +44,11 @@ class JointValues(LinkValues):
         return tuple(known[name] for name in self.servo_models)
 
     @property
+    def is_feetech(self) -> bool:
+        """Whether the servos speak Feetech's protocol; those of a chain all do, or none."""
+        return self.servo_records[0].protocol == "feetech"
+
+    @property
     def records_by_model(self) -> dict[str, ServoModel]:
         """Record of each model in the chain, in the order of the servos.
 

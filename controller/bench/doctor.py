@@ -94,7 +94,7 @@ def examine(
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    measured = _FEETECH_MEASURED if is_feetech(robot) else _MEASURED
+    measured = _FEETECH_MEASURED if robot.is_feetech else _MEASURED
     reads = [bus.probe(i, measured) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
     if noise is not None:
@@ -130,11 +130,6 @@ def examine(
     return findings
 
 
-def is_feetech(robot: RobotConfig) -> bool:
-    """Whether the robot's servos speak Feetech's protocol."""
-    return robot.servo_records[0].protocol == "feetech"
-
-
 def _find(
     port: BytePort, robot: RobotConfig, expected: Sequence[int], latency_s: float
 ) -> tuple[DynamixelBus, Collection[int]]:
@@ -143,7 +138,7 @@ def _find(
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
     for servo_id in [*pinged, *expected][:_TIMED]:
-        if is_feetech(robot):
+        if robot.is_feetech:
             timed = bus.probe(servo_id)
         else:
             timed = probe(port, servo_id, _TIMED, patience_s)
@@ -201,7 +196,7 @@ def _servo_findings(
     noise: Finding | None,
 ) -> list[Finding]:
     return [
-        *([] if is_feetech(robot) else [servos.firmware(reports)]),
+        *([] if robot.is_feetech else [servos.firmware(reports)]),
         servos.return_delay(reports),
         servos.alarms(reports, robot),
         servos.torque(reports),

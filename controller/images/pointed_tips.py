@@ -4,12 +4,17 @@ The contrast summed across the body is its width times its contrast, at any blur
 this profile, extrapolated, reaches 0.
 """
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.images.cross_profile import (
+    arc_lengths,
+    end_direction,
+    even_line,
+    seen_across,
+)
 
 _STEP_PX = 0.5
 _LOW, _HIGH = 0.06, 0.12  # of the usual width: this part of the profile is extrapolated
@@ -38,12 +43,10 @@ def to_pointed_tips(line: Floats, level: NDArray[np.float32], wide: float, scale
         scale: pixels of ``level`` per pixel of the image.
 
     """
-    steps = np.hypot(*np.diff(line, axis=0).T)
-    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    arc = arc_lengths(line)
     if arc[-1] < 4.0 * wide:
         return line
-    at = np.arange(0.0, arc[-1], _STEP_PX)
-    even = np.column_stack([np.interp(at, arc, column) for column in line.T])
+    even = even_line(line, arc, _STEP_PX)
     for _ in range(2):
         even = _lengthened(even, level, wide, scale)[::-1]
     return np.asarray(even)
@@ -53,8 +56,7 @@ def _lengthened(line: Floats, level: NDArray[np.float32], wide: float, scale: fl
     """Extend the last end of a line of equal steps to the tip."""
     count = len(line)
     back = max(2, round(_AHEAD * wide / _STEP_PX))
-    ahead = line[-1] - line[-1 - back]
-    ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)
+    ahead = end_direction(line, back)
     beyond = np.arange(1, round(_BEYOND * wide / _STEP_PX) + 1)[:, None] * _STEP_PX * ahead
     usual = float(np.median(_sums(line, level, wide)[slice(*(round(v * count) for v in _USUAL))]))
     end = min(round(_BEFORE * wide / _STEP_PX), count - back)
@@ -87,11 +89,8 @@ def _crossing(sums: Floats, share: float) -> float | None:
 
 def _sums(path: Floats, level: NDArray[np.float32], wide: float) -> Floats:
     """(P,) contrast summed across the path, less that of the ground on both sides."""
-    along = np.gradient(path, axis=0)
-    side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
     reach = round(_ACROSS * wide)
     across = np.arange(-reach, reach + 1.0)
-    x, y = np.moveaxis(path[:, None] + across[:, None] * side[:, None], -1, 0).astype(np.float32)
-    seen = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+    seen = seen_across(path, level, across)
     ground = np.median(seen[:, np.abs(across) > _RIM * wide])
     return np.asarray((seen - ground).sum(axis=1), dtype=float)

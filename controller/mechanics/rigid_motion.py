@@ -212,10 +212,9 @@ def _wrench(points_m: Floats, force: Floats) -> Floats:
 def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
-    They contain the derivatives of each link's velocity along and across itself by (vx, vy, omega),
-    the contribution of the change of shape to both. They also contain the lower triangle of the
-    product of the
-    first rows with their transpose.
+    They contain the derivatives of each link's velocity along and across itself by (vx, vy, omega)
+    and the contribution of the change of shape to both. They also contain the lower triangle of the
+    product of the first rows with their transpose.
     """
     for group in range(len(table) // rows):
         link = table[group * rows : (group + 1) * rows]

@@ -113,7 +113,7 @@ def find_servos(
             "share it, or the line is bad; connect one alone and give it another ID: snakewalk "
             "bus set --new-id"
         )
-    return {each: found[each] for each in sorted(found)}
+    return dict(sorted(found.items()))
 
 
 def _models(bus: DynamixelBus) -> dict[int, str]:
@@ -195,9 +195,7 @@ def calibrate(
     if journal is None:
         journal = Journal(CalibrationProgress(joint_axes=like.joint_axes))
     on_progress("search for servos")
-    servos = find_servos(
-        port, latency_s, like.joint_count, feetech=like.servo_records[0].protocol == "feetech"
-    )
+    servos = find_servos(port, latency_s, like.joint_count, feetech=like.is_feetech)
     journal.known.check_servos(servos, "--resume")
     unknown = unknown_chain(like, servos, current_a)
     bench = CalibrationBench(port, unknown, latency_s, stop_requested, on_progress)

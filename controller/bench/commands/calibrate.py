@@ -98,8 +98,7 @@ def calibrate(
         if (
             backup is not None and not keeps_backup
         ):  # before anything is written: a start writes EEPROM, too
-            feetech = like.servo_records[0].protocol == "feetech"
-            chain_calibration.find_servos(line, line.latency_s, feetech=feetech)
+            chain_calibration.find_servos(line, line.latency_s, feetech=like.is_feetech)
             _write(backup, backup_text(back_up(line, line.latency_s)))
         found = chain_calibration.calibrate(
             line,

@@ -6,12 +6,17 @@ contrast, or below the noise, before it ends. The profile is continued in a stra
 
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.images.cross_profile import (
+    arc_lengths,
+    end_direction,
+    even_line,
+    seen_across,
+)
 
 _HIGH, _LOW = 0.3, 0.06  # of the usual sum: between these the profile falls as it goes on to 0
 _MOST_LOW = 0.2
@@ -49,9 +54,7 @@ def profile_ends(
     """
     wide = max(2.0 * float(np.median(radius_px)), 1.5)
     step = max(_FINEST_PX, wide / _STEPS)
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    at = np.arange(0.0, arc[-1], step)
-    even = np.column_stack([np.interp(at, arc, column) for column in line.T])
+    even = even_line(line, arc_lengths(line), step)
     first, last = (round(v * len(even)) for v in _USUAL)
     usual = 0.0
     if last - first > 2:
@@ -92,8 +95,7 @@ def _end(
 ) -> Floats:
     """Where the profile of a line of equal steps comes to 0, less a round tip, and the doubt."""
     back = min(max(2, round(max(0.5 * wide, 3.0) / step)), len(line) - 1)
-    ahead = line[-1] - line[-1 - back]
-    ahead = ahead / max(float(np.hypot(*ahead)), 1e-9)
+    ahead = end_direction(line, back)
     reach = min(max(_BEYOND * wide, _LEAST_BEYOND_PX), 0.25 * step * len(line) + _LEAST_BEYOND_PX)
     beyond = np.arange(1, round(reach / step) + 1)[:, None] * step * ahead
     end = min(round(_INSIDE * wide / step), len(line) - 1)
@@ -121,13 +123,9 @@ def _crossing(profile: Floats, share: float) -> float:
 
 def _sums(path: Floats, level: NDArray[np.float32], wide: float, step: float) -> Floats:
     """(P,) contrast summed across the path, less that of the ground on both sides."""
-    along = np.gradient(path, axis=0)
-    side = np.column_stack([-along[:, 1], along[:, 0]])
-    side = side / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
     reach = _ACROSS * wide + _ACROSS_PX
     across = np.arange(-reach, reach + 0.5 * step, step)
-    x, y = np.moveaxis(path[:, None] + across[:, None] * side[:, None], -1, 0).astype(np.float32)
-    seen = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    seen = seen_across(path, level, across)
     rim = seen[:, np.abs(across) > _RIM * reach]
     # contrast below 0 is cut off, so the median of the noise is below its mean
     ground = np.minimum(rim, np.percentile(rim, _CALM)).mean()
