@@ -30,6 +30,8 @@ napoleon_numpy_docstring = False
 html_theme = "furo"
 html_title = "snakewalk"
 html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 
 PAGES = Path(__file__).parent
 
