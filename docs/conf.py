@@ -27,6 +27,7 @@ autodoc_member_order = "bysource"
 autodoc_default_options = {"exclude-members": "model_config, model_post_init"}
 napoleon_numpy_docstring = False
 
+highlight_language = "bash"  # of blocks that name no language
 html_theme = "furo"
 html_title = "snakewalk"
 html_show_sphinx = False
