@@ -1,4 +1,4 @@
-"""The robot's IMU: whether it answers, and whether what it shows can be."""
+"""The robot's IMU: whether it answers, and whether its readings are possible."""
 
 import numpy as np
 

@@ -123,7 +123,7 @@ class SafePool(ProcessPoolExecutor):
 def _starting() -> Iterator[None]:
     """Give children started in this block a safe module path and a blocked SIGINT.
 
-    A terminal sends Ctrl-C to all processes; this one decides what the children do.
+    A terminal sends Ctrl-C to all processes; the parent decides how its children end.
     """
     with _LOCK:
         before = dict(os.environ)

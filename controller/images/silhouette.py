@@ -43,7 +43,7 @@ class Silhouette:
     """x, y of the cut-out's first pixel in the image."""
     area_px: float
     distractors: float
-    """Area of the next largest object that stands out, over this body's; noise and dirt count."""
+    """Area of the next largest visible object over this body's; noise and dirt count."""
     status: FrameStatus
 
     @property

@@ -1,8 +1,8 @@
 """A snake of simulated servos as a Gymnasium environment: a step is a control cycle on the bus.
 
-Everything between the action and the physics is what a run has: the safety link vets the goals, the
-chain turns them into packets, simulated servos answer on a simulated line. A policy that has learnt
-here has met clamps, wire time, quantised readings and servo lag.
+Everything between the action and the physics equals that of a run: the safety link vets the goals,
+the chain turns them into packets, and simulated servos answer on a simulated line. A learnt policy
+has met clamps, wire time, quantised readings and servo lag.
 """
 
 from collections.abc import Callable, Sequence

@@ -42,7 +42,7 @@ class SummarizedBattery:
 
 @dataclass(frozen=True, slots=True)
 class SummarizedFriction:
-    """Friction under the body: that of the world's file, and what the run found."""
+    """Friction under the body: the values of the world file, and those that the run estimated."""
 
     along_file: float
     across_file: float

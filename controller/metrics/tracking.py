@@ -1,4 +1,4 @@
-"""How well the servos follow: error and lag between what was sent and what was measured."""
+"""How well the servos follow: error and lag between sent goals and measured positions."""
 
 from typing import Final
 

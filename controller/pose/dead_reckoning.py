@@ -1,7 +1,7 @@
 """A pose from the joints, and the attitude of an IMU where the robot has one.
 
 The way is what friction makes of the measured shape change, integrated. It drifts: it is too coarse
-to reach waypoints with. It is what is left where nothing measures the pose, so that a run on metal
+to reach waypoints with. It is used where nothing measures the pose, so that a run on metal
 can be watched and its log compared. An IMU adds which way is up, which does not drift, and the
 heading, which drifts with the bias of its gyro instead of with the ground.
 """

@@ -94,7 +94,7 @@ class RouteMotion(MotionWrapper):
             run.waypoint_radius_m,
             replan=prepared.replan,
         )
-        """Chooses the actions, and keeps what was predicted and measured."""
+        """Chooses the actions, and keeps the predicted and measured motion."""
         self._names = [segment.name for segment in prepared.repertoire.segments]
         self._path_m = route.pose[:, :2]
         self._on_event = on_event

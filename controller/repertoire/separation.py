@@ -150,7 +150,7 @@ def _apart(box, i, j):  # type: ignore[no-untyped-def]
 def _stop(  # type: ignore[no-untyped-def]
     points, old, scale, radius, known, blocker, met
 ):  # fmt: skip
-    """Write into ``blocker`` who has to return; those of ``known`` have returned already."""
+    """Write into ``blocker`` the bodies that have to return; those of ``known`` have returned."""
     box = _boxes(points, scale, radius)
     last = len(radius) - 1.0
     for i in range(len(points)):

@@ -34,7 +34,7 @@ class RosLink(WatcherProcess):
         self.domain = int(self.said["domain"])
 
     def commands(self) -> list[Command]:
-        """Return what has been commanded since the last call; returns at once."""
+        """Return the commands since the last call; never waits."""
         return [_decoded(line) for line in self._end.commands()]
 
     def waypoint_commands(self) -> list[str | Refused]:

@@ -29,7 +29,7 @@ class RosOptions:
     """Commands with an older stamp are refused."""
 
     def environ(self, given: Mapping[str, str]) -> dict[str, str]:
-        """Return what the environment of the node's process has in addition."""
+        """Return the additional environment variables of the node's process."""
         if self.network:
             return {_RANGE: "SUBNET"}
         return {} if any(given.get(name) for name in _SAYS_WHERE) else {_RANGE: "LOCALHOST"}

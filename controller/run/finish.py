@@ -1,4 +1,4 @@
-"""The end of a command that ran something: report, film, and what is printed."""
+"""The end of a command that ran something: report, film and printed result."""
 
 import platform
 import shlex

@@ -88,7 +88,7 @@ class Hands:
 def open_hands(
     stack: ExitStack, live: bool, gamepad: Path | None, page: PageControls | None
 ) -> Hands | None:
-    """Open what an operator has in hand, and say what it does; None without an operator."""
+    """Open the operator's devices and print their functions; None without an operator."""
     if not live and gamepad is None:
         return None
     devices: list[Keyboard | Gamepad | PageControls] = []

@@ -26,7 +26,7 @@ class PageControls(Watcher, OffersStop, Protocol):
         ...
 
     def pressed(self) -> list[str]:
-        """Return what was set in the page since the last call."""
+        """Return the settings that the page changed since the last call."""
         ...
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
@@ -43,7 +43,7 @@ class OffersWaypoints(Protocol):
     """An observer that commands the waypoints of a live run."""
 
     def waypoint_commands(self) -> list[str | Refused]:
-        """Return what was commanded since the last call, as ``LiveCourse`` accepts it."""
+        """Return the commands since the last call, as ``LiveCourse`` accepts them."""
         ...
 
 
@@ -79,7 +79,7 @@ class Watchers:
         return [why for each in self._with_stop for why in each.rejected()]
 
     def waypoint_commands(self) -> list[str | Refused]:
-        """Return what was commanded of the waypoints since the last call."""
+        """Return the commands for waypoints since the last call."""
         commands: list[str | Refused] = [] if self.page is None else [*self.page.pressed()]
         for each in self._with_waypoints:
             commands += each.waypoint_commands()

@@ -28,7 +28,7 @@ class SlipMonitor:
     def __init__(
         self, length_m: float, gain: float, fraction: float, pose_sd_m: float = 0.0
     ) -> None:
-        """Set what is expected.
+        """Set the expected speed.
 
         Args:
             length_m: body length; a window closes when the shape has travelled so far.

@@ -46,7 +46,7 @@ class ComparedRun:
 
 
 def compared_run(record: RunRecord, name: str) -> ComparedRun:
-    """Keep of a record what is compared."""
+    """Return the compared parts of a record."""
     header, pose, cycle = record.header, record.pose, record.cycle
     settings: dict[str, Any] = {"bus": header.backend, "software": header.software}
     for table, config in (("run", header.run), ("robot", header.robot), ("world", header.world)):

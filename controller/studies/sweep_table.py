@@ -177,7 +177,7 @@ def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
 
 
 def pace(row: dict[str, str]) -> float:
-    """How fast the gait does what it is there for: m/s over ground or upwards, rad/s turned."""
+    """Pace of the gait in its purpose: m/s over ground or upwards, or rad/s turned."""
     aim = GAITS[row["gait"]].aim
     if aim == "turn":
         return abs(number(row, "turn_rad_cycle")) * number(row, "ran_hz")

@@ -43,7 +43,7 @@ class Task:
 
 
 def pace(row: Measurement, task: Task) -> float:
-    """How fast it does what it is there for, m/s or rad/s; 0 where it did not run to its end."""
+    """Pace of the gait in its purpose, m/s or rad/s; 0 if it did not run to its end."""
     if row.ended != "ran to its end" or row.speed_m_s is None:
         return 0.0
     if task.goal == "turn":

@@ -85,7 +85,7 @@ class Dashboard:
                 each.visible = False
 
     def show_picture(self, jpeg: bytes) -> None:
-        """Show what the run's camera saw; the first makes the tab."""
+        """Show the image of the run's camera; the first image makes the tab."""
         import cv2  # noqa: PLC0415  an extra, which a run with a camera has
 
         picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)

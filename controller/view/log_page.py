@@ -121,7 +121,7 @@ class LogPage:
         self._play.label = "pause  (Space)" if self.playing else "play  (Space)"
 
     def step(self, dt_s: float, now_s: float) -> None:
-        """Go on by ``dt_s`` of real time and draw what has changed."""
+        """Advance by ``dt_s`` of real time and draw the changes."""
         if abs(self._slider.value - self.time_s) > 0.02:  # a user has moved it
             self.time_s = float(self._slider.value)
         elif self.playing:

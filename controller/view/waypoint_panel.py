@@ -49,7 +49,7 @@ class WaypointPanel:
         return found
 
     def show(self, kind: str, text: str) -> None:
-        """Show what the run made of a click: an event of its log."""
+        """Show the event of the log that answers a click."""
         if kind in ("operator", "refused"):
             self._show(text, _BAD if kind == "refused" else "inherit")
 

@@ -25,7 +25,7 @@ _SHOWN = 1.2
 
 @dataclass(frozen=True, slots=True)
 class AnimalBody:
-    """An animal's parts on its bones, and what they wear."""
+    """An animal's parts on its bones, and their skins."""
 
     rig: Rig
     texture: Image | None

@@ -52,7 +52,7 @@ class Cut:
 
 @dataclass(frozen=True, slots=True)
 class BodySkin:
-    """A skin and what it wears."""
+    """A skin and its texture."""
 
     name: str
     skin: Skin

@@ -31,7 +31,7 @@ FILM_SEGMENTS = 5
 
 @dataclass(frozen=True, slots=True)
 class SynthesisSkin:
-    """A skin of the robot's size, and what it wears."""
+    """A skin of the robot's size, and its texture."""
 
     dressed: BodySkin
     skin: Skin

@@ -1,4 +1,4 @@
-"""``snakewalk doctor``: is this bus fit for a run, and what is to be done if not."""
+"""``snakewalk doctor``: name the faults of a bus and their remedies before a run."""
 
 import json
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""``snakewalk camera check``: whether the camera above the robot sees what a run needs."""
+"""``snakewalk camera check``: whether the overhead camera sees everything that a run needs."""
 
 from contextlib import ExitStack
 from math import isnan

@@ -35,7 +35,7 @@ def import_robot(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a robot's file from a URDF or MuJoCo model; report what was dropped or changed."""
+    """Make a robot's file from a URDF or MuJoCo model; report dropped and changed parts."""
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:

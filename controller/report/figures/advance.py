@@ -1,4 +1,4 @@
-"""How fast it went against what was predicted, and how far from the path."""
+"""Measured and predicted speed, and the distance from the path."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""Joint angles over time as three maps: asked, measured, and what is left between them."""
+"""Joint angles over time as three maps: goals, measured angles, and their difference."""
 
 import numpy as np
 from matplotlib.figure import Figure

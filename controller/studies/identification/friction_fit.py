@@ -56,7 +56,7 @@ _PRIOR: Final = 1.5
 _COMMON: Final = 0.05
 """The same of the torque for a current of all servos alike: their data sheet's tolerance (ours)."""
 _STEP: Final = 0.1
-"""By which logarithms are changed to see what they do (ours)."""
+"""Change of the logarithms for a numerical derivative (ours)."""
 _MOST: Final = 0.7
 """Longest step of a logarithm: a factor of two (ours)."""
 _ALONE, _TOGETHER = 4, 2

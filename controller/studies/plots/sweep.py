@@ -1,4 +1,4 @@
-"""A sweep as a picture: for each gait, how far a cycle carries against what it costs."""
+"""A sweep as a picture: for each gait, cost of transport over pace."""
 
 from pathlib import Path
 

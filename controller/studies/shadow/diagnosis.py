@@ -205,7 +205,7 @@ class Constants:
             return np.repeat(values, sizes)
 
         self.step = of_each(0.25, 0.5 * mass_kg, 0.3, 0.1)
-        """By which each is changed to see what it does."""
+        """Change of each value for a numerical derivative."""
         self.healthy = of_each(0.1, 0.03 * mass_kg, 0.05, 0.01)
         """Standard deviation among robots and grounds that are well (ours)."""
         self.faulty = of_each(0.5, 0.1 * mass_kg / 0.11, 0.5, 0.2)
@@ -223,7 +223,7 @@ class Constants:
             first += count
 
     def deviation(self, values: Floats) -> Deviation:
-        """Return what a vector means."""
+        """Return the differences that a vector describes."""
         load_kg, weakness, slip_rad = np.split(values[2:], np.cumsum([self._links, self._joints]))
         return Deviation(
             along=max(1.0 + values[0], 0.05),
