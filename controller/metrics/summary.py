@@ -78,7 +78,7 @@ class RunSummary:
     waypoints_reached: int | None
     """Waypoints that the centre of mass came to, in order; None where the pose is dead-reckoned,
     as for every distance, speed and cost below: ``dead_reckoned_*`` has their counterparts."""
-    waypoints_counted: int
+    waypoints_counted: int | None
     """Waypoints that the run itself counted."""
     waypoint_times_s: tuple[float, ...] | None
     """Since torque on."""
@@ -166,6 +166,7 @@ class RunSummary:
     assumptions: dict[str, dict[str, object]]
     """Values that nothing measured, by name: ``value``, ``kind`` and ``source``."""
     dead_reckoned_waypoints_reached: int | None = None
+    dead_reckoned_waypoints_counted: int | None = None
     dead_reckoned_waypoint_times_s: tuple[float, ...] | None = None
     dead_reckoned_travelled_m: float | None = None
     dead_reckoned_path_error_mean_m: float | None = None
@@ -193,6 +194,7 @@ class RunSummary:
 
 _OF_THE_POSE = (
     "waypoints_reached",
+    "waypoints_counted",
     "waypoint_times_s",
     "travelled_m",
     "path_error_mean_m",

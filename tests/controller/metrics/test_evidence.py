@@ -37,6 +37,7 @@ def with_evidence(record: RunRecord, evidence: PoseEvidence) -> RunRecord:
 def test_the_numbers_of_the_pose_are_those_that_issue_from_it() -> None:
     assert {
         "waypoints_reached",
+        "waypoints_counted",
         "waypoint_times_s",
         "travelled_m",
         "path_error_mean_m",
