@@ -50,7 +50,8 @@ class PlacedPose:
         """Return the position (3,) at the time of another pose, moved by the joints alone."""
         x, y = other.odometry_m - self.odometry_m
         c, s = np.cos(turn_rad), np.sin(turn_rad)
-        return self.position_m + np.array([c * x - s * y, s * x + c * y, 0.0])
+        moved_m: Floats = self.position_m + np.array([c * x - s * y, s * x + c * y, 0.0])
+        return moved_m
 
 
 class Relocated(NamedTuple):
