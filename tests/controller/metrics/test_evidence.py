@@ -109,4 +109,9 @@ def test_a_run_states_its_evidence(
         page = (folder / "report.html").read_text(encoding="utf-8")
         assert "fair outcome" in page
         assert "believes it reached 1 of 1 waypoint" in page
-    assert read_log(folder / "log.mcap").header.pose_evidence.source == source
+    record = read_log(folder / "log.mcap")
+    assert record.header.pose_evidence.source == source
+    claims = [event.text for event in record.events if event.kind in ("waypoint", "stop")]
+    assert len(claims) == 2
+    for claim in claims:
+        assert claim.endswith("(dead reckoning)") == believed, claim
