@@ -300,17 +300,24 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
         battery=_battery(record),
-        **_evidence(header),
+        **_evidence(record),
     )
 
 
-def _evidence(header: Header) -> dict[str, Any]:
-    """Return the fields of a summary about pose, port and assumptions."""
+def _evidence(record: RunRecord) -> dict[str, Any]:
+    """Return the fields of a summary about pose, port and assumptions.
+
+    The uncertainty is the one that the source states, or the median of the one it measured.
+    """
+    header, measured = record.header, record.pose_source
+    stated = header.pose_evidence
+    position_m = _median(measured.position_sd_m) if stated.is_measured else None
+    heading_rad = _median(measured.heading_sd_rad) if stated.is_measured else None
     return {
-        "pose_evidence": str(header.pose_evidence.kind),
-        "pose_source": header.pose_evidence.source,
-        "pose_position_sd_m": header.pose_evidence.position_m,
-        "pose_heading_sd_rad": header.pose_evidence.heading_rad,
+        "pose_evidence": str(stated.kind),
+        "pose_source": stated.source,
+        "pose_position_sd_m": position_m if stated.position_m is None else stated.position_m,
+        "pose_heading_sd_rad": heading_rad if stated.heading_rad is None else stated.heading_rad,
         "pose_is_simulated": header.initial_pose is not None,
         "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
         "assumptions": _assumptions(header),
@@ -393,6 +400,11 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
 def _mean(values: Floats) -> float:
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
+
+
+def _median(values: Floats) -> float | None:
+    known = values[np.isfinite(values)]
+    return _digits(float(np.median(known))) if known.size else None
 
 
 def _peak(values: Floats) -> float:
