@@ -7,7 +7,7 @@ given in a drifting frame, whose place in the world each image updates.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -101,6 +101,21 @@ class CameraPose:
         if self._sigma_m:
             facts["head_sigma_median_m"] = round(float(np.median(self._sigma_m)), 4)
         return facts
+
+    def row(self) -> dict[str, Any]:
+        """Return a row of the log about the newest frame that was used; it has its own time."""
+        now_s, nothing = self._history[-1].time_s, float("nan")
+        fixed_s = nothing if self._fixed_s is None else self._fixed_s
+        variance = np.full((3, 3), nothing) if self.covariance is None else self.covariance
+        return {
+            "age_s": now_s - fixed_s,
+            "position_sd_m": float(np.sqrt(0.5 * variance[:2, :2].trace())),
+            "heading_sd_rad": float(np.sqrt(variance[2, 2])),
+            "latency_s": 0.0,
+            "sequence": self.used - 1,
+            "arrival_s": nothing,
+            "fault": "",
+        }
 
     def __call__(self, state: JointState) -> BodyPose:
         """Advance to the state's time, and process arrived frames."""

@@ -15,6 +15,7 @@ from snakewalk.controller.cameras.device_camera import DeviceCamera
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.run.pose_provider import PoseContext, PoseProvider
 from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
+from snakewalk.controller.runtime.pose_hold import PoseHealth
 
 if TYPE_CHECKING:
     from snakewalk.controller.cameras.rendered_camera import RenderedCamera
@@ -75,7 +76,8 @@ class OverheadCameraPose:
             distortion = device.detector.model.distortion
             if distortion is not None:
                 context.on_event("camera", str(distortion))
-            yield PoseProvider(measure, measure.facts)
+            always_believed = PoseHealth(lambda: None, 0.0, measure.row)
+            yield PoseProvider(measure, measure.facts, always_believed)
 
 
 def _camera(context: PoseContext) -> "RenderedCamera | DeviceCamera":

@@ -78,7 +78,7 @@ class RunSummary:
     waypoints_reached: int | None
     """Waypoints that the centre of mass came to, in order; None where the pose is dead-reckoned,
     as for every distance, speed and cost below: ``dead_reckoned_*`` has their counterparts."""
-    waypoints_counted: int
+    waypoints_counted: int | None
     """Waypoints that the run itself counted."""
     waypoint_times_s: tuple[float, ...] | None
     """Since torque on."""
@@ -166,6 +166,7 @@ class RunSummary:
     assumptions: dict[str, dict[str, object]]
     """Values that nothing measured, by name: ``value``, ``kind`` and ``source``."""
     dead_reckoned_waypoints_reached: int | None = None
+    dead_reckoned_waypoints_counted: int | None = None
     dead_reckoned_waypoint_times_s: tuple[float, ...] | None = None
     dead_reckoned_travelled_m: float | None = None
     dead_reckoned_path_error_mean_m: float | None = None
@@ -193,6 +194,7 @@ class RunSummary:
 
 _OF_THE_POSE = (
     "waypoints_reached",
+    "waypoints_counted",
     "waypoint_times_s",
     "travelled_m",
     "path_error_mean_m",
@@ -298,17 +300,24 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         state_library=dict(header.plan.states or {}),
         friction_found=_friction(record),
         battery=_battery(record),
-        **_evidence(header),
+        **_evidence(record),
     )
 
 
-def _evidence(header: Header) -> dict[str, Any]:
-    """Return the fields of a summary about pose, port and assumptions."""
+def _evidence(record: RunRecord) -> dict[str, Any]:
+    """Return the fields of a summary about pose, port and assumptions.
+
+    The uncertainty is the one that the source states, or the median of the one it measured.
+    """
+    header, measured = record.header, record.pose_source
+    stated = header.pose_evidence
+    position_m = _median(measured.position_sd_m) if stated.is_measured else None
+    heading_rad = _median(measured.heading_sd_rad) if stated.is_measured else None
     return {
-        "pose_evidence": str(header.pose_evidence.kind),
-        "pose_source": header.pose_evidence.source,
-        "pose_position_sd_m": header.pose_evidence.position_m,
-        "pose_heading_sd_rad": header.pose_evidence.heading_rad,
+        "pose_evidence": str(stated.kind),
+        "pose_source": stated.source,
+        "pose_position_sd_m": position_m if stated.position_m is None else stated.position_m,
+        "pose_heading_sd_rad": heading_rad if stated.heading_rad is None else stated.heading_rad,
         "pose_is_simulated": header.initial_pose is not None,
         "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
         "assumptions": _assumptions(header),
@@ -391,6 +400,11 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
 def _mean(values: Floats) -> float:
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
+
+
+def _median(values: Floats) -> float | None:
+    known = values[np.isfinite(values)]
+    return _digits(float(np.median(known))) if known.size else None
 
 
 def _peak(values: Floats) -> float:

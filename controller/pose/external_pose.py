@@ -17,6 +17,7 @@ from snakewalk.controller.pose.latency import LatencyEstimate
 from snakewalk.controller.pose.motion_check import MotionCheck
 from snakewalk.controller.pose.motion_history import Moment, MotionHistory
 from snakewalk.controller.pose.pose_filter import PoseFilter
+from snakewalk.controller.pose.relocation import PlacedPose, Relocation
 from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, UnusablePoseError
 from snakewalk.controller.pose.sender_clock import SenderClock
 from snakewalk.controller.pose.tracked_body import HeadMeasurement, TrackedBody
@@ -48,6 +49,8 @@ class MeasuredHeads(NamedTuple):
     """Time of the newest joint state."""
     heads: list[TimedHead]
     """Poses that were used since the last call; none before the delay of the source is known."""
+    has_slid: bool = False
+    """Whether the body moved without its joints since the last call."""
 
 
 class ExternalPose:
@@ -71,6 +74,7 @@ class ExternalPose:
         self._history = MotionHistory(robot.joint_count)
         self._filter = PoseFilter(robot)
         self._clock, self._check = SenderClock(), MotionCheck()
+        self._relocation, self._has_slid = Relocation(), False
         self._latency = LatencyEstimate(config.latency_s)
         self._sender: str | None = None
         self._frame = config.frame
@@ -82,8 +86,11 @@ class ExternalPose:
         self._used: PoseSample | None = None
         self._reason = ""
         self._reported: dict[str, float] = {}
-        self.counts = dict.fromkeys(("poses", "used", "lost", "rejected", "restarts"), 0)
-        """Poses that arrived, that were used, that never arrived, that were rejected."""
+        self.counts = dict.fromkeys(
+            ("poses", "used", "lost", "rejected", "restarts", "relocations"), 0
+        )
+        """Poses that arrived, that were used, that never arrived, that were rejected; restarts of
+        the sender; and slides after which poses were used again."""
 
     def keep(self, early: list[ArrivedPose]) -> None:
         """Accept poses that arrived before the first joint state."""
@@ -114,9 +121,10 @@ class ExternalPose:
 
     def take_measured(self) -> MeasuredHeads:
         """Return the measurements since the last call."""
-        heads = list(self._measured)
+        heads, has_slid = list(self._measured), self._has_slid
         self._measured.clear()
-        return MeasuredHeads(self._now_s, heads)
+        self._has_slid = False
+        return MeasuredHeads(self._now_s, heads, has_slid)
 
     def facts(self) -> dict[str, float | int]:
         """Return numbers for the log and for a command's answer."""
@@ -177,17 +185,36 @@ class ExternalPose:
             self._reject("contradiction", self._check.fault)
             return
         off = self._filter.innovation(measured, then)
-        if self._filter.is_placed and off.is_jump:
+        placed = _placed(measured, then, self._filter.turn_rad(measured, then))
+        if not self._filter.is_placed or not off.is_jump:
+            self._filter.update(measured, then, off)
+        elif not self._has_relocated(placed):
             self._reject(
                 "jump",
                 f"jump by {off.distance_m:.2f} m and {np.degrees(off.angle_rad):.0f} degrees",
             )
             return
-        self._filter.update(measured, then, off)
+        else:
+            self._filter.place_again(measured, then)
+        self._relocation.use(placed)
         if self._latency.is_known:
             self._measured.append(TimedHead(measured_s, measured))
         self.counts["used"] += 1
         self._used, self._used_s, self._reason = sample, measured_s, ""
+
+    def _has_relocated(self, placed: PlacedPose) -> bool:
+        """Whether the body truly moved without its joints, and now lies where the poses say."""
+        relocated = self._relocation.add(placed)
+        self._has_slid |= self._relocation.is_followed
+        if relocated is None or not self._check.has_agreed:
+            return False
+        self.counts["relocations"] += 1
+        self._check.forget()
+        self._on_event(
+            f"the robot slid or was moved by {relocated.distance_m:.2f} m; the poses followed it, "
+            f"agree with the joints again, and are used after {relocated.seconds:.1f} s"
+        )
+        return True
 
     def _is_of_first_sender(self, arrived: ArrivedPose) -> bool:
         if self._sender is None:
@@ -226,6 +253,7 @@ class ExternalPose:
     def _restart(self, why: str) -> None:
         self.counts["restarts"] += 1
         self._newest, self._clock, self._check = None, SenderClock(), MotionCheck()
+        self._relocation = Relocation()
         self._on_event(f"restarted sender: {why}; its clock is estimated again")
 
     def _is_frozen(self, sample: PoseSample, then: Moment) -> bool:
@@ -245,3 +273,14 @@ class ExternalPose:
         if self._now_s - self._reported.get(kind, -np.inf) >= AGAIN_S:
             self._reported[kind] = self._now_s
             self._on_event(f"{text}; the pose is left out")
+
+
+def _placed(measured: HeadMeasurement, then: Moment, turn_rad: float) -> PlacedPose:
+    return PlacedPose(
+        then.time_s,
+        measured.position_m,
+        then.place[:2],
+        turn_rad,
+        float(np.sqrt(measured.position_covariance.trace() / 3.0)),
+        float(np.sqrt(measured.rotation_covariance[2, 2])),
+    )

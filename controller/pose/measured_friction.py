@@ -81,7 +81,11 @@ class MeasuredFriction(FrictionEstimator):
 
     def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
         """Process the body, and the poses that have arrived; the goals do not count."""
-        now_s, heads = self._measured()
+        now_s, heads, has_slid = self._measured()
+        if has_slid:  # no balance of friction with the motion of the joints: the window ends
+            self._cycles.clear()
+            self._heads.clear()
+            self._steps = iter(())
         self._heads += heads
         self._cycles.append(_cycle(now_s, view))
         begin_s = self._cycles[0].time_s

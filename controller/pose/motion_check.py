@@ -30,6 +30,12 @@ TURNED_RAD: Final = 1.0
 """Direction beyond which the frame is turned (ours)."""
 SHARE: Final = 0.8
 """Least correlation with which a fault is reported (ours)."""
+AGREED: Final = 0.6
+"""Least correlation with which a source agrees with the joints (ours)."""
+STILL_RAD: Final = 0.02
+STILL_M: Final = 0.004
+"""A head that turns and moves less than this between two measurements shows nothing (ours): a run
+that holds keeps what its motion has shown."""
 
 
 class MotionCheck:
@@ -41,6 +47,15 @@ class MotionCheck:
         self._ways: deque[tuple[complex, complex]] = deque(maxlen=WINDOW)
         self.fault: str | None = None
         """How the source contradicts the joints; None while it does not."""
+        self.has_agreed = False
+        """Whether turns and directions of the source once agreed with the joints."""
+
+    def forget(self) -> None:
+        """Begin again after a body moved without its joints; ``has_agreed`` stays."""
+        self._last = None
+        self._turns.clear()
+        self._ways.clear()
+        self.fault = None
 
     def add(self, measured: HeadMeasurement, then: Moment) -> None:
         """Compare a measurement with the one before; a head that lies on its side shows nothing."""
@@ -55,6 +70,8 @@ class MotionCheck:
             return
         self._last = (then, measured)
         turn = then.place[2] - before.place[2]
+        if abs(turn) < STILL_RAD and np.hypot(*(then.place[:2] - before.place[:2])) < STILL_M:
+            return
         seen_turn = _heading(measured) - _heading(seen)
         self._turns.append((float(turn), float(np.arctan2(np.sin(seen_turn), np.cos(seen_turn)))))
         way = complex(*(then.place[:2] - before.place[:2]))
@@ -86,6 +103,13 @@ class MotionCheck:
                 "right-handed frame, z up"
             )
         angle = float(np.angle(same))
+        self.has_agreed |= bool(
+            abs(same) > max(AGREED * size, abs(mirrored))
+            and abs(angle) < TURNED_RAD
+            and scale < SCALE
+            and turned > LEAST_TURN_RAD2
+            and _correlation(expected, found) > AGREED
+        )
         if abs(same) > SHARE * size and abs(angle) > TURNED_RAD:
             return (
                 f"wrong frame: the head moves {np.degrees(angle):+.0f} degrees off the direction "

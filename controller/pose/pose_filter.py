@@ -142,6 +142,16 @@ class PoseFilter:
         )
         return Innovation(off_m, off_rad, is_jump)
 
+    def turn_rad(self, measured: HeadMeasurement, then: Moment) -> float:
+        """Return the turn from the frame of dead reckoning to the world by a measurement alone."""
+        seen = measured.rotation @ self._mean_frame(then)
+        return _wrapped(float(np.arctan2(seen[1, 0], seen[0, 0])) - self._body_heading(then))
+
+    def place_again(self, measured: HeadMeasurement, then: Moment) -> None:
+        """Place the body by a measurement, whatever its pose was before."""
+        self.is_placed = False
+        self.update(measured, then, self.innovation(measured, then))
+
     def update(self, measured: HeadMeasurement, then: Moment, off: Innovation) -> None:
         """Correct the pose by a measurement and its innovation; the first one places the body."""
         self._measured_s = then.time_s

@@ -52,6 +52,9 @@ def curves_html(record: RunRecord) -> str:
         for k in range(record.cycle.asked_rad.shape[1])
     )
     step = _step(len(record.cycle.time_s))
+    passed = "a waypoint reached"
+    if not record.header.pose_evidence.is_measured:
+        passed = "the run believes it reached a waypoint"
     which = "" if step == 1 else f" One of {step} cycles is drawn; all are in the log."
     return (
         "<section id='curves'><h2>Curves</h2><figure>"
@@ -59,7 +62,7 @@ def curves_html(record: RunRecord) -> str:
         "<div id='plot'><noscript>Curves need scripts. The pictures below do not.</noscript></div>"
         "<figcaption>Drag to zoom in time, double-click for all, click a name to hide its curve. "
         "Where a mean is drawn, pale lines show the least and the largest value. "
-        "Green: a waypoint reached; amber and orange: a warning, an error. The dark line is "
+        f"Green: {passed}; amber and orange: a warning, an error. The dark line is "
         f"the time of the film or trip.{which}{constant}"
         "</figcaption></figure>"
         f"<script id='plotly' type='text/plain'>{_library()}</script>"
@@ -67,14 +70,15 @@ def curves_html(record: RunRecord) -> str:
     )
 
 
+_DISTANCE = "distance from the path, m"
+
+
 def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
     """Panels (title with unit, curves), and a sentence about the constant values."""
     error_m = path_error_m(record)
     panels: list[tuple[str, list[Curve]]] = []
     if np.isfinite(error_m).any():
-        panels.append(
-            ("distance from the path, m", [("from the path", BLUE, record.pose.time_s, error_m)])
-        )
+        panels.append((_DISTANCE, [("from the path", BLUE, record.pose.time_s, error_m)]))
     constant = []
     for panel in Panel:
         curves = [] if panel.is_of_one_joint else panel_curves(record, panel)
@@ -111,7 +115,7 @@ def _figure(
         [_packed(each.values[:, k]) for _, curves in joint for each in curves]
         for k in range(record.cycle.asked_rad.shape[1])
     ]
-    titles = [title for title, _ in (*panels, *joint)]
+    titles = [_title(record, title) for title, _ in (*panels, *joint)]
     return {
         "traces": traces,
         "layout": _layout(record, titles),
@@ -119,6 +123,14 @@ def _figure(
         "first": first,
         "height": _PANEL_PX * len(titles) + 88,
     }
+
+
+def _title(record: RunRecord, title: str) -> str:
+    """Return the title of a panel; without a measured pose it states dead reckoning."""
+    is_of_the_pose = title in (_DISTANCE, Panel.SPEED)
+    return title + ", dead-reckoned" * (
+        is_of_the_pose and not record.header.pose_evidence.is_measured
+    )
 
 
 def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:

@@ -268,7 +268,8 @@ class _Execution:
                 clock=clock,
                 sensors=Sensors(
                     *(mapped.measure, backend.wire_busy_s, backend.energy, pose.health),
-                    evidence.position_m or 0.0,
+                    pose_sd_m=evidence.position_m or 0.0,
+                    pose_is_measured=evidence.is_measured,
                 ),
                 motion=source,
                 log=log,

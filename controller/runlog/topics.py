@@ -240,8 +240,8 @@ class PoseSourceTable(Table):
 
     time_s: Annotated[Floats, _TIME]
     age_s: Annotated[Floats, _optional("since the newest pose that was used was measured")]
-    position_sd_m: Annotated[Floats, Column("standard deviation of the head's position")]
-    heading_sd_rad: Annotated[Floats, Column("standard deviation of its heading")]
+    position_sd_m: Annotated[Floats, _optional("standard deviation of the head's position")]
+    heading_sd_rad: Annotated[Floats, _optional("standard deviation of its heading")]
     latency_s: Annotated[Floats, Column("estimated delay that the stamps do not show")]
     sequence: Annotated[Ints, Column("of the newest pose that was used", "integer", default=-1)]
     arrival_s: Annotated[Floats, _optional("when the newest pose arrived")]

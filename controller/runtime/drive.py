@@ -156,6 +156,8 @@ class Sensors:
     """Whether the pose can be trusted; None of a source that is always believed."""
     pose_sd_m: float = 0.0
     """Standard deviation of a measured position."""
+    pose_is_measured: bool = True
+    """Whether something measures the pose; otherwise the run only believes where the body is."""
 
 
 class Drive:
@@ -181,6 +183,7 @@ class Drive:
         self._link, self._clock, self._pose = link, clock, sensors.pose
         health = sensors.pose_health
         self._pose_hold = None if health is None else PoseHold(health, self._on_pose)
+        self._believes = not sensors.pose_is_measured
         self._motion, self._path = motion, path_progress(motion)
         self._open = motion if isinstance(motion, OpenWaypoints) else None
         self._waypoints_m = None if self._open is None else self._open.waypoints_m
@@ -280,6 +283,8 @@ class Drive:
         if not self._run.waypoints_m:
             is_done = self._motion.done
             return "the motion came to its end" if is_done else "the motion was cut off"
+        if self._believes:
+            return f"believes it reached {reached} of {self._waypoints} (dead reckoning)"
         if reached == self._waypoints:
             return "every waypoint reached"
         return f"{reached} waypoints reached"
@@ -377,7 +382,10 @@ class Drive:
             self._end_s = now_s + self._run.time_limit_s
             log.add(WaypointTable, now_s, waypoints_m=self._waypoints_m)
         if path.reached > reached:
-            log.event(now_s, "waypoint", f"waypoint {path.reached} reached")
+            text = f"waypoint {path.reached} reached"
+            if self._believes:
+                text = f"believes it reached waypoint {path.reached} (dead reckoning)"
+            log.event(now_s, "waypoint", text)
         if path.replanned is not None:
             text = f"{path.replanned}: another path to waypoint {path.reached + 1}"
             if path.missed > missed:

@@ -52,7 +52,7 @@ def walk_figure(record: RunRecord) -> Figure | None:
     aim = panels[-1]
     aim.axhline(0.0, color=GREY, linewidth=0.8)
     aim.plot(number, walk.heading_error_rad, color=BLUE, linewidth=1.0, marker=".", markersize=4,
-             label="heading error of the chosen shape")  # fmt: skip
+             label="heading error of the shape")  # fmt: skip
     aim.plot(number, walk.ramp_rad, color=AMBER, linewidth=1.0, label="bend added against it")
     none = walk.candidates == 0
     if many and none.any():

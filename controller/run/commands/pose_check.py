@@ -16,7 +16,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import VIEW_AT, Json, Robot, View, ViewAt, console, show
 from snakewalk.controller.console.result_files import LOG
 from snakewalk.controller.pose.feed_statistics import FeedStatistics
-from snakewalk.controller.pose.first_pose import start_fault
+from snakewalk.controller.pose.first_pose import WAIT_S, start_fault
 from snakewalk.controller.pose.sample import PoseFeed, PoseSample
 from snakewalk.controller.run.external.external_source import ExternalSource, ground_height
 from snakewalk.controller.run.external.pose_check_page import PoseCheckPage, feed_words
@@ -47,7 +47,10 @@ def check(
         ),
     ] = None,
     seconds: Annotated[
-        float, typer.Option(min=0.1, max=3600.0, help="duration of the check in seconds")
+        float,
+        typer.Option(
+            min=0.1, max=3600.0, help="duration of the check in seconds, from the first pose"
+        ),
     ] = 10.0,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
@@ -85,12 +88,18 @@ def watch(
     page: PoseCheckPage | None = None,
     judge: Judge = lambda sample: None,
 ) -> FeedStatistics:
-    """Receive poses for some seconds; ``on_line`` and ``page`` report in each second."""
+    """Receive poses for some seconds; ``on_line`` and ``page`` report in each second.
+
+    The seconds begin with the first message. Without one the check ends after ``WAIT_S`` at least,
+    because ROS 2 needs some seconds to find a publisher.
+    """
     found, start_s = FeedStatistics(config), clock.now_s()
-    due_s = start_s + LINE_S
-    while clock.now_s() < start_s + seconds:
+    due_s, end_s = start_s + LINE_S, start_s + max(seconds, WAIT_S)
+    while clock.now_s() < end_s:
         clock.sleep_until_s(clock.now_s() + LOOK_S)
         for arrived in feed.arrived(clock.now_s()):
+            if not found.senders:
+                end_s = clock.now_s() + seconds
             found.add(arrived)
         if page is not None and found.newest is not None:
             page.show(clock.now_s() - start_s, found.newest)

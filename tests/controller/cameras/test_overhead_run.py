@@ -62,6 +62,8 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
     record = read_log(finished.log)
     assert record.header.run.pose == "camera"
     assert any(event.kind == "pose" for event in record.events)
+    stated = finished.summary.evidence["pose_position_sd_m"]
+    assert float(str(stated)) == pytest.approx(float(str(found["head_sigma_median_m"])), rel=0.5)
 
 
 @pytest.mark.usefixtures("drawn")

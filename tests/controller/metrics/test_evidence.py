@@ -4,6 +4,7 @@ import dataclasses
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import RunSummary, summary
@@ -37,6 +38,7 @@ def with_evidence(record: RunRecord, evidence: PoseEvidence) -> RunRecord:
 def test_the_numbers_of_the_pose_are_those_that_issue_from_it() -> None:
     assert {
         "waypoints_reached",
+        "waypoints_counted",
         "waypoint_times_s",
         "travelled_m",
         "path_error_mean_m",
@@ -68,6 +70,19 @@ def test_a_measured_pose_gives_the_numbers(record: RunRecord, evidence: PoseEvid
     assert n["pose_source"] == evidence.source
     assert n["waypoints_reached"] == 3
     assert [key for key in OF_THE_POSE if n[f"dead_reckoned_{key}"] is not None] == []
+
+
+def test_an_uncertainty_that_the_source_measured_is_that_of_the_run(record: RunRecord) -> None:
+    """A source without a stated accuracy has the median of its poses; others keep theirs."""
+    measured = dataclasses.replace(
+        record.pose_source,
+        position_sd_m=np.array([np.nan, 0.002, 0.003, 0.1]),
+        heading_sd_rad=np.array([np.nan, 0.01, 0.02, 0.03]),
+    )
+    for source, expected in (("tags", (0.003, 0.02)), ("camera", (0.01, 0.05))):
+        (evidence,) = (each for each in MEASURED if each.source == source)
+        n = summary(dataclasses.replace(with_evidence(record, evidence), pose_source=measured))
+        assert (n.pose_position_sd_m, n.pose_heading_sd_rad) == expected
 
 
 def test_the_other_assumptions_are_listed_with_their_source(record: RunRecord) -> None:
@@ -108,4 +123,9 @@ def test_a_run_states_its_evidence(
         page = (folder / "report.html").read_text(encoding="utf-8")
         assert "fair outcome" in page
         assert "believes it reached 1 of 1 waypoint" in page
-    assert read_log(folder / "log.mcap").header.pose_evidence.source == source
+    record = read_log(folder / "log.mcap")
+    assert record.header.pose_evidence.source == source
+    claims = [event.text for event in record.events if event.kind in ("waypoint", "stop")]
+    assert len(claims) == 2
+    for claim in claims:
+        assert claim.endswith("(dead reckoning)") == believed, claim

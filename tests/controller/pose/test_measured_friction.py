@@ -34,10 +34,12 @@ def estimated(
     seed: int,
     lost: tuple[float, float] = (0.0, 0.0),
     ground: HeightField | None = None,
+    slid: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[list[FoundFriction], list[FrictionConfig]]:
     """Return the findings from noisy, late poses, and the frictions to use.
 
-    The views have noise too, as those of a filter have; no pose is measured within ``lost``.
+    The views have noise too, as those of a filter have; no pose is measured within ``lost``, and
+    the source reports a slide within ``slid``.
     """
     rng, used = np.random.default_rng(seed), list[FrictionConfig]()
     late = round(DELAY_S / CYCLE_S)
@@ -48,7 +50,7 @@ def estimated(
         now_s, measured_s = k * CYCLE_S, (k - late) * CYCLE_S
         is_kept = k >= late and not lost[0] < measured_s < lost[1]
         news = [seen(measured_s, views[k - late], rng)] if is_kept else []
-        arrived = MeasuredHeads(now_s, news)
+        arrived = MeasuredHeads(now_s, news, slid[0] < now_s < slid[1])
         noisy = seen(now_s, true, rng).head
         near = BodyPose(now_s, noisy.position_m, noisy.rotation)
         view = body_in_world(ROBOT, near, joints_rad(now_s))
@@ -84,6 +86,22 @@ def test_time_without_poses_shows_nothing() -> None:
 def test_a_gap_in_the_poses_does_not_move_the_estimate() -> None:
     found, used = estimated(sliding(FILE, 9.0), 2, lost=(1.0, 2.5))
     assert used == []
+    assert found[-1].friction.along == pytest.approx(0.1, rel=0.15)
+
+
+def test_a_window_with_a_slide_shows_nothing() -> None:
+    """A body that slid by 0.5 m within a second is not taken for one on slippery ground."""
+    still = sliding(FILE, 13.0)
+    views = [
+        view._replace(link_m=view.link_m + way_m, centre_m=view.centre_m + way_m)
+        for k, view in enumerate(still)
+        for way_m in [np.array([0.0, 0.5, 0.0]) * np.clip(k * CYCLE_S - 1.0, 0.0, 1.0)]
+    ]
+    blind, _ = estimated(views, 5)
+    found, used = estimated(views, 5, slid=(1.0, 2.0))
+    assert used == []
+    assert len(blind) == 3
+    assert len(found) == 2, "the first window begins after the slide"
     assert found[-1].friction.along == pytest.approx(0.1, rel=0.15)
 
 

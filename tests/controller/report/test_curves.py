@@ -1,8 +1,12 @@
 """A curve that jumps all the time is drawn as mean, least and largest; others as they are."""
 
+import dataclasses
+
 import numpy as np
 
-from snakewalk.controller.report.curves import _traces
+from snakewalk.controller.report.curves import _figure, _panels, _traces
+from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
+from snakewalk.controller.runlog.record import RunRecord
 
 
 def test_a_curve_that_jumps_all_the_time_has_mean_least_and_largest() -> None:
@@ -25,3 +29,20 @@ def test_a_slow_curve_with_noise_is_drawn_as_it_is() -> None:
 def test_a_short_run_or_a_curve_without_values_is_one_line() -> None:
     assert len(_traces("a", "#0072b2", 1, np.arange(9.0), np.arange(9) % 2 * 1.0)) == 1
     assert len(_traces("a", "#0072b2", 1, np.arange(9.0), np.full(9, np.nan))) == 1
+
+
+def test_panels_of_a_dead_reckoned_pose_state_it(record: RunRecord) -> None:
+    reckoned = PoseEvidence(Kind.DEAD_RECKONED, "joints")
+    believed = dataclasses.replace(
+        record, header=dataclasses.replace(record.header, pose_evidence=reckoned)
+    )
+    titles = [
+        [each["text"] for each in _figure(of, _panels(of)[0], 0)["layout"]["annotations"]]
+        for of in (record, believed)
+    ]
+    named = [each for each in titles[1] if "dead-reckoned" in each]
+    assert named == [
+        "<b>distance from the path, m, dead-reckoned</b>",
+        "<b>forward speed, m/s, dead-reckoned</b>",
+    ]
+    assert [each.replace(", dead-reckoned", "") for each in titles[1]] == titles[0]

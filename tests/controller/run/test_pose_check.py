@@ -49,6 +49,16 @@ def test_the_statistics_are_those_of_the_tracker() -> None:
         assert part in lines[-1]
 
 
+def test_the_seconds_begin_with_the_first_pose() -> None:
+    class Late(Tracker):
+        def arrived(self, now_s: float) -> list[ArrivedPose]:
+            return super().arrived(now_s - 3.0)
+
+    found = watch(Late(), SimClock(), 1.0, PoseConfig(), lambda line: None)
+    assert len(found.senders) == 1
+    assert found.facts()["poses"] == pytest.approx(100, abs=8)
+
+
 class Wrong:
     def arrived(self, now_s: float) -> list[ArrivedPose]:
         one = PoseSample(0, now_s, np.zeros(3), np.eye(3), "lab")

@@ -49,6 +49,17 @@ def test_a_path_that_turns_back_swings_out(ground) -> None:  # type: ignore[no-u
     assert_passes(path, points)
 
 
+def test_a_waypoint_behind_the_body_gets_a_turn_that_the_body_can_follow() -> None:
+    """A turn of 128 degrees at 0.19 m was left; a corner of 90 degrees at 0.2 m is followed."""
+    points = np.array([(0.0, 0.0), (1.5, 0.0), (1.5, -0.8), (0.0, -0.8), (0.8, 0.2)])
+    assert 0.45 * BEND_M < sharpest_bend(SplinePath(points))[0] < 0.25
+    path = TerrainPlanner(None, PlannerConfig())(points)
+    assert sharpest_bend(path)[0] > BEND_M
+    assert_passes(path, points)
+    corners = np.array([(0.0, 0.0), (1.2, 0.0), (1.2, 1.2), (2.4, 1.2)])
+    assert sharpest_bend(TerrainPlanner(None, PlannerConfig())(corners))[0] < 0.75 * BEND_M
+
+
 def test_round_bends_stay_as_they_are() -> None:
     points = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)])
     path = SplinePath(points)

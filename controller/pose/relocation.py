@@ -1,0 +1,130 @@
+"""A body that truly moved without its joints: poses beyond a jump that may be used again.
+
+A body that slides down a slope, or that a person moves, is far from the pose that dead reckoning
+predicts, although its source is right. Two facts distinguish it from a wrong source: the measured
+poses lead to the new place without a gap, and afterwards they agree with the motion of the joints.
+Swapped markers move a pose at once.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+
+SPEED_M_S: Final = 2.0
+RATE_RAD_S: Final = 3.0
+"""How fast a body may slide and turn without its joints, between two poses (ours): a slide of 1 m
+down 10 degrees with friction of 0.08 ends with 1.4 m/s."""
+STEP_M: Final = 0.15
+STEP_RAD: Final = 0.3
+"""How far at most between two poses, however long apart: a body that nobody saw slide did not."""
+STEP_SD: Final = 5.0
+"""Noise of two poses that may add to a step, in standard deviations (ours)."""
+SETTLED_S: Final = 1.0
+LEAST: Final = 5
+"""The poses of this time must agree with the joints, at least this many (ours)."""
+SETTLED_M: Final = 0.05
+SETTLED_RAD: Final = 0.2
+SETTLED_SD: Final = 5.0
+"""Farthest distance of a settled pose from their mean, or in standard deviations (ours)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedPose:
+    """A measured pose next to the motion of the joints at its time."""
+
+    time_s: float
+    position_m: Floats
+    """(3,) of the head, measured."""
+    odometry_m: Floats
+    """(2,) of the head, in the frame of dead reckoning."""
+    turn_rad: float
+    """From the frame of dead reckoning to the world, by this measurement alone."""
+    position_sd_m: float
+    turn_sd_rad: float
+
+    def moved_to(self, other: "PlacedPose", turn_rad: float) -> Floats:
+        """Return the position (3,) at the time of another pose, moved by the joints alone."""
+        x, y = other.odometry_m - self.odometry_m
+        c, s = np.cos(turn_rad), np.sin(turn_rad)
+        moved_m: Floats = self.position_m + np.array([c * x - s * y, s * x + c * y, 0.0])
+        return moved_m
+
+
+class Relocated(NamedTuple):
+    """How far a body moved without its joints."""
+
+    distance_m: float
+    seconds: float
+    """Since the last pose that was used."""
+
+
+class Relocation:
+    """Call ``use`` with each pose that is used, and ``add`` with each jump, in order of time."""
+
+    def __init__(self) -> None:
+        self._used: PlacedPose | None = None
+        self._last: PlacedPose | None = None
+        self._settled: deque[PlacedPose] = deque()
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether poses lead without a gap from the last one that was used."""
+        return bool(self._settled)
+
+    def use(self, pose: PlacedPose) -> None:
+        """Begin at a pose that is used."""
+        self._used = self._last = pose
+        self._settled.clear()
+
+    def add(self, pose: PlacedPose) -> Relocated | None:
+        """Return how the body moved once its poses have settled; None before."""
+        used, last = self._used, self._last
+        if used is None or last is None or not _follows(last, pose):
+            return None
+        self._last = pose
+        self._settled.append(pose)
+        while pose.time_s - self._settled[0].time_s > SETTLED_S:
+            self._settled.popleft()
+        first = self._settled[0]
+        spacing_s = (pose.time_s - first.time_s) / max(len(self._settled) - 1, 1)
+        if pose.time_s - first.time_s < SETTLED_S - 1.5 * spacing_s:
+            return None
+        if len(self._settled) < LEAST or not _agree(list(self._settled)):
+            return None
+        away_m = pose.position_m - used.moved_to(pose, used.turn_rad)
+        return Relocated(float(np.linalg.norm(away_m)), pose.time_s - used.time_s)
+
+
+def _follows(last: PlacedPose, pose: PlacedPose) -> bool:
+    """Whether a body may have moved from one pose to the next."""
+    gap_s = pose.time_s - last.time_s
+    off_m = float(np.linalg.norm(pose.position_m - last.moved_to(pose, last.turn_rad)))
+    off_rad = abs(_wrapped(pose.turn_rad - last.turn_rad))
+    noise_m = STEP_SD * np.hypot(last.position_sd_m, pose.position_sd_m)
+    noise_rad = STEP_SD * np.hypot(last.turn_sd_rad, pose.turn_sd_rad)
+    return bool(
+        gap_s > 0.0
+        and off_m <= min(SPEED_M_S * gap_s, STEP_M) + noise_m
+        and off_rad <= min(RATE_RAD_S * gap_s, STEP_RAD) + noise_rad
+    )
+
+
+def _agree(poses: list[PlacedPose]) -> bool:
+    """Whether poses differ by the motion of the joints and by noise only."""
+    newest = poses[-1]
+    turns = newest.turn_rad + np.array([_wrapped(p.turn_rad - newest.turn_rad) for p in poses])
+    turn_rad = float(turns.mean())
+    places_m = np.array([pose.moved_to(newest, turn_rad) for pose in poses])
+    off_m = np.linalg.norm(places_m - places_m.mean(axis=0), axis=1)
+    off_rad = np.abs(turns - turn_rad)
+    most_m = [max(SETTLED_M, SETTLED_SD * pose.position_sd_m) for pose in poses]
+    most_rad = [max(SETTLED_RAD, SETTLED_SD * pose.turn_sd_rad) for pose in poses]
+    return bool(np.all(off_m <= most_m) and np.all(off_rad <= most_rad))
+
+
+def _wrapped(angle_rad: float) -> float:
+    return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
