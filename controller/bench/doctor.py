@@ -17,6 +17,7 @@ from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.supply_check import supply_under_load
 from snakewalk.controller.bench.unlisted_devices import (
     factory_servos,
+    in_protocol_1,
     protocol_1,
     transmit_echo,
     unlisted,
@@ -172,9 +173,11 @@ def _presence(
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
     feetech = bus.table.facts.protocol == "feetech"
-    old = protocol_1(port, silent, bus.latency_s) if silent and not feetech else None
-    findings += [] if old is None else [old]
-    findings += servos.presence(expected, found, elsewhere, list(others), baud, port.name)
+    old = in_protocol_1(port, silent, bus.latency_s) if silent and not feetech else {}
+    findings += protocol_1(old)
+    old_ids = {i for ids in old.values() for i in ids}
+    findings += servos.presence(expected, found, elsewhere, old_ids, list(others), baud, port.name)
+    silent = [i for i in silent if i not in old_ids]
     findings += [] if noise is None else [noise]
     protocol = bus.table.facts.protocol
     findings += unlisted(port, others, bus.latency_s, noisy=noisy, protocol=protocol)

@@ -1,6 +1,6 @@
 """The other side: each servo against the robot that was described."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from statistics import median
 
 from snakewalk.config.robot import RobotConfig
@@ -29,6 +29,7 @@ def presence(
     expected: Sequence[int],
     found: Sequence[int],
     elsewhere: Mapping[int, int],
+    old: Collection[int],
     others: Sequence[int],
     baud: int,
     port: str,
@@ -39,6 +40,7 @@ def presence(
         expected: IDs of the robot.
         found: those that answered at ``baud``.
         elsewhere: ID to the other baud rate at which it answered.
+        old: IDs that reply in Protocol 1.0.
         others: IDs that answered at ``baud`` and are not the robot's.
         baud: the robot's.
         port: for the remedy.
@@ -57,14 +59,20 @@ def presence(
             )
         )
     if not rates:
-        findings.append(Finding("baud rate", "ok" if found else "warn", f"{baud} baud"))
+        findings.append(Finding("baud rate", "ok" if found or old else "warn", f"{baud} baud"))
     missing = [i for i in expected if i not in found and i not in elsewhere]
+    refusing = [i for i in missing if i in old]
+    missing = [i for i in missing if i not in old]
+    if refusing:
+        answer = f"{shown_subject(refusing, 'reply')} in Protocol 1.0 instead of 2.0"
+        remedy = "they have power and a cable; change their protocol, or exchange them"
+        findings.append(Finding("servo IDs", "fail", answer, remedy))
     if missing:
         remedy = _missing_remedy(missing, expected, others, port)
         findings.append(
             Finding("servo IDs", "fail", f"no answer from {shown_ids(missing)}", remedy)
         )
-    else:
+    elif not refusing:
         findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(expected)} answer"))
     return findings
 

@@ -55,8 +55,17 @@ def transmit_echo(port: BytePort, listed: Collection[int]) -> Finding | None:
     )
 
 
-def protocol_1(port: BytePort, missing: Sequence[int], latency_s: float) -> Finding | None:
-    """Finding if servos reply to pings of Protocol 1.0; asks missing IDs and the factory's."""
+def in_protocol_1(
+    port: BytePort, missing: Sequence[int], latency_s: float
+) -> dict[int, list[int]]:
+    """Return the IDs that reply to pings of Protocol 1.0, by baud rate.
+
+    Args:
+        port: the line.
+        missing: IDs without a reply in Protocol 2.0; the factory's ID is asked, too.
+        latency_s: how long adapter and driver may hold bytes back.
+
+    """
     asked = sorted({*missing[:_PROTOCOL_1_IDS], FACTORY_ID})
     before = port.getBaudRate()
     found: dict[int, list[int]] = {}
@@ -66,18 +75,23 @@ def protocol_1(port: BytePort, missing: Sequence[int], latency_s: float) -> Find
                 found[baud] = [i for i in asked if _replies_in_protocol_1(port, i, latency_s)]
     finally:
         port.setBaudRate(before)
-    there = [
-        f"{shown_subject(ids, 'reply')} at {baud} baud" for baud, ids in found.items() if len(ids)
+    return {baud: ids for baud, ids in found.items() if ids}
+
+
+def protocol_1(found: Mapping[int, Sequence[int]]) -> list[Finding]:
+    """Finding about servos that reply in Protocol 1.0, by baud rate; nothing without any."""
+    if not found:
+        return []
+    there = [f"{shown_subject(ids, 'reply')} at {baud} baud" for baud, ids in found.items()]
+    return [
+        Finding(
+            "protocol",
+            "fail",
+            f"in Protocol 1.0 {', '.join(there)}",
+            "a run needs Protocol 2.0: set Protocol Type(13) to 2, or update the firmware with "
+            "DYNAMIXEL Wizard 2.0; AX servos have Protocol 1.0 only and cannot run",
+        )
     ]
-    if not there:
-        return None
-    return Finding(
-        "protocol",
-        "fail",
-        f"in Protocol 1.0 {', '.join(there)}",
-        "a run needs Protocol 2.0: set Protocol Type(13) to 2, or update the firmware with "
-        "DYNAMIXEL Wizard 2.0; AX servos have Protocol 1.0 only and cannot run",
-    )
 
 
 def _replies_in_protocol_1(port: BytePort, servo_id: int, latency_s: float) -> bool:

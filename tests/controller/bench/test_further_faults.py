@@ -348,6 +348,22 @@ def test_servos_of_protocol_1_are_named() -> None:
     assert check(findings, "protocol").found == (
         "in Protocol 1.0 servos 1 to 4 reply at 1000000 baud"
     )
+    found = check(findings, "servo IDs")
+    assert found.found == "servos 1 to 4 reply in Protocol 1.0 instead of 2.0"
+    assert "is the servo power on" not in " ".join(each.remedy for each in findings)
+    assert not [each for each in findings if each.check == "baud rate" and each.grade != "ok"]
+
+
+def test_a_silent_servo_next_to_protocol_1_is_named_by_itself() -> None:
+    """Servo 4 is silent; the others of its chain have power, but another protocol."""
+    line = Ax12Line(Ax12Servos([1, 2, 3], BenchPlant(3)))
+    findings = examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    rows = [(each.found, each.remedy) for each in findings if each.check == "servo IDs"]
+    assert [found for found, _ in rows] == [
+        "servos 1 to 3 reply in Protocol 1.0 instead of 2.0",
+        "no answer from servo 4",
+    ]
+    assert rows[1][1].startswith("look at the cable in front of servo 4")
 
 
 def test_an_imu_that_is_missing_is_named() -> None:
