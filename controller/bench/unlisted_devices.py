@@ -55,9 +55,7 @@ def transmit_echo(port: BytePort, listed: Collection[int]) -> Finding | None:
     )
 
 
-def in_protocol_1(
-    port: BytePort, missing: Sequence[int], latency_s: float
-) -> dict[int, list[int]]:
+def in_protocol_1(port: BytePort, missing: Sequence[int], latency_s: float) -> dict[int, list[int]]:
     """Return the IDs that reply to pings of Protocol 1.0, by baud rate.
 
     Args:
