@@ -152,7 +152,7 @@ def test_a_foreign_goal_of_many_joints_counts_as_one() -> None:
     rig.cycles([{0: FOREIGN, 1: FOREIGN, 2: FOREIGN}, {}])
     assert rig.check.is_due is True  # more reads follow as soon as there is time
     rig.cycles([{0: FOREIGN, 1: FOREIGN, 2: FOREIGN}, {}])
-    with pytest.raises(BusError, match="^a, b, c: "):
+    with pytest.raises(BusError, match=r"^a, b, c: "):
         rig.cycle(hold={0: FOREIGN, 1: FOREIGN, 2: FOREIGN})
 
 
