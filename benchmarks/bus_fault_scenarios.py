@@ -155,6 +155,14 @@ _WRITES = [
         [_write("Goal Position", 2048, ALL, every_s=0.005)],
         amplitude_rad=0.05,
     ),
+    *(
+        Scenario(
+            f"second master: Goal Position of all joints, every {every_s:g} s",
+            [_write("Goal Position", 2048, ALL, every_s=every_s)],
+            cycles=2000,
+        )
+        for every_s in (0.03, 0.1, 0.51)
+    ),
 ]
 _SENSORS = [
     _one("`reading`: temperature 0", "reading", ids=[3], register="Present Temperature", value=0),

@@ -17,7 +17,7 @@ from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.supply_check import supply_under_load
 from snakewalk.controller.bench.unlisted_devices import (
     factory_servos,
-    protocol_1,
+    foreign_replies,
     transmit_echo,
     unlisted,
 )
@@ -44,6 +44,9 @@ _PINGED = 6
 (ours)."""
 _STILL_POSITIONS = 20
 """Positions, 1.8 degrees, by which a joint at rest may differ between two reads (ours)."""
+_STILL_RAD_S = 0.4
+"""Velocity at which a joint turns by more than ``_STILL_POSITIONS`` between the two (ours)."""
+_NO_VELOCITY = "its sensor is off, so a run does not notice that it is blocked: exchange the servo"
 _STILL_S = 0.1
 """Least time between the two (ours)."""
 _TIMED = 2
@@ -100,7 +103,7 @@ def examine(
     if noise is not None:
         patience_s = bus.latency_s
         bus = servo_bus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
-    findings += _presence(bus, expected, found, imu, noise, overheard, on_progress)
+    findings += _presence(bus, robot, expected, found, imu, noise, overheard, on_progress)
     if imu is not None:
         findings.append(imu_finding(bus, imu))
     if not found:
@@ -153,6 +156,7 @@ def _find(
 
 def _presence(
     bus: DynamixelBus,
+    robot: RobotConfig,
     expected: Sequence[int],
     found: Sequence[int],
     imu: ImuConfig | None,
@@ -172,9 +176,13 @@ def _presence(
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
     feetech = bus.table.facts.protocol == "feetech"
-    old = protocol_1(port, silent, bus.latency_s) if silent and not feetech else None
-    findings += [] if old is None else [old]
-    findings += servos.presence(expected, found, elsewhere, list(others), baud, port.name)
+    model = robot.servo_models[0]
+    foreign = foreign_replies(port, silent, bus.latency_s, feetech=feetech)
+    findings += foreign.findings(model)
+    findings += servos.presence(
+        *(expected, found, elsewhere, foreign.ids, list(others), baud, port.name)
+    )
+    silent = [i for i in silent if i not in foreign.ids]
     findings += [] if noise is None else [noise]
     protocol = bus.table.facts.protocol
     findings += unlisted(port, others, bus.latency_s, noisy=noisy, protocol=protocol)
@@ -319,15 +327,20 @@ def _settings(
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
     except BusError as error:
         return [_unreadable(error, noise)]
-    moving = [*_moving(robot, reports, registers), *servos.unsteady_supply(bus, reports)]
     scales = [ServoUnits.of(bus.table_of(servo_id).facts) for servo_id in robot.servo_ids]
-    return [*moving, *register_findings(registers, robot, JointUnits.of(robot, scales))]
+    units = JointUnits.of(robot, scales)
+    moving = _moving(robot, units, reports, registers)
+    supply = servos.unsteady_supply(bus, reports)
+    return [*moving, *supply, *register_findings(registers, robot, units)]
 
 
 def _moving(
-    robot: RobotConfig, reports: Sequence[ServoReport], registers: Sequence[ServoRegisters]
+    robot: RobotConfig,
+    units: JointUnits,
+    reports: Sequence[ServoReport],
+    registers: Sequence[ServoRegisters],
 ) -> list[Finding]:
-    """Finding about joints that turned between two reads of their positions."""
+    """Findings about joints whose position, or only their velocity, shows a motion."""
     before = {report.servo_id: report.registers["Present Position"] for report in reports}
     turned = [
         each.servo_id
@@ -335,7 +348,16 @@ def _moving(
         if abs(each.values["Present Position"] - before[each.servo_id]) > _STILL_POSITIONS
     ]
     if not turned:
-        return []
+        fast = [
+            each.servo_id
+            for each in registers
+            if abs(each.values.get("Present Velocity", 0) * units.rad_s_per_velocity[each.joint])
+            > _STILL_RAD_S
+        ]
+        if not fast:
+            return []
+        found = f"{shown_subject(fast, 'report', robot.label_of_servo)} a velocity, but stands"
+        return [Finding("velocity sensor", "warn", found, _NO_VELOCITY)]
     found = f"{shown_subject(turned, 'move', robot.label_of_servo)} while the doctor looks"
     remedy = "does it fall, or does another program move it? run doctor again when it lies still"
     return [Finding("motion", "warn", found, remedy)]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from snakewalk.controller.console.finding import Finding, Grade, shown_ids
-from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.control_cycle import FAST_FAILURES, ControlCycle
 from snakewalk.drivers.bus.probe import Overheard, Probe
 from snakewalk.drivers.port.byte_port import BytePort
 
@@ -18,6 +18,14 @@ _TEST_READS = 200
 _BAD_SHARE = 0.05
 """Share of the requests that a line may fail before it is a fault (ours)."""
 _CABLES = "cables, plugs, termination, a common ground; a lower baud rate"
+_NO_FAST_READS = (
+    "a run uses plain reads, which are slower; update the firmware of the servos, or use an "
+    "adapter that passes long replies"
+)
+_NO_GROUP_READS = (
+    "update the firmware of the servos, or use an adapter that passes long replies: a run needs "
+    "group reads"
+)
 _LATE_S = 3e-3
 """A reply that is later than the wire and the servo make it is held up by adapter or driver."""
 _SLOW_S = 2e-3
@@ -167,8 +175,15 @@ def line_quality(
         if complete:
             longest_s = max(longest_s, port.clock.now_s() - began_s)
     found = f"{lost} of {reads} group reads incomplete"
+    if cycle.counters.fast_given_up and lost == FAST_FAILURES:
+        found += ": all fast ones, but no plain one"
+        return Finding("line", "warn", found, _NO_FAST_READS)
     if lost:
-        found += _losing_servos(ask_each())
+        alone = ask_each()
+        if lost == reads and all(each.answered == each.requests for each in alone):
+            found += ", though each servo replies by itself"
+            return Finding("line", "fail", found, _NO_GROUP_READS)
+        found += _losing_servos(alone)
         grade: Grade = "fail" if lost > _BAD_SHARE * _TEST_READS else "warn"
         return Finding("line", grade, found, _CABLES)
     if longest_s > 2.0 * latency_s:

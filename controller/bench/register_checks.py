@@ -47,7 +47,7 @@ _READ = (
     *("Goal PWM", *_GAINS, *_PROFILE, IDENTITY, "Bus Watchdog", "Present Position"),
     *("Min Position Limit", "Max Position Limit", "Velocity Limit", "Temperature Limit"),
     *("Min Voltage Limit", "Max Voltage Limit", "Registered Instruction", "Goal Current"),
-    *("Torque Enable", "Present Current"),
+    *("Torque Enable", "Present Current", "Present Velocity"),
 )
 _SECONDARY_SERVO = 0x02
 """Bit of Drive Mode(10): the servo follows another one by a sync cable."""

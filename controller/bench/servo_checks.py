@@ -1,6 +1,6 @@
 """The other side: each servo against the robot that was described."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from statistics import median
 
 from snakewalk.config.robot import RobotConfig
@@ -11,6 +11,8 @@ from snakewalk.drivers.chain.start_up import ServoReport
 from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, alarm_names
 
 _HOT_C = 60.0
+_IMPOSSIBLE_C = 150.0
+"""Temperature above which a servo would not reply (ours)."""
 _UNSTEADY_V = 0.3
 """Change of a voltage at rest that no sensor shows by itself (ours)."""
 _WARMER_C = 20.0
@@ -29,6 +31,7 @@ def presence(
     expected: Sequence[int],
     found: Sequence[int],
     elsewhere: Mapping[int, int],
+    foreign: Collection[int],
     others: Sequence[int],
     baud: int,
     port: str,
@@ -39,6 +42,7 @@ def presence(
         expected: IDs of the robot.
         found: those that answered at ``baud``.
         elsewhere: ID to the other baud rate at which it answered.
+        foreign: silent IDs that reply in another protocol.
         others: IDs that answered at ``baud`` and are not the robot's.
         baud: the robot's.
         port: for the remedy.
@@ -57,14 +61,20 @@ def presence(
             )
         )
     if not rates:
-        findings.append(Finding("baud rate", "ok" if found else "warn", f"{baud} baud"))
+        findings.append(Finding("baud rate", "ok" if found or foreign else "warn", f"{baud} baud"))
     missing = [i for i in expected if i not in found and i not in elsewhere]
+    refusing = [i for i in missing if i in foreign]
+    missing = [i for i in missing if i not in foreign]
+    if refusing:
+        answer = f"{shown_subject(refusing, 'reply')} in another protocol than the robot's servos"
+        remedy = "they have power and a cable: see the check protocol"
+        findings.append(Finding("servo IDs", "fail", answer, remedy))
     if missing:
         remedy = _missing_remedy(missing, expected, others, port)
         findings.append(
             Finding("servo IDs", "fail", f"no answer from {shown_ids(missing)}", remedy)
         )
-    else:
+    elif not refusing:
         findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(expected)} answer"))
     return findings
 
@@ -252,6 +262,11 @@ def unsteady_supply(bus: DynamixelBus, servos: Sequence[ServoReport]) -> list[Fi
 
 def heat(servos: Sequence[ServoReport], robot: RobotConfig, limit_c: float) -> Finding:
     """Temperatures at rest, and sensors that cannot be right."""
+    broken = [s.servo_id for s in servos if s.temperature_c > _IMPOSSIBLE_C]
+    if broken:
+        found = f"{shown_subject(broken, 'report', robot.label_of_servo)} more than any motor bears"
+        remedy = "its sensor is broken: a run stops at once; exchange the servo"
+        return Finding("temperature", "fail", found, remedy)
     hottest = max(servos, key=lambda s: s.temperature_c)
     label = robot.label_of_servo(hottest.servo_id)
     found = f"{label} is the warmest: {hottest.temperature_c:.0f} C"

@@ -1,11 +1,13 @@
 """Devices on a line that the robot does not list, and echoes of sent packets."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
 from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.feetech_scan import identify_at
 from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.byte_port import BytePort
@@ -55,29 +57,85 @@ def transmit_echo(port: BytePort, listed: Collection[int]) -> Finding | None:
     )
 
 
-def protocol_1(port: BytePort, missing: Sequence[int], latency_s: float) -> Finding | None:
-    """Finding if servos reply to pings of Protocol 1.0; asks missing IDs and the factory's."""
+@dataclass(frozen=True, slots=True)
+class ForeignReplies:
+    """IDs that are silent in the robot's protocol, and reply in another one."""
+
+    protocol_1: Mapping[int, Sequence[int]]
+    """IDs of DYNAMIXEL servos in Protocol 1.0, by baud rate."""
+    models: Mapping[int, str]
+    """Model of servos of another make, by ID."""
+
+    @property
+    def ids(self) -> frozenset[int]:
+        """All of these IDs."""
+        return frozenset((*self.models, *(i for ids in self.protocol_1.values() for i in ids)))
+
+    def findings(self, robot_model: str) -> list[Finding]:
+        """Findings about them; nothing without any."""
+        findings = []
+        for model in dict.fromkeys(self.models.values()):
+            ids = [i for i, name in self.models.items() if name == model]
+            findings.append(
+                Finding(
+                    "protocol",
+                    "fail",
+                    f"{shown_subject(ids, 'are')} {model}, of another make than {robot_model}",
+                    f"name a robot by --robot whose servos have model = {model!r}",
+                )
+            )
+        there = [f"{shown_subject(i, 'reply')} at {at} baud" for at, i in self.protocol_1.items()]
+        if there:
+            findings.append(
+                Finding(
+                    "protocol",
+                    "fail",
+                    f"in Protocol 1.0 {', '.join(there)}",
+                    "a run needs Protocol 2.0: set Protocol Type(13) to 2, or update the firmware "
+                    "with DYNAMIXEL Wizard 2.0; AX servos have Protocol 1.0 only and cannot run",
+                )
+            )
+        return findings
+
+
+def foreign_replies(
+    port: BytePort, missing: Sequence[int], latency_s: float, *, feetech: bool
+) -> ForeignReplies:
+    """Ask silent IDs in the protocols that the robot does not use.
+
+    Args:
+        port: the line.
+        missing: IDs without a reply; for Protocol 1.0 the factory's ID is asked, too.
+        latency_s: how long adapter and driver may hold bytes back.
+        feetech: whether the robot has Feetech servos.
+
+    """
+    if not missing:
+        return ForeignReplies({}, {})
+    if feetech:
+        numbers = model_numbers(2)
+        replies = {each.servo_id: each.params for each in broadcast_ping(port).replies}
+        models_by_id = {
+            servo_id: numbers.get(int.from_bytes(params[:2], "little"), "DYNAMIXEL")
+            for servo_id, params in replies.items()
+        }
+        return ForeignReplies({}, {i: models_by_id[i] for i in missing if i in replies})
     asked = sorted({*missing[:_PROTOCOL_1_IDS], FACTORY_ID})
     before = port.getBaudRate()
     found: dict[int, list[int]] = {}
+    models: dict[int, str] = {}
     try:
         for baud in dict.fromkeys((before, *_PROTOCOL_1_BAUDS)):
-            if baud == before or port.setBaudRate(baud):
-                found[baud] = [i for i in asked if _replies_in_protocol_1(port, i, latency_s)]
+            if baud != before and not port.setBaudRate(baud):
+                continue
+            found[baud] = [i for i in asked if _replies_in_protocol_1(port, i, latency_s)]
+            for servo_id in found[baud] if baud == before else ():
+                servo = identify_at(port, servo_id, latency_s)
+                models |= {} if servo is None else {servo_id: servo.model}
     finally:
         port.setBaudRate(before)
-    there = [
-        f"{shown_subject(ids, 'reply')} at {baud} baud" for baud, ids in found.items() if len(ids)
-    ]
-    if not there:
-        return None
-    return Finding(
-        "protocol",
-        "fail",
-        f"in Protocol 1.0 {', '.join(there)}",
-        "a run needs Protocol 2.0: set Protocol Type(13) to 2, or update the firmware with "
-        "DYNAMIXEL Wizard 2.0; AX servos have Protocol 1.0 only and cannot run",
-    )
+    old = {baud: [i for i in ids if i not in models] for baud, ids in found.items()}
+    return ForeignReplies({baud: ids for baud, ids in old.items() if ids}, models)
 
 
 def _replies_in_protocol_1(port: BytePort, servo_id: int, latency_s: float) -> bool:

@@ -137,8 +137,11 @@ class CycleObserver(Protocol):
         """
         ...
 
-    def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
-        """Process a cycle: its due time, the goals (J,) that safety passed, and the readings."""
+    def step(self, deadline_s: float, sent_s: float, sent_rad: Floats, state: JointState) -> None:
+        """Process a cycle: its due time, and the readings.
+
+        Safety passed the goals ``sent_rad`` (J,), and they went out at ``sent_s``.
+        """
         ...
 
 
@@ -419,10 +422,10 @@ class Drive:
     def _send(
         self, tick: Tick, state: JointState, pose: BodyPose, view: BodyView, goal: Floats
     ) -> None:
-        before_s = self._wire_s
+        before_s, sent_s = self._wire_s, self._clock.now_s()
         # a veto latches: torque is off, the loop ends, and the log gets this cycle all the same
         with _LATCHED:
-            self._link.write(JointCommand(self._clock.now_s(), goal))
+            self._link.write(JointCommand(sent_s, goal))
         self._wire_s = self._wire_busy_s()
         sent_rad = log_cycle(
             self._log,
@@ -437,7 +440,7 @@ class Drive:
         )
         self._log_battery(tick.deadline_s, state)
         if self._observer is not None and not self._link.tripped:
-            self._observer.step(tick.deadline_s, sent_rad, state)
+            self._observer.step(tick.deadline_s, sent_s, sent_rad, state)
         self._measure_speed()
         path = self._path
         pulse_m_s, along_m = path.pulse_m_s, path.along_m

@@ -19,6 +19,8 @@ _ANY: Final = "STS3215"
 _TURN_S: Final = 0.3e-3
 """Time after which the next servo replies to a broadcast ping (ours)."""
 _SETTLE_S: Final = 0.03
+_TRIES: Final = 3
+"""Tries of a read from a servo that replied to a ping (ours)."""
 _ORDERS: Final[dict[int, Literal["little", "big"]]] = {0: "little", 1: "big"}
 """Register 2."""
 
@@ -81,6 +83,12 @@ def _anybody(port: BytePort) -> bool:
     raw = port.read_until(6, port.clock.now_s() + wire_s + _SETTLE_S)
     port.drain_until_quiet(_SETTLE_S)
     return bool(raw) and (FeetechParser().feed(raw) != [] or raw != packet)
+
+
+def identify_at(port: BytePort, servo_id: int, latency_s: float) -> FeetechServo | None:
+    """Model of a servo at the rate of the port; None for a DYNAMIXEL servo, and without a reply."""
+    bus = FeetechBus(port, _ANY, latency_s=latency_s, tries=_TRIES)
+    return identify(bus, servo_id, port.getBaudRate())
 
 
 def identify(bus: FeetechBus, servo_id: int, baud: int) -> FeetechServo | None:

@@ -19,6 +19,9 @@ from snakewalk.drivers.errors import BusError
 FOREIGN_READS, OWN_READS = 2, 4
 """Reads in a row that differ and end a run: with a goal that was never sent, and with an older goal
 of this run (ours). A line that loses 5 % of its packets loses four writes once in 160,000 reads."""
+SEEN_READS, WATCHED_READS = 3, 256
+"""Reads with a goal that was never sent that end a run though the goals between them are right, and
+the reads among which they count (ours). A program that writes rarely is seen in some reads only."""
 _SECOND_MASTER = "another program writes goals (a second master)"
 _LOST_TO_ALL = "no servo has the newest goals: the line or the adapter loses what is written"
 _REMEMBERED = 256
@@ -53,6 +56,7 @@ class GoalCheck:
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
         self._is_incomplete = False
+        self._seen, self._seen_at, self._watched = 0, 0, 0
 
     def note_write(self, goals: Int32s) -> None:
         """Store raw goals (J,) that were just sent."""
@@ -62,9 +66,9 @@ class GoalCheck:
     @property
     def is_due(self) -> bool:
         """Whether the check should be repeated as soon as there is time."""
-        return self._is_incomplete or any(
-            each.write < self._writes for each in self._differences.values()
-        )
+        if self._is_incomplete or self._watched > 0:
+            return True
+        return any(each.write < self._writes for each in self._differences.values())
 
     def check(self, explain: Callable[[int], str | None]) -> None:
         """Read the goals back and compare them.
@@ -73,12 +77,14 @@ class GoalCheck:
 
         Raises:
             BusError: a servo has another goal in ``FOREIGN_READS`` or ``OWN_READS`` reads in a row,
-                each after another goal was sent.
+                each after another goal was sent; or servos have goals that were never sent in
+                ``SEEN_READS`` of ``WATCHED_READS`` reads.
             PortError: the port is gone.
 
         """
         if not self._sent:
             return
+        self._watched = max(self._watched - 1, 0)
         reply, sent = self.cycle.read(), self._sent[-1]
         if reply.flawless and not self._differences and reply.data.tobytes() == sent.tobytes():
             self._is_incomplete = False
@@ -90,7 +96,7 @@ class GoalCheck:
                 self._differences.pop(joint, None)
             else:
                 self._note(joint, int(values[joint]))
-        over = [joint for joint, each in self._differences.items() if _is_over(each)]
+        over = [joint for joint, each in self._differences.items() if self._is_over(each)]
         if over:
             raise BusError(self._fault(sorted(over), sent, explain))
 
@@ -126,6 +132,14 @@ class GoalCheck:
             known.is_foreign |= is_foreign
             known.lag = lag if lag == known.lag else 0
             known.value = value
+        if is_foreign and (self._seen_at < self._writes or not self._watched):
+            self._seen = self._seen + 1 if self._watched else 1
+            self._seen_at, self._watched = self._writes, WATCHED_READS
+
+    def _is_over(self, difference: _Difference) -> bool:
+        if difference.is_foreign:
+            return difference.count >= FOREIGN_READS or self._seen >= SEEN_READS
+        return difference.count >= OWN_READS
 
     def _fault(
         self,
@@ -149,7 +163,3 @@ class GoalCheck:
             cause = "writes to it get lost"
         names = ", ".join(self._labels[joint] for joint in joints)
         return f"{names}: Goal Position is {first.value}, not {sent[joints[0]]}: {cause}"
-
-
-def _is_over(difference: _Difference) -> bool:
-    return difference.count >= (FOREIGN_READS if difference.is_foreign else OWN_READS)

@@ -39,7 +39,9 @@ TARGETS = {
     "snakewalk.drivers.chain.goal_check": ("test_goal_check_edges.py",),
     "snakewalk.drivers.chain.fingerprint": ("test_fingerprint.py",),
     "snakewalk.drivers.chain.temperature_sensors": ("test_temperature_sensors.py",),
-    "snakewalk.drivers.chain.motion_sensors": ("test_motion_sensors.py",),
+    "snakewalk.drivers.chain.motion_sensors": (
+        *("test_motion_sensors_edges.py", "test_motion_sensors.py"),
+    ),
     "snakewalk.drivers.chain.lost_replies": ("test_lost_replies.py",),
     "snakewalk.drivers.protocol.parser": (
         *("test_reader_edges.py", "test_packet_reader.py", "test_packets.py"),

@@ -25,7 +25,7 @@ from snakewalk.controller.studies.shadow.diagnosis import (
     is_gap,
     last_part,
 )
-from snakewalk.controller.studies.shadow.shadow import Shadow
+from snakewalk.controller.studies.shadow.shadow import Shadow, measured_s
 from snakewalk.drivers.types import JointState
 
 ALARM_A: Final = 0.03
@@ -36,6 +36,10 @@ _MEMORY_S: Final = 2.0
 """Time constant of the alarm's average (ours)."""
 _SMOOTH_S: Final = 0.1
 """Time constant that smooths the encoder's and the current's steps in a difference (ours)."""
+_LONGEST_DELAY: Final = 0.5
+"""Greatest time between the shadow's reading and its goals, over that of its watchdog (ours)."""
+_CLOCK_DIGITS: Final = 9
+"""Digits of a time in seconds beyond which differences of clocks have rounding errors."""
 
 
 @dataclass
@@ -43,6 +47,10 @@ class ShadowAlarm:
     """Compares a chain with its shadow from cycle to cycle, and says once of a joint what differs.
 
     A difference is smoothed over a tenth of a second, and its square over two seconds.
+
+    Between two goals the current of a moving joint falls by its stiffness times its speed, so a
+    goal that arrives late changes the current at the next read. The run does not know how late its
+    goals arrive, but it measures how late replies do. The limit grows by the effect of that time.
     """
 
     robot: RobotConfig
@@ -55,7 +63,18 @@ class ShadowAlarm:
         joints = self.robot.joint_count
         self._smooth = np.zeros((2, joints))
         self._square = np.zeros((2, joints))
+        self._unsure = np.zeros((2, joints))
+        self._least_age_s = np.inf
         self._cycles = 0
+        gains = np.array(self.robot.position_p_gains)
+        records = self.robot.servo_records
+        full_rad = np.array([facts.full_output_rad for facts in records]) / np.maximum(gains, 1)
+        stall_a = np.array([facts.stall_current_a or 0.0 for facts in records])
+        self._slope = np.stack([stall_a / full_rad, np.ones(joints)])
+
+    def limits(self) -> Floats:
+        """Return the limits (2, J) of the differences, in A and rad."""
+        return np.array([[ALARM_A], [ALARM_RAD]]) + np.sqrt(self._unsure)
 
     def update(self, state: JointState, shadow: JointState) -> tuple[str, ...]:
         """Process a cycle; returns a sentence for each joint that begins to differ."""
@@ -65,11 +84,13 @@ class ShadowAlarm:
         quick, slow = 1.0 / (self.cycle_hz * _SMOOTH_S), 1.0 / (self.cycle_hz * _MEMORY_S)
         self._smooth += min(quick, 1.0) * np.where(state.valid, now - self._smooth, 0.0)
         self._square += min(slow, 1.0) * (self._smooth**2 - self._square)
+        effect = self._slope * shadow.velocity_rad_s * self._late_s(state)
+        self._unsure += min(slow, 1.0) * (effect**2 - self._unsure)
         self._cycles += 1
         if self._cycles < self.cycle_hz * _MEMORY_S:
             return ()
         apart_a, apart_rad = np.sqrt(self._square)
-        over = np.maximum(apart_a / ALARM_A, apart_rad / ALARM_RAD)
+        over = (np.sqrt(self._square) / self.limits()).max(axis=0)
         found = [int(j) for j in np.argsort(-over) if over[j] > 1.0 and int(j) not in self.named]
         self.named.update(found)
         return tuple(
@@ -77,6 +98,14 @@ class ShadowAlarm:
             f"{apart_a[j]:.3f} A, its angle by {apart_rad[j]:.3f} rad (over the last seconds)"
             for j in found
         )
+
+    def _late_s(self, state: JointState) -> float:
+        """Return how much later than the earliest reply this one came."""
+        age_s = state.age_s[state.valid]
+        if not len(age_s):
+            return 0.0
+        self._least_age_s = min(self._least_age_s, float(age_s.min()))
+        return float(age_s.min()) - self._least_age_s
 
 
 @plugin("observer", "shadow")
@@ -119,6 +148,7 @@ class RunShadow:
         self._measured_start = initial_pose is None
         start = initial_pose or self._pose(np.zeros(robot.joint_count))
         self._shadow = Shadow(run, robot, world, ground, start)
+        self._longest_s = _LONGEST_DELAY * run.safety.watchdog_s
         self._first_s: float | None = None
         self._last_s = 0.0
 
@@ -137,15 +167,23 @@ class RunShadow:
         if self._measured_start:
             self._shadow.restart(self._pose(state.position_rad))
 
-    def step(self, deadline_s: float, sent_rad: Floats, state: JointState) -> None:
-        """Follow one cycle: its goals as sent, and the state that was read before."""
+    def step(self, deadline_s: float, sent_s: float, sent_rad: Floats, state: JointState) -> None:
+        """Follow one cycle: its goals as sent, and the state that was read before.
+
+        The shadow is read, and gets its goals, when the robot was and did: a busy computer is late.
+        """
+        read_s = measured_s(state)
         if self._first_s is None:
-            self._first_s = deadline_s
-        elif is_gap(deadline_s - self._last_s, self._of[0]):
+            self._first_s = read_s
+        elif is_gap(read_s - self._last_s, self._of[0]):
             self._shadow.restart(self._pose(state.position_rad))
-            self._first_s = deadline_s
-        self._last_s = deadline_s
-        shadow = self._shadow.step(deadline_s - self._first_s, sent_rad)
+            self._first_s = read_s
+        self._last_s = read_s
+        shadow = self._shadow.step(
+            round(read_s - self._first_s, _CLOCK_DIGITS),
+            sent_rad,
+            sent_after_s=min(round(sent_s - read_s, _CLOCK_DIGITS), self._longest_s),
+        )
         self._rows.append((deadline_s, sent_rad, state.current_a, state.position_rad))
         self._log.add(
             ShadowTable,

@@ -52,15 +52,34 @@ class Shadow:
         self._lay_down(pose)
         self._start_s = self._clock.now_s()
 
-    def step(self, since_start_s: float, sent_rad: Floats, delay_s: float = 0.0) -> JointState:
+    def step(
+        self,
+        since_start_s: float,
+        sent_rad: Floats,
+        delay_s: float = 0.0,
+        *,
+        sent_after_s: float = 0.0,
+    ) -> JointState:
         """Read at a time since the start, as the other chain was read, then send its goals (J,).
 
-        ``delay_s``: how long the host computes in between.
+        Args:
+            since_start_s: when to read.
+            sent_rad: (J,) goals.
+            delay_s: how long the host computes between the reply and the goals.
+            sent_after_s: least time from the measurement to the goals.
+
         """
         self._clock.sleep_until_s(self._start_s + since_start_s)
         state = self._chain.read()
-        if delay_s > 0.0:
-            self._clock.sleep_until_s(self._clock.now_s() + delay_s)
+        goals_s = max(state.time_s + delay_s, measured_s(state) + sent_after_s)
+        if goals_s > self._clock.now_s():
+            self._clock.sleep_until_s(goals_s)
         self._chain.write(JointCommand(self._clock.now_s(), sent_rad))
         self._chain.check_servos()
         return state
+
+
+def measured_s(state: JointState) -> float:
+    """Return when the joints of a state were measured; the end of a read that failed."""
+    age_s = state.age_s[state.valid]
+    return state.time_s - (float(age_s.min()) if len(age_s) else 0.0)

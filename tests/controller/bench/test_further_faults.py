@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import ImuConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench.doctor import examine
@@ -21,6 +22,8 @@ from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.finding import Finding, worst
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import Ax12Line
+from snakewalk.sim.serve.bench_line import bench_line
+from snakewalk.sim.serve.chain_spec import parse_chain
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.controller.bench.test_broken_buses import (
     PAGE,
@@ -83,6 +86,21 @@ def later(servo_ids: Sequence[int], late_s: float) -> Step:
             return [(delay + late_s * is_slow, raw) for delay, raw in reply(data, now_s)]
 
         line._reply_with_faults = slow  # type: ignore[method-assign]
+
+    return plant
+
+
+def deaf_to(*instructions: int) -> Step:
+    """Firmware or adapter that drops these requests."""
+
+    def plant(line: TestLine) -> None:
+        write = line.write
+
+        def dropped(data: bytes) -> None:
+            if data[7:8] not in [bytes((each,)) for each in instructions]:
+                write(data)
+
+        line.write = dropped  # type: ignore[method-assign]
 
     return plant
 
@@ -267,6 +285,32 @@ FURTHER = [
         "fail",
     ),
     Kind(
+        "a velocity sensor that is off",
+        reads_as("Present Velocity", 60),
+        "velocity sensor",
+        "joint yaw_03 (ID 3) reports a velocity, but stands",
+    ),
+    Kind(
+        "a temperature that no motor bears",
+        reads_as("Present Temperature", 246),
+        "temperature",
+        "joint yaw_03 (ID 3) reports more than any motor bears",
+        "fail",
+    ),
+    Kind(
+        "fast reads without a reply",
+        deaf_to(0x8A),
+        "line",
+        "3 of 200 group reads incomplete: all fast ones, but no plain one",
+    ),
+    Kind(
+        "group reads without a reply",
+        deaf_to(0x82, 0x8A),
+        "line",
+        "group reads incomplete, though each servo replies by itself",
+        "fail",
+    ),
+    Kind(
         "all servos with the factory's ID",
         registers(*(("ID", row, 1) for row in range(4))),
         "duplicate IDs",
@@ -275,7 +319,11 @@ FURTHER = [
         {"start_rad": [0.0, 0.1, 0.2, -0.3]},
     ),
 ]
-BESIDES = (("a servo of Protocol 1.0", "protocol"), ("an IMU that is missing", "imu"))
+BESIDES = (
+    ("a servo of Protocol 1.0", "protocol"),
+    ("servos of another make", "protocol"),
+    ("an IMU that is missing", "imu"),
+)
 """Kinds with a test of their own."""
 
 
@@ -348,6 +396,43 @@ def test_servos_of_protocol_1_are_named() -> None:
     assert check(findings, "protocol").found == (
         "in Protocol 1.0 servos 1 to 4 reply at 1000000 baud"
     )
+    found = check(findings, "servo IDs")
+    assert found.found == "servos 1 to 4 reply in another protocol than the robot's servos"
+    assert "is the servo power on" not in " ".join(each.remedy for each in findings)
+    assert not [each for each in findings if each.check == "baud rate" and each.grade != "ok"]
+
+
+def test_a_silent_servo_next_to_protocol_1_is_named_by_itself() -> None:
+    """Servo 4 is silent; the others of its chain have power, but another protocol."""
+    line = Ax12Line(Ax12Servos([1, 2, 3], BenchPlant(3)))
+    findings = examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    rows = [(each.found, each.remedy) for each in findings if each.check == "servo IDs"]
+    assert [found for found, _ in rows] == [
+        "servos 1 to 3 reply in another protocol than the robot's servos",
+        "no answer from servo 4",
+    ]
+    assert rows[1][1].startswith("look at the cable in front of servo 4")
+
+
+def test_feetech_servos_of_a_robot_with_dynamixel_servos_are_named() -> None:
+    """They were reported as DYNAMIXEL servos of Protocol 1.0."""
+    line = bench_line(parse_chain("1-4:STS3215"), 1_000_000)
+    findings = examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    named = check(findings, "protocol")
+    assert named.found == "servos 1 to 4 are STS3215, of another make than XM430-W350"
+    assert "'STS3215'" in named.remedy
+    assert check(findings, "servo IDs").found.startswith("servos 1 to 4 reply in another protocol")
+
+
+def test_dynamixel_servos_of_a_robot_with_feetech_servos_are_named() -> None:
+    """The doctor asked whether they have power."""
+    robot = load_robot("sts3215-12")
+    line = bench_line(parse_chain("1-11:XM430-W350"), 1_000_000)
+    findings = examine(line, robot, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    named = check(findings, "protocol")
+    assert named.found == "servos 1 to 11 are XM430-W350, of another make than STS3215"
+    rows = [each.found for each in findings if each.check == "servo IDs" and each.grade != "ok"]
+    assert rows[1:] == ["no answer from servo 12"]
 
 
 def test_an_imu_that_is_missing_is_named() -> None:

@@ -5,7 +5,12 @@ import pytest
 
 from snakewalk.drivers.bus.control_cycle import CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
-from snakewalk.drivers.chain.goal_check import FOREIGN_READS, OWN_READS, GoalCheck
+from snakewalk.drivers.chain.goal_check import (
+    FOREIGN_READS,
+    OWN_READS,
+    WATCHED_READS,
+    GoalCheck,
+)
 from snakewalk.drivers.errors import BusError
 
 FOREIGN = 9999
@@ -81,7 +86,7 @@ def test_differences_count_up_to_the_limit_and_not_before(
     rig.cycle()
     for _ in range(reads - 1):
         rig.cycle(hold={0: value})
-        assert not rig.check.is_due
+        assert rig.check.is_due is (value == FOREIGN)
     with pytest.raises(BusError) as raised:
         rig.cycle(hold={0: value})
     assert str(raised.value) == f"a: Goal Position is {value}, not {rig.sent}: {cause}"
@@ -120,18 +125,61 @@ def test_a_foreign_goal_after_older_ones_is_of_a_second_master() -> None:
 
 def test_a_goal_that_is_right_again_ends_the_count() -> None:
     rig = Rig()
+    rig.cycle()
     for _ in range(10):
-        rig.cycle(hold={0: FOREIGN})
+        rig.cycles([{0: rig.sent}] * (OWN_READS - 1))
         rig.cycle()
     assert not rig.check.is_due
+
+
+def test_foreign_goals_in_three_reads_are_of_a_second_master_though_others_are_right() -> None:
+    """A program that wrote every 0.1 s was never seen in two reads in a row."""
+    rig = Rig()
+    rig.cycles([{0: FOREIGN}, {}, {}, {1: FOREIGN}, *([{}] * (WATCHED_READS - 2))])
+    with pytest.raises(BusError, match=r"^c: Goal Position is 9999, not \d+: another program"):
+        rig.cycle(hold={2: FOREIGN})
+
+
+def test_foreign_goals_that_are_rarer_are_forgotten() -> None:
+    rig = Rig()
+    for _ in range(5):
+        rig.cycles([{0: FOREIGN}, *([{}] * WATCHED_READS)])
+        assert rig.check.is_due is False
+
+
+def test_a_foreign_goal_of_many_joints_counts_as_one() -> None:
+    rig = Rig()
+    rig.cycles([{0: FOREIGN, 1: FOREIGN, 2: FOREIGN}, {}])
+    assert rig.check.is_due is True  # more reads follow as soon as there is time
+    rig.cycles([{0: FOREIGN, 1: FOREIGN, 2: FOREIGN}, {}])
+    with pytest.raises(BusError, match=r"^a, b, c: "):
+        rig.cycle(hold={0: FOREIGN, 1: FOREIGN, 2: FOREIGN})
+
+
+def test_a_foreign_goal_counts_again_only_after_another_write() -> None:
+    rig = Rig()
+    rig.cycle(hold={0: FOREIGN})
+    right = np.array([rig.sent, 10 + rig.sent, 20 + rig.sent], np.int32)
+    for _ in range(5):
+        for value in (right[0], FOREIGN):
+            rig.servos.goals[0] = value
+            rig.check.check(lambda joint: None)
+
+
+def test_older_goals_now_and_then_are_no_second_master() -> None:
+    rig = Rig()
+    rig.cycles([{0: 0}, {}])
+    for _ in range(10):
+        rig.cycles([{0: rig.sent}, {}])
 
 
 def test_joints_count_for_themselves() -> None:
     rig = Rig()
     rig.cycle()
+    for joint in (0, 1, 2):
+        rig.cycles([{joint: rig.sent + 10 * joint}] * (OWN_READS - 1))
     rig.cycle(hold={0: FOREIGN})
     rig.cycle(hold={1: FOREIGN})
-    rig.cycle(hold={2: FOREIGN})
 
 
 def test_all_joints_over_the_limit_are_named_in_their_order() -> None:
@@ -145,11 +193,11 @@ def test_all_joints_over_the_limit_are_named_in_their_order() -> None:
 def test_a_difference_counts_again_only_after_another_write() -> None:
     rig = Rig()
     rig.cycle()
-    rig.cycle(hold={0: FOREIGN})
+    rig.cycle(hold={0: 1})
     for _ in range(2 * OWN_READS):
         assert not rig.check.is_due
         rig.check.check(lambda joint: None)
-    rig.cycle(hold={0: FOREIGN}, is_read=False)
+    rig.cycle(hold={0: 1}, is_read=False)
     assert rig.check.is_due
 
 
