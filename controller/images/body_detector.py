@@ -27,6 +27,7 @@ _BETTER = 0.04  # of the frames: this many more must agree for another ground th
 _FEWEST = 5  # frames to estimate a ground
 _CALM = 8  # frames whose median has little noise
 _CLEAR = 0.9  # share above which no other size of the surroundings is tried
+_VOTES = 9  # frames that usually decide whether the animal is dark or light
 _SURE = 0.5  # share above which a ground's body length is trusted
 _FAINT = 0.5  # of the strongest contrast: a fainter body may be a stain
 _PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
@@ -332,10 +333,14 @@ def stands_out_both_ways(frames: Sequence[DeepImage]) -> bool:
 
 
 def _most_frequent(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
-    found = [
-        contrast_polarity(frame, smooth_background(frame) if background is None else background)
-        for frame in frames
-    ]
+    few = frames[:: max(1, len(frames) // _VOTES)]
+    for some in (few, frames):  # the animal may be absent in all of the few
+        found = [
+            contrast_polarity(frame, smooth_background(frame) if background is None else background)
+            for frame in some
+        ]
+        if any(found):
+            break
     return max(Polarity, key=found.count) if any(found) else Polarity.BOTH
 
 
