@@ -1,8 +1,8 @@
 """An uncalibrated lens above printed markers: how often it is reported, and false reports.
 
 ``python -m benchmarks.uncalibrated_lens``. Corners are projected, without pictures: 0.15 px of
-noise, places measured to 3 mm, prints of 98 or 100 % of their size, tilts of 0 to 15 degrees, at
-which some markers are outside of the picture.
+noise, places measured to 3 mm, prints of 98 or 100 % of their size, tilts of 0 to 15 degrees.
+Only cameras that show four markers or more completely count.
 """
 
 import os
@@ -15,6 +15,7 @@ from rich.table import Table
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.cameras.lens import Lens
+from snakewalk.controller.cameras.markers.floor_markers import FEWEST
 from snakewalk.controller.cameras.markers.lens_residual import marker_distortion
 
 FIVE: Final = {0: (-2.6, -1.9), 1: (2.6, -1.9), 2: (2.6, 1.9), 3: (-2.6, 1.9), 4: (0.0, 1.9)}
@@ -28,7 +29,7 @@ LENSES: Final = {0.0: 100, -0.03: 20, -0.05: 20, -0.1: 20, -0.3: 20, -0.5: 20}
 def seen(
     places: dict[int, tuple[float, float]], width_px: int, k1: float, chance: np.random.Generator
 ) -> tuple[dict[int, Floats], tuple[int, int]]:
-    """Corners of the markers in a picture, and its size."""
+    """Corners of the markers that a picture shows completely, and its size."""
     size = width_px, width_px * 3 // 4
     matrix = np.array([
         [width_px, 0.0, 0.5 * (size[0] - 1)], [0.0, width_px, 0.5 * (size[1] - 1)], [0.0, 0.0, 1.0]
@@ -45,9 +46,9 @@ def seen(
         floor = floor + side_m * _SQUARE @ np.array([[c, s], [-s, c]])
         points = np.column_stack([floor[:, 0], -floor[:, 1], np.full(4, _HEIGHT_M)]) @ rotation.T
         px = points @ matrix.T
-        corners[name] = lens.distorted(px[:, :2] / px[:, 2:]) + chance.normal(
-            0.0, _NOISE_PX, (4, 2)
-        )
+        px = lens.distorted(px[:, :2] / px[:, 2:]) + chance.normal(0.0, _NOISE_PX, (4, 2))
+        if ((px >= 0.0) & (px <= np.subtract(size, 1))).all():
+            corners[name] = px
     return corners, size
 
 
@@ -63,9 +64,10 @@ def main() -> None:
                 found = []
                 for _ in range(count):
                     corners, size = seen(places, width_px, k1, chance)
-                    found.append(marker_distortion(corners, places, size, _SIDE_M))
+                    if len(corners) >= FEWEST:
+                        found.append(marker_distortion(corners, places, size, _SIDE_M))
                 reported = sum(one is not None and one.is_certain for one in found)
-                row.append(f"{reported} of {count}")
+                row.append(f"{reported} of {len(found)}")
             table.add_row(str(len(places)), str(width_px), *row)
     Console().print(table)
 

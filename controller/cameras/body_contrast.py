@@ -27,6 +27,7 @@ _CALM_PX: Final = 200  # fewest pixels away from the body for the noise
 _BLOCK_PX: Final = 8  # of JPEG and of MJPEG
 _BLOCKS: Final = 1.3  # steps between blocks over those within: more is compression (ours)
 _STEP: Final = 4  # grey levels: a larger step is an edge of the scene (ours)
+_ALONE: Final = 3.0  # times the single steps at other columns: more is compression (ours)
 _CLEAR: Final = 0.4  # of the body's contrast; halos of compression have less (ours)
 DEEP_SHADE: Final = 0.9
 """Share of the light that a hard shadow may remove (ours)."""
@@ -166,9 +167,17 @@ def _draw(mask: NDArray[np.uint8], line_px: Floats, wide_px: float) -> None:
 
 
 def _is_compressed(image: Image) -> bool:
-    """Whether every eighth column of a frame has the largest steps."""
+    """Whether every eighth column of a frame has the largest steps, or the only ones.
+
+    Strong compression leaves most blocks without any step, except to the next block.
+    """
     grey = grey_of(image[::3]).astype(np.int16)
-    step = np.minimum(np.abs(np.diff(grey, axis=1)), _STEP).mean(axis=0)
-    step = step[: len(step) // _BLOCK_PX * _BLOCK_PX].reshape(-1, _BLOCK_PX)
-    step = np.median(step, axis=0)  # edges of the scene are in few columns
-    return bool(step[-1] > _BLOCKS * np.median(step[:-1]))
+    steps = np.minimum(np.abs(np.diff(grey, axis=1)), _STEP)
+    steps = steps[:, : steps.shape[1] // _BLOCK_PX * _BLOCK_PX]
+    mean = np.median(steps.mean(axis=0).reshape(-1, _BLOCK_PX), axis=0)  # scenes have few edges
+    if float(np.median(mean)) > 0.0:
+        return bool(mean[-1] > _BLOCKS * np.median(mean[:-1]))
+    moved = (steps > 0).astype(np.float32)
+    beside = cv2.boxFilter(moved, -1, (_BLOCK_PX - 1, 1), normalize=False)
+    alone = ((moved > 0) & (beside < 1.5)).sum(axis=0).reshape(-1, _BLOCK_PX).sum(axis=0)
+    return bool(alone[-1] > _ALONE * max(float(np.median(alone[:-1])), 1.0))

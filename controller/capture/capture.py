@@ -31,6 +31,33 @@ _FAINT_TAIL = 0.1  # of the length: expected error if something faint goes on be
 _STILL = 0.02  # of the length: a smaller change does not count as motion
 
 
+_ADVICE = {
+    FrameStatus.NOTHING: "no contrast or no motion: nothing stands out from the background; "
+    "give --background, or better light",
+    FrameStatus.SEVERAL: "several animals: give --animals N or --animals auto",
+    FrameStatus.MERGED: "the animal is never seen apart from others",
+    FrameStatus.EMPTY: "the found lines lie on empty ground; give --background",
+    FrameStatus.CUT: "the body is cut by the edge of the image",
+    FrameStatus.BLOB: "the silhouette is not a long body; give --background",
+}
+
+
+class UnusableFilmError(InputError):
+    """Too few frames can be used; the commonest reason, and what would help."""
+
+    def __init__(self, name: str, skeletons: Sequence[Skeleton]) -> None:
+        """Find the commonest status of the frames of the film called ``name``."""
+        reasons = [one.status for one in skeletons if one.status is not FrameStatus.GOOD]
+        self.reason: FrameStatus | None = None
+        """None: the film is too short."""
+        if not reasons:
+            super().__init__(f"{name}: {len(skeletons)} frame: two or more are needed")
+            return
+        self.reason = worst = max(dict.fromkeys(reasons), key=reasons.count)
+        advice = _ADVICE.get(worst, f"the body is never seen whole: {worst}")
+        super().__init__(f"{name}: {advice} ({reasons.count(worst)} of {len(skeletons)} frames)")
+
+
 @dataclass(frozen=True, slots=True)
 class Capture:
     """A recording as skeletons; all its T frames, NaN where neither ``good`` nor ``rough``."""
@@ -131,7 +158,7 @@ def captured_from(
     if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
         if part:
             return _without_body(found, checked, rate_hz, fixed=fixed)
-        raise InputError(f"{name}: {_fault(checked)}")
+        raise UnusableFilmError(name, checked)
     aligned = align_ends(checked)
     coils = solve_coils(aligned.skeletons, found.outlines, np.array(found.axis_error_px))
     aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
@@ -152,7 +179,7 @@ def captured_from(
     fitted = with_least_errors(fitted, found.faint_error_px)
     skeletons = verified(fitted.skeletons, found.store)
     if not part and sum(one.status.has_points for one in skeletons) < 2:
-        raise InputError(f"{name}: {_fault(skeletons)}")
+        raise UnusableFilmError(name, skeletons)
     usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
     expected = fitted.expected_px.copy()
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
@@ -334,24 +361,6 @@ def load_capture(path: Path) -> CaptureFile:
             int(one) for one in np.ravel(held.get("identity_uncertain_after", ()))
         ),
     )
-
-
-def _fault(checked: list[Skeleton]) -> str:
-    """Say why too few frames can be used: the commonest reason, and what would help."""
-    reasons = [one.status for one in checked if one.status is not FrameStatus.GOOD]
-    if not reasons:
-        return f"{len(checked)} frame: two or more are needed"
-    worst = max(dict.fromkeys(reasons), key=reasons.count)
-    advice = {
-        FrameStatus.NOTHING: "no contrast or no motion: nothing stands out from the background; "
-        "give --background, or better light",
-        FrameStatus.SEVERAL: "several animals: give --animals N or --animals auto",
-        FrameStatus.MERGED: "the animal is never seen apart from others",
-        FrameStatus.EMPTY: "the found lines lie on empty ground; give --background",
-        FrameStatus.CUT: "the body is cut by the edge of the image",
-        FrameStatus.BLOB: "the silhouette is not a long body; give --background",
-    }.get(worst, f"the body is never seen whole: {worst}")
-    return f"{advice} ({reasons.count(worst)} of {len(checked)} frames)"
 
 
 def _change(points: Floats) -> float:

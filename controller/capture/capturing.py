@@ -15,6 +15,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import (
     Capture,
     CaptureFile,
+    UnusableFilmError,
     load_capture,
     save_capture,
 )
@@ -31,7 +32,11 @@ from snakewalk.controller.capture.verification.film_check import REJECTED
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
-from snakewalk.controller.images.body_detector import BodyDetector, make_detector
+from snakewalk.controller.images.body_detector import (
+    BodyDetector,
+    make_detector,
+    stands_out_both_ways,
+)
 from snakewalk.controller.images.region import WHOLE
 from snakewalk.controller.images.video import Footage, in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -39,6 +44,7 @@ from snakewalk.controller.track.track import UNSURE_HEAD
 
 _MANY = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
 _EXPLAINED = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED, FrameStatus.LEFT_OUT}
+_TOO_FEW = 1.0 / 3.0  # of the frames that show the animal: fewer are used if its outline is unseen
 _INACCURATE = 0.015  # of the length: a larger expected error needs a look
 
 
@@ -157,7 +163,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         scale = picture_scale(film.some[::3], footage.count, str(options.recording))
     parts = _parts(options, film, folder, finished)
     with ProgressBar("frames", footage.count, transient=True, remaining=True) as bar:
-        captured = _captured(parts, film, detector, bar)
+        captured = _captured_clearly(options, parts, film, detector, bar)
         captured = in_whole_film(options, film, captured)
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
@@ -201,6 +207,35 @@ def _parts(
         finished=finished,
         part_frames=PART_FRAMES,
     )
+
+
+def _captured_clearly(
+    options: CaptureOptions,
+    parts: FilmParts,
+    film: OpenedFilm,
+    detector: BodyDetector,
+    bar: ProgressBar,
+) -> Capture:
+    """Capture the film; an animal as bright as its ground, whose outline is unseen, is a fault."""
+    fault = InputError(
+        f"{options.recording}: the animal is about as bright as its ground, or dark and light "
+        "shapes are in view; use other light, or give --background, --roi or --threshold"
+    )
+    try:
+        captured = _captured(parts, film, detector, bar)
+    except UnusableFilmError as error:
+        if error.reason not in {None, *_EXPLAINED} and stands_out_both_ways(film.some):
+            raise fault from None
+        raise
+    few = captured.used.sum() < _TOO_FEW * len(_shown(captured))
+    if few and stands_out_both_ways(film.some):
+        raise fault
+    return captured
+
+
+def _shown(captured: Capture) -> list[FrameStatus]:
+    """Statuses of the frames in which a whole animal is expected."""
+    return [one for one in captured.status if one.has_points or one not in _EXPLAINED]
 
 
 def _captured(

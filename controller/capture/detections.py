@@ -67,7 +67,8 @@ class Detections:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)
                 self.faint_error_px[number] = axis_px
-        if body.status is FrameStatus.GOOD or body.status in COILS:
+        may_coil = body.status in COILS and silhouette.status is FrameStatus.GOOD
+        if body.status is FrameStatus.GOOD or may_coil:
             width_px = 2.0 * float(np.max(body.radius_px))
             self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
         self._keep(number, frame, detection)

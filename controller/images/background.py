@@ -12,6 +12,8 @@ from snakewalk.controller.images.silhouette import Polarity, as_deep_as
 _GRID_PX = 64  # longest side of the image to which the surface is fitted
 _ROUNDS = 4
 _STRONGEST_PX = 20.0  # number of pixels that decide the polarity
+_SHRUNK_PX = 400  # side of the picture of which medians are taken
+_CLEAR = 6.0  # standard deviations of the noise: a contrast that shows an animal
 _QUANTILE = 0.85  # a slow dark animal may cover a pixel in up to this share of the frames
 
 
@@ -81,16 +83,27 @@ def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> De
     return as_deep_as(image, cv2.blur(closed, (side_px, side_px)))
 
 
-def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity:
-    """Whether the pixels of most contrast are darker or lighter than the ground, or both."""
+def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity | None:
+    """Whether the pixels of most contrast are darker or lighter than the ground, or both.
+
+    None: nothing stands out by more than noise.
+    """
     kind: type[np.int16 | np.float32] = np.int16 if image.dtype == np.uint8 else np.float32
     apart: NDArray[np.int16 | np.float32] = image.astype(kind) - background.astype(kind)
     if apart.ndim == 3:
-        strongest = np.argmax(np.abs(apart), axis=2)[..., None]
-        apart = np.take_along_axis(apart, strongest, axis=2)[..., 0]
-    smooth = np.asarray(cv2.GaussianBlur(apart, (5, 5), 0.0), dtype=float) - np.median(apart)
-    part = min(0.5, _STRONGEST_PX / smooth.size)
-    edge = 0.5 * float(np.percentile(np.abs(smooth), 100.0 - 100.0 * part))
+        one, *others = (cv2.extractChannel(apart, k) for k in range(apart.shape[2]))
+        for other in others:
+            one = np.where(np.abs(other) > np.abs(one), other, one)
+        apart = one
+    every = max(1, min(apart.shape) // _SHRUNK_PX)
+    smooth = cv2.GaussianBlur(apart.astype(np.float32), (5, 5), 0.0)
+    smooth = smooth - np.float32(np.median(apart[::every, ::every]))
+    size = np.abs(smooth)
+    few = min(smooth.size // 2, round(_STRONGEST_PX))
+    strongest = float(np.partition(size.ravel(), -few)[-few])
+    if strongest < _CLEAR * 1.4826 * float(np.median(size[::every, ::every])):
+        return None
+    edge = 0.5 * strongest
     dark, light = np.count_nonzero(smooth < -edge), np.count_nonzero(smooth > edge)
     if max(dark, light) < 4 * min(dark, light):
         return Polarity.BOTH

@@ -17,7 +17,7 @@ from snakewalk.controller.images.background import (
 )
 from snakewalk.controller.images.faint_parts import may_have_faint_parts, with_faint_parts
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton, skeleton_of_level
-from snakewalk.controller.images.residual import check_residual
+from snakewalk.controller.images.residual import check_residual, is_ghost
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -27,6 +27,7 @@ _BETTER = 0.04  # of the frames: this many more must agree for another ground th
 _FEWEST = 5  # frames to estimate a ground
 _CALM = 8  # frames whose median has little noise
 _CLEAR = 0.9  # share above which no other size of the surroundings is tried
+_VOTES = 9  # frames that usually decide whether the animal is dark or light
 _SURE = 0.5  # share above which a ground's body length is trusted
 _FAINT = 0.5  # of the strongest contrast: a fainter body may be a stain
 _PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
@@ -109,6 +110,9 @@ class BodyDetector:
             rows, columns = body.mask.shape
             if (body.mask & ~self.inside[top : top + rows, left : left + columns]).any():
                 body = replace(body, status=FrameStatus.CUT)
+        may_be_ghost = self.background is not None and body.status is FrameStatus.GOOD
+        if may_be_ghost and is_ghost(image, background, body):
+            body = replace(body, status=FrameStatus.GHOST)
         if body.status is not FrameStatus.GOOD:
             return Detection(body, no_skeleton(body.status), background)
         skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
@@ -308,18 +312,36 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
 
 
 def usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
-    """Return the polarity of most frames.
+    """Return the polarity of most frames in which something stands out.
 
     If the background shows the animal, frames stand out both ways; each frame alone then decides.
     """
-    found = [
-        contrast_polarity(frame, smooth_background(frame) if background is None else background)
-        for frame in frames[:: max(1, len(frames) // 9)]
-    ]
-    usual = max(Polarity, key=found.count)
+    usual = _most_frequent(frames, background)
     if background is not None and usual is Polarity.BOTH:
-        return usual_polarity(frames, None)
+        return _most_frequent(frames, None)
     return usual
+
+
+def stands_out_both_ways(frames: Sequence[DeepImage]) -> bool:
+    """Whether most frames are darker than their median in places, and lighter in others.
+
+    An animal as bright as its ground shows only its pattern in this way.
+    """
+    alike = len({frame.shape for frame in frames}) == 1
+    ground = median_background(frames) if alike else None
+    return _most_frequent(frames, ground) is Polarity.BOTH
+
+
+def _most_frequent(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
+    few = frames[:: max(1, len(frames) // _VOTES)]
+    for some in (few, frames):  # the animal may be absent in all of the few
+        found = [
+            contrast_polarity(frame, smooth_background(frame) if background is None else background)
+            for frame in some
+        ]
+        if any(found):
+            break
+    return max(Polarity, key=found.count) if any(found) else Polarity.BOTH
 
 
 def _size(image: DeepImage) -> str:

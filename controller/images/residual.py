@@ -16,6 +16,7 @@ _AWAY = 1.2  # widths from the body: a shadow stays nearer
 _PART = 0.02  # of the body's summed contrast: a larger residual beyond a tip is a part of it
 _GHOST = 0.05  # the same for objects that only the background shows
 _GHOST_WEAK = 0.3  # of the body's contrast
+_EDGES = 0.5  # share of the outline's edges that the frame must show; a ghost has about none
 
 
 def check_residual(
@@ -59,6 +60,30 @@ def check_residual(
         if _ghost(seen, ground, polarity, body, wide, least) > _GHOST * mass:
             return FrameStatus.GHOST
     return FrameStatus.GOOD
+
+
+def is_ghost(image: DeepImage, background: DeepImage, silhouette: Silhouette) -> bool:
+    """Whether the outline of a silhouette is an edge of the background and not of the frame.
+
+    Frame minus background has the gradient a - b along the outline. The share of the frame in its
+    square, a (a - b), is 1 for a body on bare ground and 0 where only the background shows a body.
+    """
+    rows, columns = silhouette.level.shape
+    left, top = (int(v) for v in silhouette.origin_px)
+    window = (slice(top, top + rows), slice(left, left + columns))
+    body = silhouette.mask.astype(np.uint8)
+    box = np.ones((3, 3), dtype=np.uint8)
+    outline = cv2.dilate(body, box) != cv2.erode(body, box)
+    own, other = _gradient(image[window], outline), _gradient(background[window], outline)
+    apart = own - other
+    return float((own * apart).sum()) < _EDGES * float((apart * apart).sum())
+
+
+def _gradient(image: DeepImage, places: Bools) -> Floats:
+    """(2, P[, C]) slopes along x and y at some places (H, W), with single-pixel noise averaged."""
+    grey = cv2.GaussianBlur(np.asarray(image, dtype=np.float32), (3, 3), 0.0)
+    slopes = [cv2.Sobel(grey, cv2.CV_32F, *way)[places] for way in ((1, 0), (0, 1))]
+    return np.asarray(slopes, dtype=float)
 
 
 def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:

@@ -190,12 +190,13 @@ def cut_out(
 
     The margin is ``most_px`` if more than noise reaches the edge, else a few pixels.
     """
-    found = connected_parts((apart > threshold).astype(np.uint8))
+    above = apart > threshold
+    found = connected_parts(above.astype(np.uint8))
     if found is None:
         return _no_silhouette()
     label, stats = found
     areas = stats[1:, cv2.CC_STAT_AREA]
-    sums = np.bincount(label.ravel(), weights=(apart - np.float32(middle)).ravel())
+    sums = np.bincount(label[above], weights=apart[above] - np.float32(middle))
     best = 1 + int(np.argmax(sums[1:]))
     left, top, wide, high, area = (int(v) for v in stats[best])
     rows, columns = apart.shape

@@ -37,7 +37,7 @@ _TOUCH_PX: Final = 1.0
 """How far from the plane a pixel may be that belongs to it (ours)."""
 
 
-def match(left: Image, right: Image, count: int, least: int = 0) -> Floats:
+def match(left: Image, right: Image, count: int, least: int = 0, fill_px: int = 0) -> Floats:
     """Disparities (H, W) of the left picture's pixels, NaN if unknown.
 
     A pixel is known if it matches in both directions, lies on a plane with its neighbours, and is
@@ -48,6 +48,8 @@ def match(left: Image, right: Image, count: int, least: int = 0) -> Floats:
         right: the same scene from farther right: a point lies further left in it.
         count: number of disparities from ``least``; rounded up to 16.
         least: least disparity.
+        fill_px: gaps of a row up to this width are filled: for views, not for maps, because
+            nothing was measured there.
 
     Raises:
         InputError: pictures of different sizes, or narrower than the range.
@@ -72,7 +74,30 @@ def match(left: Image, right: Image, count: int, least: int = 0) -> Floats:
         checked = _aligned(left, right, checked)
     smooth = np.empty_like(checked)
     _on_planes(checked, smooth, _RADIUS_PX, _TOUCH_PX, _LEAST_SHARE)
-    return _without_specks(smooth, least)
+    return _filled(_without_specks(smooth, least), fill_px)
+
+
+def _filled(disparity: Floats, most_px: int) -> Floats:
+    """Fill short gaps of each row: between ends that agree in a straight line.
+
+    Otherwise the gap is hidden from one camera, so it belongs to the farther side (Hirschmueller
+    2008, 2.7).
+    """
+    if not most_px:
+        return disparity
+    column = np.arange(disparity.shape[1])
+    known = np.isfinite(disparity)
+    before = np.maximum.accumulate(np.where(known, column, -1), axis=1)
+    after = np.minimum.accumulate(np.where(known, column, len(column))[:, ::-1], axis=1)[:, ::-1]
+    between = (before >= 0) & (after < len(column)) & ~known & (after - before <= most_px + 1)
+    row, at = np.nonzero(between)
+    first, last = before[between], after[between]
+    one, other = disparity[row, first], disparity[row, last]
+    share = (at - first) / (last - first)
+    out = disparity.copy()
+    near = np.abs(one - other) <= _AGREE_PX
+    out[between] = np.where(near, one + share * (other - one), np.minimum(one, other))
+    return out
 
 
 def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:

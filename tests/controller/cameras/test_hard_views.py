@@ -10,6 +10,7 @@ import pytest
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
+from snakewalk.controller.cameras.body_contrast import _is_compressed
 from snakewalk.controller.cameras.floor_light import banded_floor
 from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.cameras.pose_fit import fit_both_ends
@@ -127,3 +128,19 @@ def test_bands_of_rows_are_light_and_smooth_light_is_not_a_band() -> None:
     gradient = np.linspace(0.7, 1.3, 120)[:, None, None]
     smooth = np.asarray(np.rint(floor * gradient), np.uint8)
     assert banded_floor(smooth, floor) is floor
+
+
+@pytest.mark.parametrize("quality", [5, 10, 20, 50])
+def test_compression_is_noticed_even_if_most_blocks_have_one_level(quality: int) -> None:
+    floor = np.full((240, 320, 3), 140.0)
+    floor += np.random.default_rng(3).normal(0.0, 3.0, floor.shape)
+    floor[60:75, 40:240] = 60.0
+    coded = cv2.imencode(".jpg", sensed(floor), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    assert _is_compressed(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)))
+    assert not _is_compressed(sensed(floor))
+
+
+def test_a_frame_without_noise_is_not_taken_for_a_compressed_one() -> None:
+    x, y = np.meshgrid(np.arange(320.0), np.arange(240.0))
+    ramp = np.floor(100.0 + 0.11 * x + 0.07 * y)
+    assert not _is_compressed(sensed(np.dstack([ramp] * 3)))

@@ -4,11 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.capturing import warning_of
+from snakewalk.controller.capture.capturing import capture_recording, warning_of
 from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.verification.film_check import goes_on_faintly
@@ -16,7 +19,14 @@ from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
-from tests.oracles.rendered_snake import SnakeScene, empty, film, half_width, true_midlines
+from tests.oracles.rendered_snake import (
+    SnakeScene,
+    coverage,
+    empty,
+    film,
+    half_width,
+    true_midlines,
+)
 from tests.oracles.skeleton_accuracy import point_error
 
 SCENE = SnakeScene(rows=240, columns=320, frames=10, rate_hz=3.75, wave_hz=0.6, length_px=100.0)
@@ -104,3 +114,19 @@ def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
         store.put(number, frame, body.points_px, body.length_px)
         found.append(body)
     assert goes_on_faintly(align_ends(found).skeletons, store) is expected
+
+
+def test_an_animal_as_bright_as_its_ground_is_rejected_with_that_reason(tmp_path: Path) -> None:
+    scene = replace(SCENE, rows=220, columns=260)
+    rng = np.random.default_rng(4)
+    mottled = rng.normal(0.0, 45.0, (scene.rows, scene.columns))
+    pattern = 3.5 * gaussian_filter(mottled, 1.0)
+    folder = tmp_path / "mottled"
+    folder.mkdir()
+    for k, line in enumerate(true_midlines(scene)):
+        body = coverage(scene, line)
+        frame = scene.ground + body * pattern + rng.normal(0.0, 3.0, body.shape)
+        cv2.imwrite(str(folder / f"{k:02d}.png"), np.clip(frame, 0.0, 255.0).astype(np.uint8))
+    with pytest.raises(InputError, match="the animal is about as bright as its ground"):
+        capture_recording(CaptureOptions(folder, tmp_path / "track.npz", rate_hz=4.0))
+    assert not (tmp_path / "track.npz").exists()

@@ -49,7 +49,7 @@ def off_px(track: Path) -> float:
 
 def test_the_region_or_the_mask_leaves_the_clutter_out(cluttered: Path, tmp_path: Path) -> None:
     plain = replace(CaptureOptions(cluttered, tmp_path / "t.npz"), force=True)
-    with pytest.raises(InputError, match="the found lines lie on empty ground"):
+    with pytest.raises(InputError, match="give --background"):
         capture_recording(plain)
     roi = capture_recording(replace(plain, roi=f"{PAD[1]},{PAD[0]},{SCENE.columns},{SCENE.rows}"))
     assert roi.frames_used == SCENE.frames

@@ -6,8 +6,9 @@ import pytest
 import skimage.data
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from benchmarks.stereo import widened_opencv
 from snakewalk.config.errors import InputError
-from snakewalk.controller.mapping.disparity import match
+from snakewalk.controller.mapping.disparity import _filled, match
 
 ROWS, COLUMNS = 120, 200
 V, U = np.mgrid[:ROWS, :COLUMNS].astype(float)
@@ -97,3 +98,24 @@ def test_little_is_told_of_a_sky_over_textured_ground() -> None:
     told = np.isfinite(match(left, right, 32))
     assert told[:46].mean() < 0.25
     assert told[54:, 16:-4].mean() > 0.95
+
+
+def test_filled_gaps_are_interpolated_or_belong_to_the_farther_side() -> None:
+    nan = np.nan
+    row = np.array([[nan, 4.0, nan, nan, 4.6, nan, 9.0, nan, nan, nan, 9.0, nan]])
+    found = _filled(row, 2)
+    wanted = [nan, 4.0, 4.2, 4.4, 4.6, 4.6, 9.0, nan, nan, nan, 9.0, nan]
+    assert np.allclose(found[0], wanted, equal_nan=True)
+    assert np.array_equal(_filled(row, 0), row, equal_nan=True)
+
+
+def test_filled_gaps_lead_a_real_pair_in_both_columns() -> None:
+    left, right, truth = skimage.data.stereo_motorcycle()
+    has_truth = np.isfinite(truth)
+    shares = []
+    for found in (match(left, right, 80, fill_px=16), widened_opencv(left, right, 80)):
+        told = has_truth & np.isfinite(found)
+        close = np.abs(found - truth)[told] <= 1.0
+        shares.append((close.sum() / has_truth.sum(), close.mean()))
+    assert shares[0][0] > shares[1][0] + 0.005
+    assert shares[0][1] > shares[1][1] + 0.01
