@@ -140,3 +140,24 @@ def test_help_shows_an_example(name: str) -> None:
     done = CliRunner().invoke(app, ["fish", name, "--help"])
     assert done.exit_code == 0
     assert f"snakewalk fish {name}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("tank", "apart", "warning"),
+    [
+        ("-1.2,-0.3,0.4,0.3", "0.1", "the fish leaves the tank by"),
+        ("-2,-2,4,3", "2.6", "come nearer than --apart"),
+        ("-20,-20,20,20", "0.1", ""),
+    ],
+)
+def test_a_fish_that_cannot_keep_its_distance_is_reported(
+    tank: str, apart: str, warning: str, tmp_path: Path
+) -> None:
+    """A fish of nearly straight segments left its tank by 15 lengths without a word."""
+    save_postures(tmp_path / "postures.npz", swim())
+    words = ["fish", "synthesise", str(tmp_path / "postures.npz"), "--seconds", "6"]
+    words += ["-o", str(tmp_path / "track.npz"), f"--tank={tank}", "--apart", apart, "--json"]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert warning in done.stderr
+    assert bool(warning) == bool(done.stderr)
