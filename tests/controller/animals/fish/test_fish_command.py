@@ -142,22 +142,18 @@ def test_help_shows_an_example(name: str) -> None:
     assert f"snakewalk fish {name}" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("tank", "apart", "warning"),
-    [
-        ("-1.2,-0.3,0.4,0.3", "0.1", "the fish leaves the tank by"),
-        ("-2,-2,4,3", "2.6", "come nearer than --apart"),
-        ("-20,-20,20,20", "0.1", ""),
-    ],
-)
-def test_a_fish_that_cannot_keep_its_distance_is_reported(
-    tank: str, apart: str, warning: str, tmp_path: Path
-) -> None:
+def test_a_fish_that_cannot_keep_its_distance_is_reported(tmp_path: Path) -> None:
     """A fish of nearly straight segments left its tank by 15 lengths without a word."""
     save_postures(tmp_path / "postures.npz", swim())
-    words = ["fish", "synthesise", str(tmp_path / "postures.npz"), "--seconds", "6"]
-    words += ["-o", str(tmp_path / "track.npz"), f"--tank={tank}", "--apart", apart, "--json"]
-    done = CliRunner().invoke(app, words, catch_exceptions=False)
-    assert done.exit_code == 0
-    assert warning in done.stderr
-    assert bool(warning) == bool(done.stderr)
+    first = tmp_path / "first.npz"
+    words = ["fish", "synthesise", str(tmp_path / "postures.npz"), "--seconds", "6", "--json"]
+    for options, warning in (
+        (["--tank=-20,-20,20,20", "-o", str(first)], ""),
+        (["--tank=-1.2,-0.3,0.4,0.3", "--apart", "0.1"], "the fish leaves the tank by"),
+        (["--avoid", str(first)], "come nearer than --apart to walls or fish"),
+    ):
+        out = [] if "-o" in options else ["-o", str(tmp_path / "track.npz"), "--force"]
+        done = CliRunner().invoke(app, words + options + out, catch_exceptions=False)
+        assert done.exit_code == 0
+        assert warning in done.stderr
+        assert bool(warning) == bool(done.stderr)
