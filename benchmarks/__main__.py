@@ -38,6 +38,7 @@ MODULES = tuple(
         "replanning",
         "busy_calibrations",
         "light_install",
+        "equal_chords",
     )
     if find_spec(f"benchmarks.{name}") is not None
 )

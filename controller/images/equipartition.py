@@ -1,10 +1,9 @@
 """Equal chords along a curve: ``N`` consecutive points on it, first at A, last at B ([PT] 2.3).
 
 The order of methods: steepest descent on the chord ([PT] Algorithm 1, corrected in the errata);
-bisection if it does not settle. Then come chords that end at a later crossing of their circle;
-the path of
-the existence proof (``chord_path``). A curve without a solution is an error, never an unequal
-partition.
+bisection if it does not settle. Then come chords that end at a later crossing of their circle, all
+crossings together (``chord_branches``), and the path of the existence proof (``chord_path``). If
+none finds a solution, the result is an error, never an unequal partition.
 """
 
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.images.chord_branches import BranchBracket, BranchSearch
 from snakewalk.controller.images.chord_path import follow_chords
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -45,7 +45,7 @@ class Equipartition:
     """Distance of neighbouring points, in the curve's unit."""
     method: str
     """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``,
-    ``two places`` (3 chords), ``path`` (the path of ``chord_path``)."""
+    ``two places`` (3 chords), ``branches`` (``chord_branches``), ``path`` (``chord_path``)."""
     solutions: int
     """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""
@@ -197,6 +197,8 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
             if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in found):
                 found.append(third)
     if not found:
+        found = _by_branches(given)
+    if not found:
         places = follow_chords(given.curve, given.arc, given.segments, _path_steps(given))
         if places is not None:
             found.append(_at_places(given, places))
@@ -206,6 +208,19 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
         )
     best = min(found, key=lambda one: one.distance)
     return Equipartition(best.points, best.at, best.chord, best.method, len(found), best.distance)
+
+
+def _by_branches(given: _Curve) -> list[Equipartition]:
+    """Return the first solution among the branches of all crossings: that of the longest chord."""
+
+    def root(bracket: BranchBracket) -> float | None:
+        return _bisect(given, bracket.low, bracket.high, bracket.crossing)
+
+    search = BranchSearch(given.line, given.line_arc, given.length, given.segments)
+    least = max(given.least * (1.0 - 1e-12), 1e-6 * given.most)
+    for chord, crossing in search.solutions(least, given.most, root):
+        return [given.solution(chord, "branches", crossing)]
+    return []
 
 
 def _path_steps(given: _Curve) -> int:

@@ -281,7 +281,8 @@ def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
     texture = model.tex("ground")
     size = TEXELS * TEXELS * 3
     start = int(texture.adr[0])
-    model.tex_data[start : start + size] = colour.astype(np.uint8).ravel()
+    # the first row of a texture has the largest y, that of a height field the smallest
+    model.tex_data[start : start + size] = colour[::-1].astype(np.uint8).ravel()
 
 
 def _contours(level: Floats) -> Floats:

@@ -9,10 +9,15 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
 from snakewalk.controller.animals.commands.pictures import pictures
-from snakewalk.controller.animals.fish.fish_synthesis import SynthesisOptions, synthesise_motion
+from snakewalk.controller.animals.fish.fish_synthesis import (
+    SynthesisFacts,
+    SynthesisOptions,
+    synthesise_motion,
+)
 from snakewalk.controller.animals.fish.postures import load_postures
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
@@ -106,7 +111,23 @@ def synthesise(
         made.save(part)
     if picture is not None:
         pictures()[1].draw_synthesis(picture, made, options)
+    _warn(made.facts)
     show(made.facts.to_dict() | {"track": str(output)}, as_json)
+
+
+def _warn(facts: SynthesisFacts) -> None:
+    """Warn of a fish that leaves its tank, or comes nearer to walls and fish than requested."""
+    advice = "film more turns, add --mirror, or give a larger --tank"
+    if facts.wall_distance is not None and facts.wall_distance < 0.0:
+        LOGGER.warning(
+            "--tank: the fish leaves the tank by %.3g; its segments turn too little; %s",
+            -facts.wall_distance, advice,
+        )  # fmt: skip
+    elif facts.pieces_too_close:
+        LOGGER.warning(
+            "%s of %s segments come nearer than --apart to walls or fish; %s",
+            facts.pieces_too_close, facts.pieces_used, advice,
+        )  # fmt: skip
 
 
 def _points(words: list[str]) -> list[tuple[float, ...]]:

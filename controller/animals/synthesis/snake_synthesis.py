@@ -198,7 +198,7 @@ class SnakeSynthesis:
         """Synthesise a motion until the last target, or for a number of frames on the map.
 
         A number of frames can lead beyond the path. The motion then ends when the head leaves the
-        ground of the world.
+        ground of the world. Before the last target it ends when the whole body has left it.
 
         Raises:
             InputError: the run's time limit allows more than ``FRAMES_MAX``.
@@ -228,7 +228,10 @@ class SnakeSynthesis:
 
         def until(points_m: Floats) -> bool:
             reached = targets.observe(points_m)
-            return reached if frames is None else not self.prepared.on_map(points_m[0])
+            if frames is None:
+                return reached
+            on_map = self.prepared.on_map(points_m)
+            return not (on_map[0] if reached else on_map.any())
 
         if run.motion == "kp":
             plan, states = self._on_graph(most, until)

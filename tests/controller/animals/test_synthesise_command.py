@@ -223,6 +223,14 @@ def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_p
     assert head_m[-1] > 1.5 >= head_m[:-1].max()
 
 
+def test_frames_do_not_end_a_motion_before_the_last_waypoint(tmp_path: Path) -> None:
+    """The head left the floor 18 frames before the middle of the body reached the waypoint."""
+    words = ["synthesise", "flat-slalom", "--json", "-o", str(tmp_path / "out"), "--frames", "3000"]
+    facts = json.loads(snakewalk(*words).stdout)
+    assert facts["waypoints_reached"] == 5
+    assert facts["frames"] < 3000
+
+
 def test_a_motion_on_paper_is_refused_as_a_run() -> None:
     done = snakewalk("run", "jacksboro-traverse", "--motion", "kp")
     assert done.returncode == 2

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from snakewalk.controller.images.chord_branches import BranchSearch
 from snakewalk.controller.images.chord_path import follow_chords, solve
 from snakewalk.controller.images.equipartition import (
     NoEquipartitionError,
@@ -134,8 +135,8 @@ def first_crossings_only(curve: Floats, n: int) -> Floats:
     return np.asarray(found)
 
 
-def bent(seed: int) -> Floats:
-    turns = np.cumsum(np.random.default_rng(seed).normal(size=60) * 0.6)
+def bent(seed: int, turn_rad: float = 0.6) -> Floats:
+    turns = np.cumsum(np.random.default_rng(seed).normal(size=60) * turn_rad)
     return np.cumsum(np.column_stack([np.cos(turns), np.sin(turns)]), axis=0)
 
 
@@ -171,21 +172,46 @@ def test_three_chords_are_found_on_every_smooth_body(seed: int) -> None:
 @pytest.mark.parametrize(("seed", "n"), [(1, 4), (31, 4), (63, 5)])
 def test_the_path_of_the_proof_ends_at_an_equipartition(seed: int, n: int) -> None:
     """Counted crossings lead to none of these: 15 of 61 smooth bodies were rejected at 4 chords."""
-    found = equipartition(smooth(seed), n)
-    assert found.method == "path"
-    assert np.ptp(chords(found.points)) < 1e-9
-    assert (np.diff(found.at) > 0.0).all()
-    assert np.array_equal(found.points[[0, -1]], smooth(seed)[[0, -1]])
-    assert on_curve(smooth(seed), found.points) < 1e-9
+    curve = smooth(seed)
+    arc = np.concatenate([[0.0], np.cumsum(chords(curve))])
+    places = follow_chords(curve, arc, n, 40_000)
+    assert places is not None
+    points = np.column_stack([np.interp(places, arc, column) for column in curve.T])
+    assert np.ptp(chords(points)) < 1e-9
+    assert (np.diff(places) > 0.0).all()
 
 
-def test_the_path_divides_a_zigzag_into_a_hundred_chords() -> None:
-    """Counted crossings reject this one of 60."""
-    found = equipartition(bent(26), 100)
-    assert found.method == "path"
-    assert np.ptp(chords(found.points)) < 1e-9
+@pytest.mark.parametrize("n", [4, 5, 6, 7, 8])
+def test_few_chords_divide_every_smooth_body(n: int) -> None:
+    for seed in range(2000, 2012):
+        curve = smooth(seed)
+        found = equipartition(curve, n)
+        assert np.ptp(chords(found.points)) < 1e-8
+        assert (np.diff(found.at) > 0.0).all()
+        assert on_curve(curve, found.points) < 1e-9
+
+
+@pytest.mark.parametrize("seed", [1, 18, 31, 1001, 1006, 1011])
+def test_a_hundred_chords_divide_a_zigzag(seed: int) -> None:
+    """Turns of 1 rad (standard deviation): no count of one later crossing divides 14 of 20."""
+    curve = bent(seed, 1.0)
+    found = equipartition(curve, 100)
+    assert np.ptp(chords(found.points)) < 1e-7
     assert (np.diff(found.at) > 0.0).all()
-    assert on_curve(bent(26), found.points) < 1e-9
+    assert np.array_equal(found.points[[0, -1]], curve[[0, -1]])
+    assert on_curve(curve, found.points) < 1e-9
+
+
+def test_the_sum_of_signs_counts_the_branches_that_pass_the_end() -> None:
+    """One sharp corner has three branches; their signs sum to 0 below and 1 above all solutions."""
+    curve = np.array([[0.0, 0.0], [3.0, 0.0], [3.0 - 4.0 * np.cos(0.5), 4.0 * np.sin(0.5)]])
+    arc = np.array([0.0, 3.0, 7.0])
+    search = BranchSearch(curve, arc, 5.0, 4)
+    sums = [search.branches(chord, 12.0) for chord in (0.2, 0.5, 0.9, 1.4, 1.75)]
+    assert [each.sign_sum for each in sums] == [0, 0, 1, 1, 1]
+    folded = search.branches(1.4, 12.0)
+    assert len(folded.excess) == 3, "the corner is passed in three ways"
+    assert folded.is_complete
 
 
 @pytest.mark.parametrize("count", [2, 5, 100])

@@ -140,3 +140,20 @@ def test_help_shows_an_example(name: str) -> None:
     done = CliRunner().invoke(app, ["fish", name, "--help"])
     assert done.exit_code == 0
     assert f"snakewalk fish {name}" in done.stdout
+
+
+def test_a_fish_that_cannot_keep_its_distance_is_reported(tmp_path: Path) -> None:
+    """A fish of nearly straight segments left its tank by 15 lengths without a word."""
+    save_postures(tmp_path / "postures.npz", swim())
+    first = tmp_path / "first.npz"
+    words = ["fish", "synthesise", str(tmp_path / "postures.npz"), "--seconds", "6", "--json"]
+    for options, warning in (
+        (["--tank=-20,-20,20,20", "-o", str(first)], ""),
+        (["--tank=-1.2,-0.3,0.4,0.3", "--apart", "0.1"], "the fish leaves the tank by"),
+        (["--avoid", str(first)], "come nearer than --apart to walls or fish"),
+    ):
+        out = [] if "-o" in options else ["-o", str(tmp_path / "track.npz"), "--force"]
+        done = CliRunner().invoke(app, words + options + out, catch_exceptions=False)
+        assert done.exit_code == 0
+        assert warning in done.stderr
+        assert bool(warning) == bool(done.stderr)
