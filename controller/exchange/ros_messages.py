@@ -90,7 +90,9 @@ def pose_frame(header: Header) -> str:
 
 
 def _variance(deviation: float | None) -> float:
-    return UNKNOWN_VARIANCE if deviation is None else max(deviation**2, _LEAST_VARIANCE)
+    if deviation is None or not np.isfinite(deviation):  # not a number: nothing was measured yet
+        return UNKNOWN_VARIANCE
+    return max(deviation**2, _LEAST_VARIANCE)
 
 
 class RosMessages:

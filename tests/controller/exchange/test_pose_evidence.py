@@ -10,7 +10,13 @@ from mcap.reader import make_reader
 from snakewalk.controller.exchange.flat_table import flat_tables, write_csv, write_parquet
 from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
-from snakewalk.controller.exchange.ros_messages import OK, WARNING, RosMessages
+from snakewalk.controller.exchange.ros_messages import (
+    OK,
+    UNKNOWN_VARIANCE,
+    WARNING,
+    RosMessages,
+    _variance,
+)
 from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -78,3 +84,10 @@ def test_a_ros_graph_is_warned_of_dead_reckoning(known: RunRecord) -> None:
     diagnostics = [row for row in messages.rows(known) if row.topic == "/diagnostics"]
     assert diagnostics
     assert all(row.message["status"][0] == status for row in diagnostics)
+
+
+@pytest.mark.parametrize("unknown", [None, float("nan")])
+def test_an_unknown_deviation_is_a_large_variance(unknown: float | None) -> None:
+    """A camera has no uncertainty before its first frame; NaN would void the message."""
+    assert _variance(unknown) == UNKNOWN_VARIANCE
+    assert _variance(0.1) == pytest.approx(0.01)
