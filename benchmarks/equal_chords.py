@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def run() -> list[Row]:
         rows += _divided(f"smooth bodies, {segments} chords", smooth_body, BODIES, segments)
     for turn_rad in (0.6, 1.0, 1.25, 1.5):
         name = f"zigzags of {turn_rad} rad, 100 chords"
-        rows += _divided(name, lambda seed, turn=turn_rad: zigzag(seed, turn), ZIGZAGS, 100)
+        rows += _divided(name, partial(zigzag, turn_rad=turn_rad), ZIGZAGS, 100)
     return rows
 
 

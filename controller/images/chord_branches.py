@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
@@ -173,7 +174,7 @@ def crossings_ahead(
 
 @compiled(f"UniTuple(int64, 3)({_LINE}, float64, float64[::1], int8[:, ::1], float64[::1])")
 def count_branches(
-    line: Floats, arc: Floats, chord: float, limits: Floats, steps: Ints, excess: Floats
+    line: Floats, arc: Floats, chord: float, limits: Floats, steps: NDArray[np.int8], excess: Floats
 ) -> tuple[int, int, int]:
     """Visit all branches of a chord, depth first.
 
