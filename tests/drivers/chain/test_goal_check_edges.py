@@ -6,6 +6,7 @@ import pytest
 from snakewalk.drivers.bus.control_cycle import CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.goal_check import FOREIGN_READS, OWN_READS, GoalCheck
+from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.errors import BusError
 
 FOREIGN = 9999
@@ -41,7 +42,7 @@ class Rig:
 
     def __init__(self) -> None:
         self.servos = Servos(3)
-        self.check = GoalCheck(["a", "b", "c"], self.servos)
+        self.check = GoalCheck(["a", "b", "c"], self.servos, RegisterRows(["<i4"] * 3))
         self.sent = 0
 
     def cycle(self, *, hold: dict[int, int] | None = None, is_read: bool = True) -> None:
