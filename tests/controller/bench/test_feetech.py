@@ -158,3 +158,16 @@ def test_one_chain_has_one_make() -> None:
     servo = {"model": "STS3215", "supply_v": 6.0, "over_current_a": 1.0}
     with pytest.raises(ValidationError, match="one chain has servos of one series"):
         RobotConfig.model_validate({"name": "two", "joints": joints, "servo": servo})
+
+
+def test_the_doctor_measures_the_supply_under_load() -> None:
+    line = a_line()
+    findings = examine(
+        *(line, ROBOT, SafetyConfig(), 50.0),
+        latency_s=0.004,
+        latency_timer_ms=None,
+        wiggle=True,
+    )
+    supply = [each for each in findings if each.check == "supply under load"]
+    assert [each.grade for each in supply] == ["ok"]
+    assert "7.4 V at rest" in supply[0].found
