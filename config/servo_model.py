@@ -314,6 +314,11 @@ class ServoModel(Strict):
         return math.nan if rpm2 is None else rpm2 * 2.0 * math.pi / 3600.0
 
 
+def wire_format(facts: ServoModel) -> tuple[int | str, str, bool]:
+    """Protocol, byte order and group read of a model; servos on one port agree in them."""
+    return facts.protocol, facts.byte_order, facts.sync_read
+
+
 def protocol_name(facts: ServoModel) -> str:
     """Protocol of a model in words."""
     if facts.protocol == "feetech":

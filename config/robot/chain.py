@@ -13,11 +13,12 @@ from snakewalk.config.robot.keys import READ_INSTEAD, Unreadable
 from snakewalk.config.robot.register_bounds import (
     half_range_rad,
     initial_gains,
+    initial_joint_gains,
     register_faults,
 )
 from snakewalk.config.robot.servo import LAST_ID
 from snakewalk.config.robot.spelling import canonical_joints, canonical_links
-from snakewalk.config.servo_model import protocol_name
+from snakewalk.config.servo_model import protocol_name, wire_format
 
 _LIMIT_SHARE = 2.0 / 2.3
 """Share of the stall current at which a run stops (ours): 2 A for an XM430."""
@@ -195,15 +196,16 @@ class RobotConfig(JointValues):
             records = self.records_by_model
         except ConfigError as error:
             raise ValueError(f"servo: {error}") from None
-        first = next(iter(records.values()))
+        for ids in [port.ids for port in self.ports] or [self.servo_ids]:
+            first, *others = self.models_on(ids).values()
+            for facts in others:
+                if wire_format(facts) != wire_format(first):
+                    raise ValueError(
+                        f"servo: {first.model} speaks {protocol_name(first)} and {facts.model} "
+                        f"{protocol_name(facts)} or other words: one port has servos of one "
+                        "series; name a port for each in [[ports]]"
+                    )
         for model, facts in records.items():
-            formats = (facts.protocol, facts.byte_order, facts.sync_read)
-            if formats != (first.protocol, first.byte_order, first.sync_read):
-                raise ValueError(
-                    f"servo: {first.model} speaks {protocol_name(first)} and {model} "
-                    f"{protocol_name(facts)} or other words: one chain has servos of one series; "
-                    "describe each make as a robot of its own"
-                )
             if facts.protocol == 1:
                 raise ValueError(
                     f"servo: model {model} speaks Protocol 1.0, which lacks group reads and a "
@@ -225,7 +227,12 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _registers_hold_the_values(self) -> Self:
-        gains = initial_gains(self)
+        by_joint, gains = initial_joint_gains(self), initial_gains(self)
+        if by_joint:
+            self.__dict__["joints"] = tuple(
+                each.model_copy(update=by_joint.get(joint, {}))
+                for joint, each in enumerate(self.joints)
+            )
         if gains:
             self.__dict__["servo"] = self.servo.model_copy(update=gains)
         faults = register_faults(self)

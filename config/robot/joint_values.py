@@ -1,6 +1,7 @@
 """Values of each joint and servo, derived from the parsed keys."""
 
 import math
+from collections.abc import Collection
 from functools import cache
 from typing import TypeVar
 
@@ -9,7 +10,7 @@ from snakewalk.config.motor import MotorConfig
 from snakewalk.config.robot.keys import parsed
 from snakewalk.config.robot.link_values import LinkValues
 from snakewalk.config.servo_catalogue import servo_model
-from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.servo_model import ServoModel, wire_format
 
 N = TypeVar("N", int, float, str)
 
@@ -45,8 +46,13 @@ class JointValues(LinkValues):
 
     @property
     def is_feetech(self) -> bool:
-        """Whether the servos speak Feetech's protocol; those of a chain all do, or none."""
-        return self.servo_records[0].protocol == "feetech"
+        """Whether all servos speak Feetech's protocol."""
+        return all(each.protocol == "feetech" for each in self.records_by_model.values())
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether the ports have servos of different series, each its own."""
+        return len({wire_format(each) for each in self.records_by_model.values()}) > 1
 
     @property
     def records_by_model(self) -> dict[str, ServoModel]:
@@ -70,6 +76,11 @@ class JointValues(LinkValues):
     def models_by_id(self) -> dict[int, ServoModel]:
         """Record of each servo's model by its bus ID."""
         return dict(zip(self.servo_ids, self.servo_records, strict=True))
+
+    def models_on(self, ids: Collection[int] | None) -> dict[int, ServoModel]:
+        """``models_by_id`` of the servos of a port; ``ids`` None: of all."""
+        known = self.models_by_id
+        return known if ids is None else {i: each for i, each in known.items() if i in ids}
 
     @property
     def signs(self) -> tuple[int, ...]:

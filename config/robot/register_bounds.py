@@ -35,6 +35,25 @@ def initial_gains(robot: JointValues) -> dict[str, int]:
     return gains
 
 
+def initial_joint_gains(robot: JointValues) -> dict[int, dict[str, int]]:
+    """Return such gains of joints whose servos are of another model than `[servo]`, by joint."""
+    found: dict[int, dict[str, int]] = {}
+    for joint, (own, facts) in enumerate(zip(robot.joints, robot.servo_records, strict=False)):
+        if facts.model == robot.servo.model:
+            continue
+        for key, (register, values) in _GAINS.items():
+            is_soft = key == "position_p_gain" and robot.all_axes[joint] == "p"
+            given = "pitch_p_gain" if is_soft else key
+            row = facts.registers.get(register)
+            if getattr(own, key) is not None or given in robot.servo.model_fields_set:
+                continue
+            if row is None or row.range is None:
+                continue
+            if not row.range[0] <= getattr(robot, values)[joint] <= row.range[1]:
+                found.setdefault(joint, {})[key] = row.initial
+    return found
+
+
 def register_faults(robot: JointValues) -> list[str]:
     """Return gains and currents that a register cannot hold, in words, each once."""
     faults: dict[str, None] = {}

@@ -1,10 +1,11 @@
 """Reads a bus and puts the checks in order; writes nothing to a servo unless the joints wiggle."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 from snakewalk.config.robot import ImuConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
+from snakewalk.config.servo_model import ServoModel, wire_format
 from snakewalk.controller.bench import adapter, line_checks
 from snakewalk.controller.bench import servo_checks as servos
 from snakewalk.controller.bench.imu_check import imu_finding
@@ -80,7 +81,7 @@ def examine(
 
     """
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
-    expected, baud = robot.servo_ids, port.getBaudRate()
+    expected, baud, models = robot.servo_ids, port.getBaudRate(), robot.models_on(on_it)
     imu = robot.imu
     if on_it is not None:
         expected = tuple(each for each in expected if each in on_it)
@@ -93,17 +94,17 @@ def examine(
     if echo is not None:  # each request would be read as a reply
         return [*findings, echo]
     on_progress("the robot's servos")
-    bus, pinged = _find(port, robot, expected, latency_s)
+    bus, pinged = _find(port, models, expected, latency_s)
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    measured = _FEETECH_MEASURED if robot.is_feetech else _MEASURED
+    measured = _FEETECH_MEASURED if _is_feetech(bus) else _MEASURED
     reads = [bus.probe(i, measured) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
     if noise is not None:
         patience_s = bus.latency_s
-        bus = servo_bus(port, robot.models_by_id, latency_s=patience_s, tries=_NOISE_TRIES)
-    findings += _presence(bus, robot, expected, found, imu, noise, overheard, on_progress)
+        bus = servo_bus(port, models, latency_s=patience_s, tries=_NOISE_TRIES)
+    findings += _presence(bus, expected, found, imu, noise, overheard, on_progress)
     if imu is not None:
         findings.append(imu_finding(bus, imu))
     if not found:
@@ -119,7 +120,7 @@ def examine(
         on_progress("group reads")
         fast = all(s.fast_reads for s in reports)
         port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to earlier requests
-        patient = servo_bus(port, robot.models_by_id, latency_s=line_checks.PATIENCE_S)
+        patient = servo_bus(port, models, latency_s=line_checks.PATIENCE_S)
         cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
         ids = [s.servo_id for s in reports for _ in range(_ASKED)]
         findings.append(
@@ -134,29 +135,32 @@ def examine(
 
 
 def _find(
-    port: BytePort, robot: RobotConfig, expected: Sequence[int], latency_s: float
+    port: BytePort, models: Mapping[int, ServoModel], expected: Sequence[int], latency_s: float
 ) -> tuple[DynamixelBus, Collection[int]]:
     """The bus, and the servos that reply; the bus waits longer if all replies are later."""
-    bus = servo_bus(port, robot.models_by_id, latency_s=latency_s)
+    bus = servo_bus(port, models, latency_s=latency_s)
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
     for servo_id in [*pinged, *expected][:_TIMED]:
-        if robot.is_feetech:
+        if _is_feetech(bus):
             timed = bus.probe(servo_id)
         else:
             timed = probe(port, servo_id, _TIMED, patience_s)
         late_s = timed.late_s
         if late_s and min(late_s) > latency_s and not timed.damaged:
-            patient = servo_bus(port, robot.models_by_id, latency_s=patience_s)
+            patient = servo_bus(port, models, latency_s=patience_s)
             return patient, patient.find(expected)
         if late_s:
             break
     return bus, pinged
 
 
+def _is_feetech(bus: DynamixelBus) -> bool:
+    return bus.table.facts.protocol == "feetech"
+
+
 def _presence(
     bus: DynamixelBus,
-    robot: RobotConfig,
     expected: Sequence[int],
     found: Sequence[int],
     imu: ImuConfig | None,
@@ -175,10 +179,9 @@ def _presence(
     baud = port.getBaudRate()
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
-    feetech = bus.table.facts.protocol == "feetech"
-    model = robot.servo_models[0]
+    feetech = _is_feetech(bus)
     foreign = foreign_replies(port, silent, bus.latency_s, feetech=feetech)
-    findings += foreign.findings(model)
+    findings += foreign.findings(bus.table.facts.model)
     findings += servos.presence(
         *(expected, found, elsewhere, foreign.ids, list(others), baud, port.name)
     )
@@ -204,7 +207,7 @@ def _servo_findings(
     noise: Finding | None,
 ) -> list[Finding]:
     return [
-        *([] if robot.is_feetech else [servos.firmware(reports)]),
+        *([] if _is_feetech(bus) else [servos.firmware(reports)]),
         servos.return_delay(reports),
         servos.alarms(reports, robot),
         servos.torque(reports),
@@ -263,7 +266,7 @@ def examine_segments(
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         parts = [
-            (servo_bus(line, robot.models_by_id, latency_s=line.latency_s), ids)
+            (servo_bus(line, robot.models_on(ids), latency_s=line.latency_s), ids)
             for line, ids in segments
         ]
         findings += supply_under_load(SegmentedBus(parts), robot, safety)
@@ -313,9 +316,9 @@ def _reports(
         findings.append(_unreadable(error, noise))
         return ()
     wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
-    findings.append(
-        servos.models(inspection.servos, wrong, ", ".join(dict.fromkeys(robot.servo_models)))
-    )
+    port_format = wire_format(bus.table.facts)
+    models = {each.model: each for each in robot.servo_records if wire_format(each) == port_format}
+    findings.append(servos.models(inspection.servos, wrong, ", ".join(models)))
     return inspection.servos
 
 
@@ -327,8 +330,7 @@ def _settings(
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
     except BusError as error:
         return [_unreadable(error, noise)]
-    scales = [ServoUnits.of(bus.table_of(servo_id).facts) for servo_id in robot.servo_ids]
-    units = JointUnits.of(robot, scales)
+    units = JointUnits.of(robot, [ServoUnits.of(facts) for facts in robot.servo_records])
     moving = _moving(robot, units, reports, registers)
     supply = servos.unsteady_supply(bus, reports)
     return [*moving, *supply, *register_findings(registers, robot, units)]
@@ -376,7 +378,7 @@ def _at_other_bauds(
         return {}
     port = bus.port
     before = port.getBaudRate()
-    feetech = bus.table.facts.protocol == "feetech"
+    feetech = _is_feetech(bus)
     others = [baud for baud in (bus.table.facts.bauds if feetech else BAUDS) if baud != before]
     if len(missing) > _PINGED:
         if feetech:

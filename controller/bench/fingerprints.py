@@ -18,7 +18,6 @@ from snakewalk.drivers.chain.fingerprint_file import (
     own_file,
 )
 from snakewalk.drivers.errors import BusError
-from snakewalk.drivers.protocol.control_table import load_control_table
 
 
 def fingerprint_file(robot: str, option: str) -> FingerprintFile:
@@ -63,7 +62,7 @@ def read_all(lines: PortLines, robot: RobotConfig) -> dict[int, Fingerprint]:
     """Fingerprints of a robot's servos on all its ports; raises as ``read_fingerprints``."""
     found: dict[int, Fingerprint] = {}
     for line, ids in lines.lines:
-        bus = servo_bus(line, robot.models_by_id, latency_s=line.latency_s)
+        bus = servo_bus(line, robot.models_on(ids), latency_s=line.latency_s)
         there = [i for i in robot.servo_ids if ids is None or i in ids]
         found |= read_fingerprints(bus, there)
     return found
@@ -81,7 +80,7 @@ def fingerprint_finding(
     known = file.read()
     if known is None:
         return None
-    lines = changes(robot, known, found, _rad_per_position(robot))
+    lines = changes(robot, known, found)
     missing = missing_registers(known, found)
     if not lines and missing:
         text = f"{file.path} has no {', '.join(missing)}: not compared"
@@ -128,7 +127,3 @@ def write_fingerprints(robot_file: Path, found: Mapping[int, Fingerprint]) -> Pa
     file = FingerprintFile(robot_file)
     file.write(found)
     return file.path
-
-
-def _rad_per_position(robot: RobotConfig) -> float:
-    return load_control_table(robot.servo_models[0]).rad_per_position

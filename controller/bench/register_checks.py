@@ -98,10 +98,13 @@ class _Checks:
         self._servos, self._robot, self._units = servos, robot, units
         self._factory = [_factory_values(facts) for facts in robot.servo_records]
         self._full = units.full_pwm.tolist()
+        first = servos[0].joint if servos else 0
+        self._facts = robot.servo_records[first]
+        """Record of a model on this port; the others have the same registers."""
 
     def all(self) -> list[Finding | None]:
         """Findings in the order of their weight; None where all is well."""
-        facts = self._robot.servo_records[0]
+        facts = self._facts
         all_reply, shutdown = ALL_REPLY, SHUTDOWN_ALARMS
         if facts.protocol == "feetech":
             all_reply, shutdown = 1, feetech.shutdown_alarms(facts)
@@ -157,13 +160,13 @@ class _Checks:
 
     def _at(self, name: str) -> str:
         """Name of a register with its address."""
-        row = self._robot.servo_records[0].registers.get(name)
+        row = self._facts.registers.get(name)
         return name if row is None else f"{name}({row.address})"
 
     def _pwm(self) -> list[Finding | None]:
         """Limits and goals of the PWM that make a servo weak."""
         full = self._full
-        shown = " or ".join(map(str, dict.fromkeys(full)))
+        shown = " or ".join(map(str, dict.fromkeys(full[servo.joint] for servo in self._servos)))
         return [
             self._bad(
                 "PWM limit",
@@ -195,7 +198,7 @@ class _Checks:
 
     def _limits(self) -> list[Finding | None]:
         """Limits, goals and sensors that other programs and faults leave behind."""
-        units, rows = self._units, self._robot.servo_records[0].registers
+        units, rows = self._units, self._facts.registers
         low, high = (rows[f"{end} Position Limit"].address for end in ("Max", "Min"))
         return [
             self._bad(

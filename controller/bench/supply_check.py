@@ -10,7 +10,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench.cable_drop import cable_finding, drawn_a
 from snakewalk.controller.console.finding import Finding
-from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.chain.joint_codec import voltages_v
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
@@ -32,8 +32,11 @@ the current.
 """
 _SAG_SHARE = 0.08
 """Share of the voltage at rest that the supply may lose (ours); a walk asks for more than this."""
+_OUTPUT = "Present PWM"
 _VOLTAGE_AT = 20
 """In a block from Present PWM(124) on: Present Input Voltage(144)."""
+_SUPPLY_BYTES = 3
+"""A block of Present Input Voltage and Present Temperature alone."""
 _ENOUGH = 10
 """Readings of a wiggle that ended early, from which on they are judged (ours)."""
 
@@ -98,9 +101,7 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
         ):
             start = link.enable()
             rest_v = start.voltage_v
-            block = bus.block(
-                robot.servo_ids, "Present PWM", "Present Input Voltage", fast=chain.fast
-            )
+            block = _supply_block(bus, robot, fast=chain.fast)
             begin_s = clock.now_s()
             for cycle in range(round(_CYCLES / _FREQUENCY_HZ / _PERIOD_S)):
                 clock.sleep_until_s(begin_s + cycle * _PERIOD_S)
@@ -113,7 +114,7 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
                 clock.sleep_until_s(clock.now_s() + _DELAYS_S[cycle % len(_DELAYS_S)])
                 reply = block.read()
                 if reply.valid.all():
-                    voltage_v.append(voltages_v(reply.data[:, _VOLTAGE_AT:]))
+                    voltage_v.append(voltages_v(reply.data[:, _voltage_at(reply.data) :]))
                     drawn.append(_drawn_a(robot, reply.data))
     except DriverError as error:
         fault = error
@@ -121,8 +122,22 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
     return Wiggle(rest_v, np.array(voltage_v).reshape(shape), np.array(drawn).reshape(shape), fault)
 
 
+def _supply_block(bus: ChainBus, robot: RobotConfig, *, fast: bool) -> GroupCycle:
+    """Group read of output, current and supply; of the supply alone if a model lacks the block."""
+    ids = robot.servo_ids
+    if all(_OUTPUT in bus.table_of(each) for each in ids):
+        return bus.block(ids, _OUTPUT, "Present Input Voltage", fast=fast)
+    return bus.slow_cycle(ids, fast=fast)
+
+
+def _voltage_at(blocks: Bytes) -> int:
+    return 0 if blocks.shape[1] == _SUPPLY_BYTES else _VOLTAGE_AT
+
+
 def _drawn_a(robot: RobotConfig, blocks: Bytes) -> Floats:
-    """(S,) drawn from the supply, of blocks (S, B) that begin with output and current."""
+    """(S,) drawn from the supply, of blocks (S, B) that begin with output and current, or NaN."""
+    if blocks.shape[1] == _SUPPLY_BYTES:
+        return np.full(len(blocks), np.nan)
     output, current = np.ascontiguousarray(blocks[:, :4]).view("<i2").T
     models = robot.servo_records
     unit_a = [math.nan if (a := each.units.current_a) is None else a for each in models]

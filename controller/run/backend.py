@@ -4,14 +4,12 @@ Everything above the byte port is the same object for both.
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
-
-import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -23,6 +21,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.pose.sample import PoseFeed
 from snakewalk.controller.run.deviation import Deviation
 from snakewalk.controller.run.external.served_robot import physics_modules, simulated_line
+from snakewalk.controller.run.external.simulated_bus import SimulatedBus
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin_rollout import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -38,12 +37,8 @@ from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_ma
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.types import BodyPose, JointState
 from snakewalk.sim.line.clock import RealTimeClock
-from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.physics.split_plant import SplitPlant
-from snakewalk.sim.plant import Mounting
-from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.motor import motors_of
-from snakewalk.sim.servo.protection import SupplyAndAmbient
 
 if TYPE_CHECKING:
     from snakewalk.sim.physics.plant import MujocoPlant
@@ -138,33 +133,32 @@ def simulated(
     body = made.plant
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
-    line = simulated_line(robot, body, deviation, made.imu())
+    servos = SimulatedBus.of(robot, body, deviation, made.imu())
     chain = ServoChain(
-        servo_bus(line, robot.models_by_id),
-        robot.model_copy(update={"ports": ()}),  # here they are on one wire
+        servos.bus(),
+        servos.robot,
         watchdog_s=run.safety.watchdog_s,
         rate_hz=run.cycle_hz,
         can_hold=run.safety.on_trip == "hold",
     )
 
     def lay_down(pose: InitialPose) -> None:
-        line.settle()
+        servos.settle()
         shaft_rad = deviation.shaft_rad(pose.joint_rad)
         body.lay_down(run.start_m, pose.heading_rad, shaft_rad)
-        line.firmware.hold_position()
+        servos.hold_position()
 
-    drive = line.firmware.drive
     return Backend(
         "sim",
         chain,
-        line.clock,
+        servos.clock,
         body.head_pose,
         lambda: body.qpos,
-        lambda: line.busy_s,
-        lambda: MotorEnergy(float(drive.drawn_j.sum()), float(drive.work_j.sum())),
+        lambda: servos.busy_s,
+        servos.energy,
         made.twin,
         lay_down,
-        partial(line.firmware.cut_power, np.arange(robot.joint_count)),
+        servos.cut_power,
     )
 
 
@@ -247,23 +241,13 @@ def split(
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     motors = motors_of(robot)
     body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
-    baud, mounting, clock = robot.servo.baud, Mounting.of(robot), RealTimeClock()
-    imu = made.imu()
-    bank = ServoBank(
-        [robot.servo_ids[row] for row in rows], [robot.servo_records[row] for row in rows], baud
+    clock, imu = RealTimeClock(), made.imu()
+    line = simulated_line(
+        *(robot, body, replace(deviation, slip_rad=None)),
+        imu if imu is not None and imu.config.id in here else None,
+        rows=rows,
+        clock=clock,
     )
-    line = SimLine(
-        bank,
-        body,
-        clock,
-        baud=baud,
-        mounting=Mounting(mounting.sign[rows], mounting.zero_rad[rows]),
-        motors=[motors[row] for row in rows],
-        supply_and_ambient=SupplyAndAmbient(supply_v=robot.servo.supply_v),
-        imu=imu if imu is not None and imu.config.id in here else None,
-    )
-    if deviation.torque is not None:
-        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[rows]
     bus = _bus_on_ports(robot, clock, line)
     chain = ServoChain(
         bus,
@@ -297,8 +281,10 @@ def real_ports(robot: RobotConfig) -> list[str]:
     return [each.port for each in robot.ports if each.port != SIMULATED]
 
 
-def _bus_on(robot: RobotConfig, line: SerialPort | NetworkPort) -> DynamixelBus:
-    return servo_bus(line, robot.models_by_id, latency_s=line.latency_s)
+def _bus_on(
+    robot: RobotConfig, line: SerialPort | NetworkPort, ids: Collection[int] | None = None
+) -> DynamixelBus:
+    return servo_bus(line, robot.models_on(ids), latency_s=line.latency_s)
 
 
 def _bus_on_ports(
@@ -309,9 +295,10 @@ def _bus_on_ports(
     with ExitStack() as opened:
         for each in robot.ports:
             if each.port == SIMULATED and simulated_line is not None:
-                bus = servo_bus(simulated_line, robot.models_by_id)
+                bus = servo_bus(simulated_line, robot.models_on(each.ids))
             else:
-                bus = _bus_on(robot, open_port(each.port, robot.servo.baud, clock))
+                line = open_port(each.port, robot.servo.baud, clock)
+                bus = _bus_on(robot, line, each.ids)
             opened.callback(bus.port.closePort)
             parts.append((bus, each.ids))
         opened.pop_all()

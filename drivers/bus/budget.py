@@ -162,17 +162,14 @@ def chain_budget(servos: int, baud: int, *, fast: bool) -> WireBudget:
 
 def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
     """``chain_budget`` of a robot's servos and IMU; of several ports, that of the busiest."""
-    facts = robot.servo_records[0]
-    if facts.protocol == "feetech":
-        counts = [len(set(port.ids)) for port in robot.ports] or [robot.joint_count]
-        return _feetech_budget(facts, max(counts), baud)
-    if not robot.ports:
-        return _port_budget(robot.joint_count, baud, fast=fast, with_imu=robot.imu is not None)
     imu = set() if robot.imu is None else {robot.imu.id}
-    budgets = (
-        _port_budget(len(set(port.ids) - imu), baud, fast=fast, with_imu=bool(imu & set(port.ids)))
-        for port in robot.ports
-    )
+    budgets = []
+    for ids in [set(port.ids) for port in robot.ports] or [{*robot.servo_ids, *imu}]:
+        facts = next(iter(robot.models_on(ids).values()))
+        if facts.protocol == "feetech":
+            budgets.append(_feetech_budget(facts, len(ids), baud))
+        else:
+            budgets.append(_port_budget(len(ids - imu), baud, fast=fast, with_imu=bool(imu & ids)))
     return max(budgets, key=lambda budget: budget.cycle_s)
 
 

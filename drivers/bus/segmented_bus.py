@@ -2,6 +2,7 @@
 
 Requests begin on all ports before the bus waits for a reply. A fault of one port ends the cycle of
 all; its error names the port. Commands to all servos, such as torque off, go to every working port.
+Each port may have servos of another make: it has its own packets, addresses and register sizes.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -148,7 +149,11 @@ class SegmentedBus:
     ) -> "SegmentedCycle":
         places = self._places(servo_ids)
         cycles = {bus: make(bus, [servo_ids[k] for k in at]) for bus, at in places.items()}
-        spans = {(cycle.read_address, cycle.read_bytes) for cycle in cycles.values()}
+        spans = {
+            (cycle.read_address, cycle.read_bytes)
+            for bus, cycle in cycles.items()
+            if bus.table.facts.protocol != "feetech"
+        }
         if len(spans) > 1:
             raise ControlTableError(
                 "ports: the servo models have their block of a control cycle at different "
@@ -264,15 +269,15 @@ class SegmentedCycle:
         return self._whole(replies)
 
     def _whole(self, replies: Mapping[DynamixelBus, GroupReadReply]) -> GroupReadReply:
-        """One reply with the results of all ports."""
-        width = next(iter(replies.values())).data.shape[1]
+        """One reply with the results of all ports; zeros fill the rows of shorter registers."""
+        width = max(reply.data.shape[1] for reply in replies.values())
         data = np.zeros((self._count, width), np.uint8)
         valid, answered = np.zeros(self._count, np.bool_), np.zeros(self._count, np.bool_)
         error = np.zeros(self._count, np.uint8)
         for bus, reply in replies.items():
             at = self._places[bus]
-            data[at], valid[at], answered[at] = reply.data, reply.valid, reply.answered
-            error[at] = reply.error
+            data[at, : reply.data.shape[1]] = reply.data
+            valid[at], answered[at], error[at] = reply.valid, reply.answered, reply.error
         each = replies.values()
         return GroupReadReply(
             *(data, valid, error, answered),

@@ -102,16 +102,27 @@ def _feetech_settings(
 
 def limitations(robot: RobotConfig) -> list[str]:
     """Protections that a robot's servos lack, one line per model and reason."""
+    lines = [
+        f"{facts.model}: measures no current: safety watches its output instead, as a share of the "
+        "stall current"
+        for facts in robot.records_by_model.values()
+        if not facts.measures_current
+    ]
+    return [*lines, *missing_watchdogs(robot)]
+
+
+def missing_watchdogs(robot: RobotConfig) -> list[str]:
+    """Line on each model without a bus watchdog; it names the joints if others have one."""
     lines = []
-    for facts in {facts.model: facts for facts in robot.servo_records}.values():
-        if not facts.measures_current:
-            lines.append(
-                f"{facts.model}: measures no current: safety watches its output instead, as a "
-                "share of the stall current"
-            )
-        if WATCHDOG not in facts.registers:
-            lines.append(
-                f"{facts.model}: has no bus watchdog: it holds its last goal if this program or "
-                "the port fails; keep a switch for the servo power at hand"
-            )
+    for model, facts in robot.records_by_model.items():
+        if WATCHDOG in facts.registers:
+            continue
+        joints = [joint for joint, each in enumerate(robot.servo_models) if each == model]
+        which = ""
+        if len(joints) < robot.joint_count:
+            which = f" ({', '.join(robot.joint_names[joint] for joint in joints)})"
+        lines.append(
+            f"{model}{which}: has no bus watchdog: it holds its last goal if this program or the "
+            "port fails; keep a switch for the servo power at hand"
+        )
     return lines

@@ -81,9 +81,7 @@ class FingerprintFile:
         part.write_text("\n".join(lines), encoding="utf-8")
         os.replace(part, self.path)
 
-    def check(
-        self, robot: RobotConfig, fingerprints: Mapping[int, Fingerprint], rad_per_position: float
-    ) -> list[str]:
+    def check(self, robot: RobotConfig, fingerprints: Mapping[int, Fingerprint]) -> list[str]:
         """Compare servos with the file; create it if it is missing.
 
         Registers that the chain sets itself are stored, not compared.
@@ -98,7 +96,7 @@ class FingerprintFile:
         """
         known = self.read()
         if known is not None:
-            faults = changes(robot, known, fingerprints, rad_per_position)
+            faults = changes(robot, known, fingerprints)
             if faults:
                 hint = f"snakewalk doctor --accept --robot {self._robot_file} accepts it"
                 raise ChainError(
@@ -123,7 +121,6 @@ def changes(
     robot: RobotConfig,
     before: Mapping[int, Fingerprint],
     now: Mapping[int, Fingerprint],
-    rad_per_position: float,
 ) -> list[str]:
     """Lines, by joint, on the differing registers that the chain does not set."""
     lines = []
@@ -134,7 +131,8 @@ def changes(
                 continue
             mask = REVERSE if name == "Drive Mode" else -1
             if (old[name] ^ new[name]) & mask:
-                change = register_change(name, old[name], new[name], rad_per_position)
+                unit_rad = robot.servo_records[joint].rad_per_position
+                change = register_change(name, old[name], new[name], unit_rad)
                 lines.append(f"{robot.joint_label(joint)}: {change}")
     return lines
 

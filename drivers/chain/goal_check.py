@@ -7,13 +7,12 @@ difference counts again only after another goal was sent.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Int32s
 from snakewalk.drivers.bus.chain_bus import GroupCycle
+from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.errors import BusError
 
 FOREIGN_READS, OWN_READS = 2, 4
@@ -48,11 +47,11 @@ class _Difference:
 class GoalCheck:
     """Reads the goals of all joints back."""
 
-    def __init__(self, labels: Sequence[str], cycle: GroupCycle, kind: str = "<i4") -> None:
-        """Prepare the read; ``kind`` is the register's type, ``<u2`` on Protocol 1.0."""
-        self._labels, self._kind = labels, kind
+    def __init__(self, labels: Sequence[str], cycle: GroupCycle, rows: RegisterRows) -> None:
+        """Prepare the read; ``rows`` are those of Goal Position."""
+        self._labels, self._rows = labels, rows
         self.cycle = cycle
-        self._sent: deque[NDArray[np.integer[Any]]] = deque(maxlen=_REMEMBERED)
+        self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
         self._is_incomplete = False
@@ -60,7 +59,7 @@ class GoalCheck:
 
     def note_write(self, goals: Int32s) -> None:
         """Store raw goals (J,) that were just sent."""
-        self._sent.append(goals.astype(self._kind, copy=False))
+        self._sent.append(goals)
         self._writes += 1
 
     @property
@@ -86,10 +85,11 @@ class GoalCheck:
             return
         self._watched = max(self._watched - 1, 0)
         reply, sent = self.cycle.read(), self._sent[-1]
-        if reply.flawless and not self._differences and reply.data.tobytes() == sent.tobytes():
+        is_usual = reply.flawless and not self._differences
+        if is_usual and reply.data.tobytes() == self._rows.encode(sent):
             self._is_incomplete = False
             return
-        values = np.ascontiguousarray(reply.data).view(self._kind)[:, 0]
+        values = self._rows.decode(reply.data)
         self._is_incomplete = not reply.valid.all()
         for joint in np.flatnonzero(reply.valid).tolist():
             if values[joint] == sent[joint]:
@@ -110,7 +110,7 @@ class GoalCheck:
         if not self._sent:
             return None
         reply, sent = self.cycle.read(), self._sent[-1]
-        values = np.ascontiguousarray(reply.data).view(self._kind)[:, 0]
+        values = self._rows.decode(reply.data)
         value = int(values[joint])
         if not reply.valid[joint] or value == sent[joint]:
             return None
@@ -144,7 +144,7 @@ class GoalCheck:
     def _fault(
         self,
         joints: list[int],
-        sent: NDArray[np.integer[Any]],
+        sent: Int32s,
         explain: Callable[[int], str | None],
     ) -> str:
         first = self._differences[joints[0]]

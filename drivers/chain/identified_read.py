@@ -4,17 +4,19 @@ Servos with one ID reply in turn, and IDs may be exchanged; such a reading is an
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.robot import RobotConfig
-from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import IDENTITY, identity
 from snakewalk.drivers.errors import ChainError
+from snakewalk.drivers.protocol.control_table import Register
 
-_GOAL = "Goal Position"
+_GOAL, _POSITION = "Goal Position", "Present Position"
 
 
 class IdentifiedRead:
@@ -25,14 +27,12 @@ class IdentifiedRead:
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, units: JointUnits) -> None:
         self._bus, self._robot, self._units = bus, robot, units
-        ids = robot.servo_ids
-        table = bus.table_of(ids[0])
-        self._position = table.state_names[-1]
-        names: tuple[str, ...] = (_GOAL, self._position)
-        if all(IDENTITY in bus.table_of(each) for each in ids):
-            names = (IDENTITY, *names)
-        self._registers = {name: table.register(name) for name in names}
-        self._cycle = bus.block(ids, names[0], names[-1], fast=False)
+        joints_of: dict[tuple[Register, ...], list[int]] = {}
+        for joint, servo_id in enumerate(robot.servo_ids):
+            table = bus.table_of(servo_id)
+            names = (IDENTITY, _GOAL, _POSITION) if IDENTITY in table else (_GOAL, _POSITION)
+            joints_of.setdefault(tuple(table.register(name) for name in names), []).append(joint)
+        self._blocks = [_Block.of(bus, robot, *each) for each in joints_of.items()]
 
     def positions_rad(self, reads: int, *, ask_again: bool = False) -> Floats:
         """(J,) angles; arguments and errors as ``positions_and_goals``."""
@@ -49,24 +49,52 @@ class IdentifiedRead:
 
         """
         here_rad, goals = np.full((2, self._robot.joint_count), np.nan)
-        registers = self._registers
-        start = next(iter(registers.values())).address
 
         def store(joint: int, values: Mapping[str, int]) -> None:
             if values.get(IDENTITY, identity(joint)) == identity(joint):
-                here_rad[joint] = self._units.position_rad(joint, values[self._position])
+                here_rad[joint] = self._units.position_rad(joint, values[_POSITION])
                 goals[joint] = values[_GOAL]
 
-        for _ in range(reads):
-            reply = self._cycle.read()
-            for joint in np.flatnonzero(reply.valid & np.isnan(here_rad)).tolist():
-                row = reply.data[joint].tobytes()
-                store(joint, {n: r.decode(row[r.address - start :]) for n, r in registers.items()})
-            if not np.isnan(here_rad).any():
-                break
-        for joint in np.flatnonzero(np.isnan(here_rad)).tolist() if ask_again else ():
-            store(joint, self._bus.read_each(self._robot.servo_ids[joint], registers))
+        for block in self._blocks:
+            for _ in range(reads):
+                for joint, values in block.read(np.isnan(here_rad)).items():
+                    store(joint, values)
+                if not np.isnan(here_rad[block.joints]).any():
+                    break
+            names = [register.name for register in block.registers]
+            for joint in block.joints if ask_again else ():
+                if np.isnan(here_rad[joint]):
+                    store(joint, self._bus.read_each(self._robot.servo_ids[joint], names))
         return here_rad, goals
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Group read of servos that have the registers at the same addresses."""
+
+    joints: list[int]
+    registers: tuple[Register, ...]
+    """In the order of their addresses."""
+    cycle: GroupCycle
+
+    @classmethod
+    def of(
+        cls, bus: ChainBus, robot: RobotConfig, registers: tuple[Register, ...], joints: list[int]
+    ) -> "_Block":
+        ids = [robot.servo_ids[joint] for joint in joints]
+        cycle = bus.block(ids, registers[0].name, registers[-1].name, fast=False)
+        return cls(joints, registers, cycle)
+
+    def read(self, missing: Bools) -> dict[int, dict[str, int]]:
+        """Values of the joints that replied and are ``missing`` (J,), by name."""
+        reply, start = self.cycle.read(), self.registers[0].address
+        found = {}
+        for place in np.flatnonzero(reply.valid & missing[self.joints]).tolist():
+            row = reply.data[place].tobytes()
+            found[self.joints[place]] = {
+                each.name: each.decode(row[each.address - start :]) for each in self.registers
+            }
+        return found
 
 
 def check_stillness(

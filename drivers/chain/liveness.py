@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, register_change
 from snakewalk.drivers.chain.goal_check import GoalCheck
+from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.chain.start_up import (
     IDENTITY,
     RAM_SETTINGS,
@@ -21,7 +20,6 @@ from snakewalk.drivers.chain.start_up import (
     identity_fault,
 )
 from snakewalk.drivers.errors import BusError
-from snakewalk.drivers.protocol.control_table import Register
 from snakewalk.drivers.protocol.registers import WATCHDOG, WATCHDOG_TRIPPED
 
 SLOW_EVERY = 16
@@ -46,7 +44,7 @@ class LivenessCheck:
         robot: RobotConfig,
         configured: Mapping[int, Mapping[str, int]],
         fingerprints: Mapping[int, Fingerprint],
-        watchdog_ticks: int | None,
+        watchdogs: Mapping[int, int],
         goals: GoalCheck,
         *,
         fast: bool,
@@ -55,16 +53,14 @@ class LivenessCheck:
         """Prepare the reads.
 
         ``configured`` has RAM registers, ``fingerprints`` EEPROM registers, by joint.
-        ``watchdog_ticks`` is None without a watchdog.
+        ``watchdogs`` are the ticks of each joint's watchdog; those without one are left out.
         """
         self._bus, self._robot, self._goals = bus, robot, goals
         self._rad_per_position = rad_per_position
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
         self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
-        self._watchdog = None
-        if watchdog_ticks is not None:
-            self._watchdog = read(WATCHDOG, dict.fromkeys(joints, watchdog_ticks))
+        self._watchdog = read(WATCHDOG, watchdogs) if watchdogs else None
 
         def checks(
             registers: Iterable[str], values: Mapping[int, Mapping[str, int]]
@@ -151,7 +147,7 @@ class LivenessCheck:
 
     def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
         """Meaning of an unexpected register value."""
-        name, expected = check.register.name, check.expected[joint]
+        name, expected = check.name, check.expected[joint]
         if check is self._torque:
             return "torque is off: has it rebooted?"
         if name == WATCHDOG and value == WATCHDOG_TRIPPED:
@@ -178,12 +174,12 @@ class LivenessCheck:
         ]
         try:
             values = self._bus.read_each(
-                self._robot.servo_ids[joint], [check.register.name for check in checks]
+                self._robot.servo_ids[joint], [check.name for check in checks]
             )
         except BusError:
             return None
         for check in checks:
-            value = values[check.register.name]
+            value = values[check.name]
             if value != check.expected[joint]:
                 return self._difference(check, joint, value)
         return None
@@ -202,7 +198,8 @@ def _in_turn(
 class RegisterCheck:
     """Group read of one register, and its expected values."""
 
-    register: Register
+    name: str
+    rows: RegisterRows
     cycle: GroupCycle
     ids: tuple[int, ...]
     expected: Mapping[int, int]
@@ -223,9 +220,8 @@ class RegisterCheck:
         """Prepare the read of a register of some joints' servos."""
         ids = tuple(robot.servo_ids[joint] for joint in expected)
         cycle = bus.block(ids, name, name, fast=fast)
-        register = bus.table_of(ids[0]).register(name)
-        raw = np.array(list(expected.values()), register.kind).tobytes()
-        return cls(register, cycle, ids, dict(expected), raw)
+        rows = RegisterRows.of(bus, ids, name)
+        return cls(name, rows, cycle, ids, dict(expected), rows.encode([*expected.values()]))
 
     def compare(self, ask_again: ChainBus | None = None) -> tuple[dict[int, int], bool]:
         """Read the register; return unexpected values by joint, and whether all are known.
@@ -237,17 +233,17 @@ class RegisterCheck:
             PortError: the port is gone.
 
         """
-        reply, register = self.cycle.read(), self.register
+        reply = self.cycle.read()
         if reply.flawless and reply.data.tobytes() == self.raw:  # the usual case
             return {}, True
-        values = np.ascontiguousarray(reply.data).view(register.kind)[:, 0]
+        values = self.rows.decode(reply.data)
         everybody = reply.valid_count == len(reply.valid)
         found = {}
         for place, (joint, expected) in enumerate(self.expected.items()):
             if reply.valid[place]:
                 got = int(values[place])
             elif ask_again is not None:
-                got = ask_again.read(self.ids[place], register.name)
+                got = ask_again.read(self.ids[place], self.name)
             else:
                 continue
             if got != expected:

@@ -1,7 +1,7 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from snakewalk.drivers.chain.liveness import SLOW_EVERY, LivenessCheck, Register
 from snakewalk.drivers.chain.lost_replies import LostReplies
 from snakewalk.drivers.chain.motion_sensors import MotionSensors
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
+from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.chain.soft_hold import limit_currents
 from snakewalk.drivers.chain.start_up import (
     Inspection,
@@ -44,6 +45,7 @@ from snakewalk.drivers.protocol.registers import (
 )
 from snakewalk.drivers.types import JointCommand, JointState
 
+_GOAL = "Goal Position"
 _SLOW_S = 1.0
 """Age from which voltages and temperatures are read in every cycle until they come (ours)."""
 _FIRST_READS = 5
@@ -98,10 +100,13 @@ class ServoChain:
         scales = [ServoUnits.of(table.facts) for table in tables]
         self._units = JointUnits.of(robot, scales, can_hold=can_hold)
         # rounded up: at least the requested time
-        self._has_watchdog = all(WATCHDOG in table for table in tables)
         ticks = math.ceil(watchdog_s / WATCHDOG_UNIT_S - 1e-9)
         self._watchdog_ticks = min(WATCHDOG_TICKS_MAX, max(1, ticks))
         self._watchdog_s = self._watchdog_ticks * WATCHDOG_UNIT_S
+        self._watchdogs = {
+            joint: self._watchdog_ticks for joint, table in enumerate(tables) if WATCHDOG in table
+        }
+        """Ticks of the watchdog of each joint that has one."""
         self._configured: dict[int, Mapping[str, int]] = {}
         self._fingerprints: dict[int, Fingerprint] = {}
         self._liveness: LivenessCheck | None = None
@@ -168,8 +173,7 @@ class ServoChain:
         self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
         if self._file is not None:
             found = {self.robot.servo_ids[j]: each for j, each in self._fingerprints.items()}
-            unit_rad = float(self._units.rad_per_position[0])
-            for line in self._file.check(self.robot, found, unit_rad):
+            for line in self._file.check(self.robot, found):
                 self.on_event(line)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
@@ -259,13 +263,13 @@ class ServoChain:
     def _hold_and_arm(self, here_rad: Floats) -> JointState:
         """Goal = present, torque on, watchdog armed, each read back; return the state."""
         bus, ids = self._bus, self.robot.servo_ids
-        if self._has_watchdog:
-            bus.sync_write(ids, WATCHDOG, 0)  # goals follow at once, else an old goal counts
+        watched = [ids[joint] for joint in self._watchdogs]
+        if watched:
+            bus.sync_write(watched, WATCHDOG, 0)  # goals follow at once, else an old goal counts
         goals = self._send_goals(here_rad)
-        ticks = self._watchdog_ticks
-        if self._has_watchdog:
-            bus.sync_write(ids, WATCHDOG, ticks)  # before torque, which is never on without it
-            self._expect(WATCHDOG, [ticks] * len(ids))
+        if watched:  # before torque, which is never on without it
+            bus.sync_write(watched, WATCHDOG, self._watchdog_ticks)
+            self._expect(WATCHDOG, self._watchdogs)
         # read last: meanwhile another program may have written goals, or exchanged IDs
         now_rad, held = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
         check_stillness(self.robot, now_rad, here_rad, STILL_RAD)
@@ -275,7 +279,7 @@ class ServoChain:
                 f"{goals[joint]} was written to all"
             )
         bus.sync_write(ids, "Torque Enable", 1)
-        self._expect("Torque Enable", [1] * len(ids))
+        self._expect("Torque Enable", dict.fromkeys(range(len(ids)), 1))
         self._liveness = self._new_liveness()
         self._armed = True
         state = self.read()
@@ -285,7 +289,7 @@ class ServoChain:
     def _new_liveness(self) -> LivenessCheck:
         return LivenessCheck(
             *(self._bus, self.robot, self._configured, self._fingerprints),
-            *(self._watchdog_ticks if self._has_watchdog else None, self._goal_check),
+            *(self._watchdogs, self._goal_check),
             fast=self._fast_reads,
             rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
         )
@@ -423,7 +427,7 @@ class ServoChain:
 
         """
         pause_s = self._clock.now_s() - self._sent_at_s
-        if self._armed and self._has_watchdog and pause_s > self._watchdog_s:
+        if self._armed and self._watchdogs and pause_s > self._watchdog_s:
             raise BusError(
                 f"{pause_s:.2f} s without a packet: the bus watchdog ({self._watchdog_s:g} s) has "
                 "stopped the servos"
@@ -443,9 +447,8 @@ class ServoChain:
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
         labels = [*map(self.robot.joint_label, range(self.robot.joint_count))]
-        goal = bus.table_of(ids[0])["Goal Position"]
-        goals = bus.block(ids, goal.name, goal.name, fast=fast)
-        self._goal_check = GoalCheck(labels, goals, goal.kind)
+        goals = bus.block(ids, _GOAL, _GOAL, fast=fast)
+        self._goal_check = GoalCheck(labels, goals, RegisterRows.of(bus, ids, _GOAL))
         self._identified = IdentifiedRead(bus, self.robot, self._units)
         self._fast_reads = fast
 
@@ -465,14 +468,13 @@ class ServoChain:
         self._goal_rad = goal_rad
         return goals
 
-    def _expect(self, name: str, values: Sequence[int]) -> None:
-        """Compare a register of all servos with the values written to it.
+    def _expect(self, name: str, expected: Mapping[int, int]) -> None:
+        """Compare a register with the values written to the servos of some joints.
 
         Raises:
             BusError: a servo differs, or does not reply.
 
         """
-        expected = dict(enumerate(values))
         check = RegisterCheck.of(self._bus, self.robot, name, expected, fast=False)
         differing, _ = check.compare(ask_again=self._bus)
         for joint, got in differing.items():

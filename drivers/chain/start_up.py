@@ -151,7 +151,8 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
 
     """
     table = bus.table_of(servo_id)
-    names = [each for each in (*_REPORTED, *_COMPARED) if each in table]
+    own = FEETECH_SETTINGS if table.facts.protocol == "feetech" else ()
+    names = [each for each in (*_REPORTED, *_COMPARED, *own) if each in table]
     values = bus.read_each(servo_id, names)
     return ServoReport(
         servo_id=servo_id,
@@ -347,14 +348,17 @@ def _current_setting(
 def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     """Let servos reply to every instruction (Status Return Level(68)); return ping replies.
 
-    At level 0 a servo replies to pings only, at level 1 to pings and reads. Only servos of the
-    robot's model are written to.
+    At level 0 a servo replies to pings only, at level 1 to pings and reads; a Feetech servo replies
+    to all at level 1. Only servos of the robot's model are written to.
     """
     found = bus.find(robot.servo_ids)
     right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]
-    if right:
-        is_feetech = bus.table_of(right[0]).facts.protocol == "feetech"
-        bus.sync_write(right, "Status Return Level", 1 if is_feetech else ALL_REPLY)
+    by_level: dict[int, list[int]] = {}
+    for each in right:
+        is_feetech = bus.table_of(each).facts.protocol == "feetech"
+        by_level.setdefault(1 if is_feetech else ALL_REPLY, []).append(each)
+    for level, ids in by_level.items():
+        bus.sync_write(ids, "Status Return Level", level)
     return found
 
 

@@ -1,6 +1,6 @@
 """Torque off on every servo of a chain, repeated until each servo confirms it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -44,31 +44,32 @@ class TorqueOff:
             except PortError:
                 gone.append(part)
         silent: list[int] = []
-        faults: list[PortError] = []
+        faults: dict[DynamixelBus, PortError] = {}
         for part in sorted(joints_on, key=gone.__contains__):
             try:
                 if part in gone:
                     self._wait_to_send(part, joints_on[part], give_up_s)
                 silent += self._unconfirmed(part, joints_on[part])
             except PortError as error:
-                faults.append(error)
-        self._report(sorted(silent), faults, ports=len(joints_on))
+                faults[part] = error
+        self._report(sorted(silent), faults)
 
-    def _report(self, silent: Sequence[int], faults: Sequence[PortError], ports: int) -> None:
-        """Raise the error of servos that are not off, if any."""
+    def _report(self, silent: Sequence[int], faults: Mapping[DynamixelBus, PortError]) -> None:
+        """Raise the error of servos that are not off, if any; ``faults`` are of the lost ports."""
         names = ", ".join(map(self._robot.joint_label, silent))
         if faults:
-            ids = self._robot.servo_ids
+            ids = [each for part in faults for each in self._ids_of(self._joints_on(part))]
             hold = "its servos hold their last goals"
             if all(WATCHDOG in self._bus.table_of(each) for each in ids):
                 hold = f"its servos hold after the bus watchdog ({self._watchdog_s:.3g} s)"
+            gone = [*faults.values()]
             text = (
-                f"{'; '.join(map(str, faults))}; torque is not off: {hold}; switch the servo power "
+                f"{'; '.join(map(str, gone))}; torque is not off: {hold}; switch the servo power "
                 "off"
             )
-            if ports > len(faults) and not silent:
+            if len(self._bus.parts) > len(faults) and not silent:
                 text += "; on the other ports torque is off"
-            raise PortError(f"{text}; {names}: not confirmed" if names else text) from faults[0]
+            raise PortError(f"{text}; {names}: not confirmed" if names else text) from gone[0]
         if names:
             raise BusError(
                 f"{names}: torque off is not confirmed; if a joint still holds, switch the servo "

@@ -8,9 +8,11 @@ writes again. Only reads and time-outs move the clock. Implements the SDK's ``Po
 
 # ruff: noqa: N802, D102 - the SDK chose the names; `drivers.port.byte_port` describes them
 
+import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from typing import Final
 
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
@@ -28,6 +30,8 @@ INSTANT_S = 1e-9
 """Times closer than this are the same."""
 HOLD_UP_MAX_S = 0.01
 """A reply that is later than this does not hold up the servos behind it (ours)."""
+SLICE_S: Final = 2e-3
+"""Longest step in which the servos of several lines advance one after the other (ours)."""
 PacketTap = Callable[[float, bool, bytes], None]
 """Called with every packet on the wire: time of its end, whether the host sent it, its bytes."""
 
@@ -40,6 +44,8 @@ class Wire(ABC):
 
     def __init__(self, clock: SimClock, usb_latency_s: float = 0.0) -> None:
         self.clock = clock
+        self.label = "simulated line"
+        """Name of the port."""
         self.usb_latency_s = usb_latency_s
         """Delay of the host's adapter between the wire and the host."""
         self.taps: list[PacketTap] = []
@@ -52,6 +58,8 @@ class Wire(ABC):
         """Time during which bytes were on the wire."""
         self.collisions = 0
         """Packets that the host began while servos were still replying."""
+        self.group: LineGroup | None = None
+        """Lines whose servos turn the same body; None: this line is alone."""
         self._sent: deque[tuple[float, bytes]] = deque()
         self._rx_queue = RxQueue()
         self._sent_until_s = self._quiet_s = self.clock.now_s()
@@ -164,7 +172,7 @@ class Wire(ABC):
     @property
     def name(self) -> str:
         """For messages."""
-        return "simulated line"
+        return self.label
 
     def write(self, data: bytes) -> None:
         """Send bytes after those already on the wire; returns at once."""
@@ -263,7 +271,14 @@ class Wire(ABC):
         """Advance servos and physics to the clock's time."""
         now_s = self.clock.now_s()
         self._deliver(now_s)
-        self._advance(now_s)
+        self._advance_all(now_s)
+
+    def _advance_all(self, until_s: float) -> None:
+        """Advance the servos of this line, and of all lines of its group."""
+        if self.group is None:
+            self._advance(until_s)
+        else:
+            self.group.advance(until_s)
 
     def next_event_s(self) -> float | None:
         """Time of the next packet end or byte arrival, or None."""
@@ -299,7 +314,7 @@ class Wire(ABC):
 
     def _arrive(self, end_s: float, count: int) -> None:
         """Advance the servos to the end of a packet of ``count`` bytes."""
-        self._advance(end_s)
+        self._advance_all(end_s)
         if end_s - count * self._byte_s > self._delivered_s + GAP_S:
             self._reset_parser()
         self._delivered_s = end_s
@@ -320,3 +335,38 @@ class Wire(ABC):
         self.collisions += 1
         self._rx_queue.cut(start_s)
         self._quiet_s = start_s
+
+
+class LineGroup:
+    """Lines with one clock whose servos turn the shafts of one body.
+
+    Time passes for all of them together: packets of all lines are executed in the order of their
+    ends, and all servos advance in slices of ``SLICE_S``.
+    """
+
+    def __init__(self, lines: Sequence[Wire]) -> None:
+        """Join the lines.
+
+        Raises:
+            ValueError: their clocks differ.
+
+        """
+        if len({id(line.clock) for line in lines}) != 1:
+            raise ValueError("the lines of one body share one clock")
+        self._lines = tuple(lines)
+        self._time_s = lines[0].clock.now_s()
+        for line in lines:
+            line.group = self
+
+    def advance(self, until_s: float) -> None:
+        """Execute the packets that end by ``until_s``, and advance the servos to that time."""
+        while True:
+            ends = [line._sent[0][0] if line._sent else math.inf for line in self._lines]
+            end_s = min(ends)
+            if end_s > until_s:
+                break
+            self._lines[ends.index(end_s)]._deliver(end_s)
+        while self._time_s < until_s:
+            self._time_s = min(until_s, self._time_s + SLICE_S)
+            for line in self._lines:
+                line._advance(self._time_s)

@@ -14,6 +14,7 @@ from snakewalk.sim.ax12.line import BAUD_CLOCK, Ax12Line
 from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.imu import Imu
+from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.plant import LinkMotion
 from snakewalk.sim.serve.chain_spec import ChainSpec
@@ -91,8 +92,8 @@ def _ax12_line(ids: tuple[int, ...], facts: ServoModel, baud: int, plant: BenchP
     return Ax12Line(servos, baud=baud)
 
 
-def feetech_line(servos: FeetechServos, baud: int) -> FeetechLine:
-    """Line of ``baud`` with Feetech servos at that rate.
+def feetech_line(servos: FeetechServos, baud: int, clock: SimClock | None = None) -> FeetechLine:
+    """Line of ``baud`` with Feetech servos at that rate; ``clock`` None: its own.
 
     Raises:
         ControlTableError: the model lacks the rate.
@@ -102,4 +103,4 @@ def feetech_line(servos: FeetechServos, baud: int) -> FeetechLine:
     for row in range(len(servos)):
         servos["Baud Rate"][row] = code
         servos.registers.keep(row, "Baud Rate")
-    return FeetechLine(servos, baud=baud)
+    return FeetechLine(servos, clock, baud)

@@ -6,6 +6,7 @@ move by up to 0.1 rad.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.util import find_spec
 
@@ -17,11 +18,14 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.run.external.served_robot import simulated_line
+from snakewalk.controller.run.external.simulated_bus import SimulatedBus
+from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import ChainError, DriverError
 from snakewalk.drivers.link import JointLink
-from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand, JointState
@@ -32,6 +36,7 @@ from snakewalk.sim.serve.pty import PtyServer
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.pty_port import PtyPort, ServedClock
 
+Line = SimLine | FeetechLine
 PERIOD_S = 0.02
 TRIO = RobotConfig(name="trio", joint_axes="ypy")
 FEETECH = {
@@ -49,16 +54,33 @@ FEETECH = {
     for model, volts, gain in (("STS3215", 7.4, 64), ("HLS3606", 6.0, 128), ("SCS0009", 6.0, 16))
 }
 START_RAD = [0.3, 0.0, -0.2]
+TWO_MAKES = RobotConfig.model_validate(
+    {
+        "name": "trio",
+        "servo": {"model": "XM430-W350", "supply_v": 12.0, "pitch_current_limit_a": 0.8},
+        "joints": [
+            {"axis": "y", "id": 1},
+            {"axis": "p", "id": 2, "model": "STS3215-C018", "position_p_gain": 64},
+            {"axis": "y", "id": 3},
+        ],
+        "ports": [{"port": "A", "ids": [1, 3]}, {"port": "B", "ids": [2]}],
+    }
+)
+"""DYNAMIXEL servos at both ends, a Feetech servo between them on a port of its own."""
 
 
 @dataclass
 class Bus:
     """Where the host's bytes go, and what answers."""
 
-    port: BytePort
+    chain_bus: ChainBus
     robot: RobotConfig
-    line: SimLine | FeetechLine | None
-    """The simulated line; None on metal."""
+    lines: tuple[Line, ...]
+    """The simulated lines; empty on metal."""
+
+    @property
+    def clock(self) -> Clock:
+        return self.chain_bus.parts[0].port.clock
 
 
 @dataclass
@@ -66,14 +88,23 @@ class Backend:
     """A link, and what stands behind it."""
 
     link: JointLink
-    port: BytePort
-    robot: RobotConfig
-    line: SimLine | FeetechLine | None
-    """The simulated line; None on metal."""
+    bus: Bus
+
+    @property
+    def robot(self) -> RobotConfig:
+        return self.bus.robot
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        return self.bus.lines
+
+    @property
+    def clock(self) -> Clock:
+        return self.bus.clock
 
     def cycles(self, count: int, goal: Callable[[float], np.ndarray] | None = None) -> JointState:
         """Write and read at 50 Hz, hold the pose if no goal is given; the last state."""
-        clock = self.port.clock
+        clock = self.clock
         state, start_s = self.link.read(), clock.now_s()
         hold = state.position_rad
         for k in range(count):
@@ -96,27 +127,40 @@ def mujoco(robot: RobotConfig) -> Plant:
     return plant
 
 
-def bare(port: BytePort, robot: RobotConfig) -> JointLink:
-    return ServoChain(servo_bus(port, robot.models_by_id), robot)
+def bare(bus: Bus) -> JointLink:
+    return ServoChain(bus.chain_bus, bus.robot)
 
 
-def safe(port: BytePort, robot: RobotConfig) -> JointLink:
-    limits = SafetyLimits.from_config(robot, SafetyConfig())
-    return SafeLink(bare(port, robot), limits, port.clock)
+def safe(bus: Bus) -> JointLink:
+    return SafeLink(bare(bus), SafetyLimits.from_config(bus.robot, SafetyConfig()), bus.clock)
 
 
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="MuJoCo is not installed")
 
 
 def in_process(plant: Callable[[RobotConfig], Plant], robot: RobotConfig) -> Iterator[Bus]:
-    line = simulated_line(robot, plant(robot))
-    yield Bus(line, robot, line)
+    servos = SimulatedBus.of(robot, plant(robot))
+    yield Bus(servos.bus(), servos.robot, servos.lines)
 
 
 def on_a_pty(plant: Callable[[RobotConfig], Plant], robot: RobotConfig) -> Iterator[Bus]:
     line, clock = simulated_line(robot, plant(robot)), ServedClock()
     with PtyServer(line, clock) as server, PtyPort(server, robot.servo.baud, clock) as port:
-        yield Bus(port, robot, line)
+        yield Bus(servo_bus(port, robot.models_by_id), robot, (line,))
+
+
+def on_two_ptys(plant: Callable[[RobotConfig], Plant], robot: RobotConfig) -> Iterator[Bus]:
+    clock = ServedClock()
+    with ExitStack() as opened:
+        lines, parts = [], []
+        for port in robot.ports:
+            rows = [row for row, each in enumerate(robot.servo_ids) if each in port.ids]
+            shafts = BenchPlant(len(rows), start_rad=[START_RAD[row] for row in rows])
+            lines.append(simulated_line(robot, shafts, rows=rows))
+            server = opened.enter_context(PtyServer(lines[-1], clock))
+            device = opened.enter_context(PtyPort(server, robot.servo.baud, clock))
+            parts.append((servo_bus(device, robot.models_on(port.ids)), port.ids))
+        yield Bus(SegmentedBus(parts), robot, tuple(lines))
 
 
 BACKENDS = [
@@ -126,6 +170,9 @@ BACKENDS = [
     *(pytest.param((in_process, bench, robot), id=model) for model, robot in FEETECH.items()),
     pytest.param((in_process, mujoco, FEETECH["STS3215"]), id="STS3215-mujoco", marks=needs_mujoco),
     pytest.param((on_a_pty, bench, FEETECH["STS3215"]), id="STS3215-pty"),
+    pytest.param((in_process, bench, TWO_MAKES), id="two-makes"),
+    pytest.param((in_process, mujoco, TWO_MAKES), id="two-makes-mujoco", marks=needs_mujoco),
+    pytest.param((on_two_ptys, bench, TWO_MAKES), id="two-makes-ptys"),
     pytest.param(None, id="metal", marks=pytest.mark.metal),
 ]
 
@@ -143,32 +190,37 @@ def bus(request: pytest.FixtureRequest) -> Iterator[Bus]:
 
     robot = load_robot(request.config.getoption("--robot"))
     with SerialPort(device, robot.servo.baud) as port:
-        yield Bus(port, robot, None)
+        yield Bus(servo_bus(port, robot.models_by_id), robot, ())
 
 
 @pytest.fixture(params=[bare, safe])
 def backend(request: pytest.FixtureRequest, bus: Bus) -> Iterator[Backend]:
-    made = Backend(request.param(bus.port, bus.robot), bus.port, bus.robot, bus.line)
+    made = Backend(request.param(bus), bus)
     yield made
-    if bus.line is not None:
-        bus.port.openPort()
-        bus.line.tamper = None
+    for line, part in zip(bus.lines, bus.chain_bus.parts, strict=bool(bus.lines)):
+        part.port.openPort()
+        line.tamper = None
     made.link.disable()
 
 
-def simulated(backend: Backend) -> SimLine | FeetechLine:
-    if backend.line is None:
+def simulated(backend: Backend) -> tuple[Line, ...]:
+    if not backend.lines:
         pytest.skip("needs a line that fails on demand")
-    return backend.line
+    return backend.lines
+
+
+def tamper(lines: tuple[Line, ...], change: Callable[[bytes], list[bytes]] | None) -> None:
+    for line in lines:
+        line.tamper = change
 
 
 def test_enable_moves_nothing(backend: Backend) -> None:
     found = backend.link.enable()
     later = backend.cycles(25)
     assert np.abs(later.position_rad - found.position_rad).max() < 0.02
-    if backend.line is not None:
+    if backend.lines:
         assert np.abs(found.position_rad - START_RAD).max() < 0.05
-        assert backend.line.firmware.drive.torque_on.all()
+    assert all(line.firmware.drive.torque_on.all() for line in backend.lines)
 
 
 def test_goals_are_followed(backend: Backend) -> None:
@@ -202,7 +254,7 @@ def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
     first = backend.link.enable()
     second = backend.cycles(5)
     assert second.time_s > first.time_s
-    assert second.time_s <= backend.port.clock.now_s()
+    assert second.time_s <= backend.clock.now_s()
     assert second.valid.all()
     assert (second.age_s >= 0).all()
     assert second.age_s.max() < PERIOD_S
@@ -211,12 +263,12 @@ def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
 def test_a_goal_that_is_no_number_never_leaves(backend: Backend) -> None:
     goal = backend.link.enable().position_rad.copy()
     goal[0] = np.nan
-    sent = None if backend.line is None else backend.line.bank["Goal Position"].tolist()
+    sent = [line.bank["Goal Position"].tolist() for line in backend.lines]
     with pytest.raises((ValueError, DriverError)):
-        backend.link.write(JointCommand(backend.port.clock.now_s(), goal))
-    if backend.line is not None:
-        backend.line.settle()
-        assert backend.line.bank["Goal Position"].tolist() == sent
+        backend.link.write(JointCommand(backend.clock.now_s(), goal))
+    for line in backend.lines:
+        line.settle()
+    assert [line.bank["Goal Position"].tolist() for line in backend.lines] == sent
 
 
 def test_disable_may_come_at_any_time(backend: Backend) -> None:
@@ -225,8 +277,7 @@ def test_disable_may_come_at_any_time(backend: Backend) -> None:
     backend.link.disable()
     backend.link.disable()
     assert backend.link.read().valid.all()
-    if backend.line is not None:
-        assert not backend.line.firmware.drive.torque_on.any()
+    assert not any(line.firmware.drive.torque_on.any() for line in backend.lines)
 
 
 def test_enable_again_after_disable(backend: Backend) -> None:
@@ -239,10 +290,10 @@ def test_enable_again_after_disable(backend: Backend) -> None:
 
 
 def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
-    line = simulated(backend)
+    lines = simulated(backend)
     backend.link.enable()
     good = backend.link.read()
-    line.tamper = lambda _: []
+    tamper(lines, lambda _: [])
     ages = []
     for _ in range(3):
         state = backend.link.read()
@@ -252,45 +303,46 @@ def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
         ages.append(float(state.age_s.min()))
     assert ages == sorted(set(ages))
     assert ages[0] > 0.0
-    line.tamper = None
+    tamper(lines, None)
     assert backend.link.read().valid.all()
 
 
 def test_a_bent_answer_is_never_taken_for_a_value(backend: Backend) -> None:
-    line = simulated(backend)
+    lines = simulated(backend)
     backend.link.enable()
     good = backend.link.read()
-    line.tamper = lambda answer: [answer[:-6] + bytes((answer[-6] ^ 0x40,)) + answer[-5:]]
+    tamper(lines, lambda answer: [answer[:-6] + bytes((answer[-6] ^ 0x40,)) + answer[-5:]])
     for _ in range(6):
         state = backend.link.read()
         assert np.abs(state.position_rad - good.position_rad).max() < 0.02
 
 
 def test_a_servo_with_an_alarm_is_not_enabled(backend: Backend) -> None:
-    line = simulated(backend)
-    protection = line.servos.protection
-    protection.detect(np.array([1]), protection.alarms(1)["overheating"])
-    with pytest.raises(ChainError, match="overheating"):
+    line = simulated(backend)[-1]
+    protection, row = line.servos.protection, len(line.ids()) // 2
+    protection.detect(np.array([row]), protection.alarms(row)["overheating"])
+    with pytest.raises(ChainError, match=rf"\(ID {line.ids()[row]}\b.*overheating"):
         backend.link.enable()
-    assert not line.firmware.drive.torque_on.any()
+    assert not any(each.firmware.drive.torque_on.any() for each in backend.lines)
 
 
 def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -> None:
-    line = simulated(backend)
+    lines = simulated(backend)
     backend.link.enable()
     backend.cycles(5)
-    clock = backend.port.clock
+    clock = backend.clock
     clock.sleep_until_s(clock.now_s() + 1.0)
-    line.settle()
-    if isinstance(line, FeetechLine):  # no watchdog: a run reports it, and they hold
-        assert line.firmware.drive.torque_on.all()
-    else:
-        assert (line.bank["Bus Watchdog"] == 0xFF).all()
+    for line in lines:
+        line.settle()
+        if isinstance(line, FeetechLine):  # no watchdog: a run reports it, and they hold
+            assert line.firmware.drive.torque_on.all()
+        else:
+            assert (line.bank["Bus Watchdog"] == 0xFF).all()
 
 
 def test_a_lost_port_is_an_error_that_says_so(backend: Backend) -> None:
     simulated(backend)
     backend.link.enable()
-    backend.port.closePort()
+    backend.bus.chain_bus.parts[-1].port.closePort()
     with pytest.raises(DriverError, match="closed"):
         backend.link.read()

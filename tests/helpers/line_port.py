@@ -12,6 +12,7 @@ from unittest import mock
 
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.port import network_port
+from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.line.sim_line import SimLine
 
 _OPENERS = (
@@ -21,7 +22,7 @@ _OPENERS = (
 )
 
 
-class OpenedLine(SimLine):
+class _Opened:
     """What ``open_port`` gives, besides the line."""
 
     latency_s = 0.0
@@ -40,8 +41,16 @@ class OpenedLine(SimLine):
         pass
 
 
+class OpenedLine(_Opened, SimLine):
+    """Servos of Protocol 2.0."""
+
+
+class OpenedFeetechLine(_Opened, FeetechLine):
+    """Feetech servos."""
+
+
 @contextmanager
-def line_port(line: OpenedLine) -> Iterator[str]:
+def line_port(line: OpenedLine | OpenedFeetechLine) -> Iterator[str]:
     """Yield a device that exists, and opens ``line``; all other devices are opened as ever."""
     master, slave = os.openpty()
     device, really = os.ttyname(slave), network_port.open_port

@@ -81,8 +81,7 @@ def calibrate(
     keeps_backup = resume and backup is not None and backup.exists()
     refuse_to_overwrite([out, None if keeps_backup else backup], force)
     like = load_robot(robot)
-    if like.limbs:
-        raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
+    _check_robot(like)
     answers = ProgressFile(out)
     journal = answers.start(like, resume=resume, force=force)
     device = pick_port(port)
@@ -123,6 +122,16 @@ def calibrate(
         facts["fingerprints"] = str(fingerprints)
     answers.remove()
     _show(described, found.notes, facts, as_json)
+
+
+def _check_robot(like: RobotConfig) -> None:
+    if like.limbs:
+        raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
+    if like.is_mixed:
+        raise InputError(
+            f"robot {like.name}: has servos of different series on its ports; calibrate knows one "
+            "series: calibrate the joints of each port as a robot of its own, and join the files"
+        )
 
 
 def _check_options(out: Path, current: float, *, homing_offset: bool, yes: bool) -> None:

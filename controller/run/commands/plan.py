@@ -27,6 +27,7 @@ from snakewalk.controller.console.plugins import require
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.summary import path_relief, path_warnings
+from snakewalk.drivers.chain.chain_settings import missing_watchdogs
 from snakewalk.drivers.safety.trip_hold import TripHold
 
 
@@ -138,7 +139,8 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
-    warnings = [*prepared.warnings, *prepared.climb_warnings]
+    missing = missing_watchdogs(prepared.robot)
+    warnings = [*prepared.warnings, *prepared.climb_warnings, *missing]
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
         found |= facts

@@ -31,7 +31,7 @@ _ENERGIES = ("drawn_j", "returned_j", "heat_j", "work_j")
 
 def batch_fault(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> str | None:
     """Return why a run cannot be one of a batch; None if it can."""
-    if robot.is_feetech:
+    if robot.is_feetech or robot.is_mixed:
         return f"robot {robot.name}: has servos of Feetech"
     if robot.imu is not None:
         return f"robot {robot.name}: has an IMU"

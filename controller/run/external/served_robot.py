@@ -1,5 +1,6 @@
 """A simulated robot on its ground, served as if it were real, with a tracker and its truth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
 from snakewalk.config.pose import PoseConfig, TrackerConfig
@@ -22,8 +24,9 @@ from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.truth import TruthLog
 from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.feetech.servos import FeetechServos
+from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.sim_line import SimLine
-from snakewalk.sim.plant import Plant
+from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.serve.bench_line import feetech_line
 from snakewalk.sim.serve.watched_plant import WatchedPlant
 from snakewalk.sim.servo.bank import ServoBank
@@ -85,38 +88,56 @@ def simulated_line(
     deviation: Deviation = NO_DEVIATION,
     imu: "Imu | None" = None,
     baud: int | None = None,
+    *,
+    rows: Sequence[int] | None = None,
+    clock: SimClock | None = None,
 ) -> SimLine | FeetechLine:
-    """Return the robot's servos on the shafts of a body, behind a simulated line."""
-    rate = baud or robot.servo.baud
-    facts = robot.servo_records[0]
-    if facts.protocol == "feetech":
-        return _feetech_line(robot, plant, deviation, rate)
-    line = SimLine(
-        ServoBank(robot.servo_ids, robot.servo_records, rate),
-        plant,
-        baud=rate,
-        mounting=deviation.mounting(robot),
-        motors=motors_of(robot),
-        supply_and_ambient=SupplyAndAmbient.of(robot),
-        imu=imu,
-    )
+    """Return servos of a robot on the shafts of a body, behind a simulated line.
+
+    Args:
+        robot: its file.
+        plant: the body; it has the shafts of ``rows``.
+        deviation: differences of the simulated servos from the file.
+        imu: on the line.
+        baud: None: the robot's.
+        rows: joints whose servos are on the line; None: all, with the robot's cables.
+        clock: shared with other lines; None: a clock of its own.
+
+    Raises:
+        InputError: the servos are of different series.
+
+    """
+    rate, joints = baud or robot.servo.baud, range(robot.joint_count) if rows is None else rows
+    if rows is None and robot.is_mixed:
+        raise InputError(
+            f"robot {robot.name}: its ports have servos of different series, and one simulated "
+            "line has one series; serve the servos of each port alone: snakewalk bus serve --servos"
+        )
+    ids, at = [robot.servo_ids[row] for row in joints], np.array(joints, np.intp)
+    records, motors = [robot.servo_records[row] for row in joints], motors_of(robot)
+    mounting = deviation.mounting(robot)
+    mounting = Mounting(mounting.sign[at], mounting.zero_rad[at])
+    on_it = [motors[row] for row in joints]
+    line: SimLine | FeetechLine
+    if records[0].protocol == "feetech":
+        volts = robot.servo.supply_v
+        servos = FeetechServos(ids, plant, records[0], volts, mounting, on_it)
+        line = feetech_line(servos, rate, clock)
+    else:
+        around = SupplyAndAmbient.of(robot) if rows is None else None
+        line = SimLine(
+            ServoBank(ids, records, rate),
+            plant,
+            clock,
+            rate,
+            mounting=mounting,
+            motors=on_it,
+            supply_and_ambient=around or SupplyAndAmbient(supply_v=robot.servo.supply_v),
+            imu=imu,
+        )
     if deviation.torque is not None:
-        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque
+        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[at]
     return line
-
-
-def _feetech_line(robot: RobotConfig, plant: Plant, deviation: Deviation, baud: int) -> FeetechLine:
-    servos = FeetechServos(
-        robot.servo_ids,
-        plant,
-        robot.servo_records[0],
-        robot.servo.supply_v,
-        deviation.mounting(robot),
-        motors_of(robot),
-    )
-    if deviation.torque is not None:
-        servos.drive.torque_constant_n_m_a[:] *= deviation.torque
-    return feetech_line(servos, baud)
 
 
 class ServedRobot:

@@ -153,8 +153,21 @@ def test_a_run_reports_that_there_is_no_watchdog() -> None:
     assert sum("STS3215: has no bus watchdog" in each for each in lines) == 1
 
 
-def test_one_chain_has_one_make() -> None:
+def test_one_port_has_one_make() -> None:
     joints = [{"axis": "y", "id": 1}, {"axis": "y", "id": 2, "model": "XL330-M288"}]
     servo = {"model": "STS3215", "supply_v": 6.0, "over_current_a": 1.0}
-    with pytest.raises(ValidationError, match="one chain has servos of one series"):
+    with pytest.raises(ValidationError, match="one port has servos of one series"):
         RobotConfig.model_validate({"name": "two", "joints": joints, "servo": servo})
+
+
+def test_the_doctor_measures_the_supply_under_load() -> None:
+    line = a_line()
+    findings = examine(
+        *(line, ROBOT, SafetyConfig(), 50.0),
+        latency_s=0.004,
+        latency_timer_ms=None,
+        wiggle=True,
+    )
+    supply = [each for each in findings if each.check == "supply under load"]
+    assert [each.grade for each in supply] == ["ok"]
+    assert "7.4 V at rest" in supply[0].found

@@ -11,6 +11,7 @@ from snakewalk.drivers.chain.goal_check import (
     WATCHED_READS,
     GoalCheck,
 )
+from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.errors import BusError
 
 FOREIGN = 9999
@@ -46,7 +47,7 @@ class Rig:
 
     def __init__(self) -> None:
         self.servos = Servos(3)
-        self.check = GoalCheck(["a", "b", "c"], self.servos)
+        self.check = GoalCheck(["a", "b", "c"], self.servos, RegisterRows(["<i4"] * 3))
         self.sent = 0
 
     def cycle(self, *, hold: dict[int, int] | None = None, is_read: bool = True) -> None:

@@ -10,6 +10,7 @@ from snakewalk.config.loader import checked
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.drivers.bus.protocol1_block import Protocol1Block
 from snakewalk.drivers.chain.goal_check import FOREIGN_READS, OWN_READS, GoalCheck
+from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.errors import BusError
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import Ax12Line
@@ -30,7 +31,9 @@ class Rig:
         servos["Return Delay Time"][:] = 0
         FaultPlayer(self.line, checked(FaultPlan, tomllib.loads(faults), "test"))
         self.block = Protocol1Block(self.line, IDS, facts.registers["Goal Position"])
-        self.check = GoalCheck([f"servo {each}" for each in IDS], self.block, "<u2")
+        self.check = GoalCheck(
+            [f"servo {each}" for each in IDS], self.block, RegisterRows(["<u2"] * len(IDS))
+        )
 
     def swing(self, cycles: int) -> int:
         """Cycles until the check raises, or ``cycles``."""

@@ -372,7 +372,7 @@ def test_a_check_whose_reply_is_lost_is_made_again_in_the_next_cycle_with_time(
         chain.read()
     assert chain._liveness is not None
     check = chain._liveness._shaping[0]
-    line.bank[check.register.name][1] = 77
+    line.bank[check.name][1] = 77
     read, remaining = check.cycle.read, [None] * lost
 
     def lose() -> GroupReadReply:

@@ -153,6 +153,17 @@ def test_a_fault_that_the_servos_do_not_have(text: str, said: str) -> None:
         scripted(text)
 
 
+def test_a_chain_is_compared_with_itself_after_an_interruption() -> None:
+    line, robot = scripted("", "1-12:STS3215"), load_robot("sts3215-12")
+    chain = ServoChain(servo_bus(line, robot.models_by_id), robot, rate_hz=50)
+    believed_rad = chain.enable().position_rad
+    found = chain.recheck(believed_rad)
+    assert found.faults == ()
+    assert found.reset == ()
+    line.servos["Goal Velocity"][3] = 7
+    assert chain.recheck(believed_rad).reset == (3,)
+
+
 NOISE = {
     "drop": {"chance": 0.05},
     "corrupt": {"chance": 0.05},
