@@ -161,6 +161,10 @@ def captured_from(
         raise UnusableFilmError(name, checked)
     aligned = align_ends(checked)
     coils = solve_coils(aligned.skeletons, found.outlines, np.array(found.axis_error_px))
+    if sum(one.status.has_points for one in coils.skeletons) < 2:
+        if part:
+            return _without_body(found, coils.skeletons, rate_hz, fixed=fixed)
+        raise UnusableFilmError(name, coils.skeletons)
     aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
     points = np.stack([one.points_px for one in aligned.skeletons])
     radius = np.stack([one.radius_px for one in aligned.skeletons])
@@ -176,7 +180,7 @@ def captured_from(
     crops = {k: crop for k, crop in found.crops.items() if not solved[k]}
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
     fitted = with_tip_errors(fitted, found.ends_px, solved)
-    fitted = with_least_errors(fitted, found.faint_error_px)
+    fitted = with_least_errors(fitted, found.least_error_px)
     skeletons = verified(fitted.skeletons, found.store)
     if not part and sum(one.status.has_points for one in skeletons) < 2:
         raise UnusableFilmError(name, skeletons)

@@ -17,6 +17,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _LOST_FRAMES = 5  # for this number of frames a lost small body is searched at its last place
 _FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
+_BAND = 0.6  # of the longest light band: another one may be hidden beyond a thin tail, which
+# shifts the points by half of its length in the mean; blur shortens the band that is seen
 _HIDDEN = 0.1  # of the length: error if half of the contrast of the faint parts is only noise
 # because a tail that fades into the noise goes on beyond its visible end (measured on larvae)
 
@@ -35,7 +37,9 @@ class Detections:
     outlines: dict[int, Outline] = field(default_factory=dict)
     """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
     faint_error_px: dict[int, float] = field(default_factory=dict)
-    """By frame: least expected error of bodies with faint parts."""
+    """By frame: least expected error of bodies with faint parts, apart from hidden bands."""
+    bands_px: list[float] = field(default_factory=list)
+    """Longest light band of each body with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
     """(2, 3) by frame: where the profile of the body ends, and the doubt; NaN if not known."""
     store: FrameStore = field(default_factory=FrameStore)
@@ -66,6 +70,7 @@ class Detections:
             if detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)
+                self.bands_px.append(_longest_band_px(body, detection))
                 self.faint_error_px[number] = axis_px
         may_coil = body.status in COILS and silhouette.status is FrameStatus.GOOD
         if body.status is FrameStatus.GOOD or may_coil:
@@ -82,6 +87,12 @@ class Detections:
         self.expected_px.append(expected)
         self.axis_error_px.append(axis_px)
         self.ends_px.append(ends_px)
+
+    @property
+    def least_error_px(self) -> dict[int, float]:
+        """By frame: least expected error of bodies with faint parts."""
+        band_px = _BAND * float(np.median(self.bands_px)) if self.bands_px else 0.0
+        return {k: max(error_px, band_px) for k, error_px in self.faint_error_px.items()}
 
     def skip(self, status: FrameStatus) -> None:
         """Add a frame in which the animal is not searched for."""
@@ -100,3 +111,13 @@ class Detections:
         if len(places):
             length = float(np.nan_to_num(detection.skeleton.length_px))
             self.store.put(number, frame, places, length)
+
+
+def _longest_band_px(body: Skeleton, detection: Detection) -> float:
+    """Length of the longest faint part of a body that has stronger parts on both sides."""
+    level = detection.silhouette.level
+    at = np.rint(body.points_px - np.asarray(detection.silhouette.origin_px)).astype(int)
+    column, row = np.clip(at, 0, np.subtract(level.shape[::-1], 1)).T
+    strong = np.flatnonzero(level[row, column] >= detection.contrast_threshold)
+    chord = body.length_px / (len(body.points_px) - 1)
+    return float(np.diff(strong).max(initial=1) - 1) * chord

@@ -1,6 +1,7 @@
 """The ground without the animal: from many frames, or from one frame."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -89,12 +90,15 @@ def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity | Non
     None: nothing stands out by more than noise.
     """
     kind: type[np.int16 | np.float32] = np.int16 if image.dtype == np.uint8 else np.float32
-    apart: NDArray[np.int16 | np.float32] = image.astype(kind) - background.astype(kind)
+    apart: NDArray[Any] = image.astype(kind) - background.astype(kind)
     if apart.ndim == 3:
-        one, *others = (cv2.extractChannel(apart, k) for k in range(apart.shape[2]))
+        strongest_channel, *others = (
+            np.asarray(cv2.extractChannel(apart, k)) for k in range(apart.shape[2])
+        )
         for other in others:
-            one = np.where(np.abs(other) > np.abs(one), other, one)
-        apart = one
+            stronger = np.abs(other) > np.abs(strongest_channel)
+            np.copyto(strongest_channel, other, where=stronger)
+        apart = strongest_channel
     every = max(1, min(apart.shape) // _SHRUNK_PX)
     smooth = cv2.GaussianBlur(apart.astype(np.float32), (5, 5), 0.0)
     smooth = smooth - np.float32(np.median(apart[::every, ::every]))

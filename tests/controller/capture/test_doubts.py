@@ -10,13 +10,15 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture, UnusableFilmError, capture
 from snakewalk.controller.capture.capturing import capture_recording, warning_of
+from snakewalk.controller.capture.coil_film import CoilFilm
 from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.verification.film_check import goes_on_faintly
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.rendered_snake import (
@@ -130,3 +132,30 @@ def test_an_animal_as_bright_as_its_ground_is_rejected_with_that_reason(tmp_path
     with pytest.raises(InputError, match="the animal is about as bright as its ground"):
         capture_recording(CaptureOptions(folder, tmp_path / "track.npz", rate_hz=4.0))
     assert not (tmp_path / "track.npz").exists()
+
+
+def test_a_hidden_light_band_at_the_tail_is_part_of_the_expected_error() -> None:
+    larva: dict[str, Any] = {"head": 1.8, "tip": 0.05, "taper": 0.6, "bands": 5}
+    scene = replace(SCENE, rows=300, columns=360, frames=6, **larva)
+    truth = true_midlines(scene)
+    detector = BodyDetector(empty(scene), Polarity.DARK, "given")
+    seen = capture(film(scene), detector, scene.rate_hz)
+    off = []
+    for k in np.flatnonzero(seen.used):
+        line = seen.points_px[k]
+        off.append(min(point_error(line[::way], truth[k]) for way in (1, -1)))
+    assert len(off) >= 5
+    assert np.median(off) > 0.03 * scene.length_px
+    assert (np.array(off) < 2.0 * seen.expected_px[seen.used]).all()
+    assert not seen.good.any()
+
+
+def test_a_film_whose_coils_leave_no_body_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lost(skeletons: tuple[Skeleton, ...], *_: object) -> CoilFilm:
+        away = tuple(no_skeleton(FrameStatus.COIL_ALONE) for _ in skeletons)
+        return CoilFilm(away, np.full(len(away), np.nan))
+
+    monkeypatch.setattr("snakewalk.controller.capture.capture.solve_coils", lost)
+    frames = list(film(replace(SCENE, frames=5)))
+    with pytest.raises(UnusableFilmError, match="the body is never seen whole"):
+        capture(frames, BodyDetector(empty(SCENE), Polarity.DARK, "given"), SCENE.rate_hz)
