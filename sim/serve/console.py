@@ -1,5 +1,6 @@
 """A console of simulated servos: changes registers, loads, faults and pace during a run."""
 
+import re
 from collections.abc import Callable
 from typing import Final
 
@@ -13,6 +14,8 @@ from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.register_access import register_name, rows_of, set_load, set_register
 
+_BEFORE_KEY: Final = re.compile(r" (?=\w+=)")
+"""Space between two pairs of key and value; a value may contain spaces."""
 HELP: Final = """\
 set IDS REGISTER VALUE    set 3 Homing Offset 100; IDS: 3, 1-4, 1,3,5-8 or all
 get IDS REGISTER          get all Present Position
@@ -79,7 +82,7 @@ class Console:
 
     def _fault(self, words: list[str]) -> str:
         table: dict[str, object] = {"kind": words[0]}
-        for word in words[1:]:
+        for word in _BEFORE_KEY.split(" ".join(words[1:])) if words[1:] else ():
             key, equals, value = word.partition("=")
             if not equals:
                 raise ValueError

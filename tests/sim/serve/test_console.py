@@ -61,6 +61,15 @@ def test_a_fault_begins_now_and_others_go_on(line: SimLine, say: Callable[[str],
     assert set(bus.find([1, 2, 7])) == {1, 2}
 
 
+def test_the_value_of_a_fault_may_have_spaces(line: SimLine, say: Callable[[str], str]) -> None:
+    """Most registers have a space in their name."""
+    told = say('fault reading ids=[2, 1] register="Present Temperature" value=0 for_s=5')
+    assert told == "reading: from now on"
+    line.clock.sleep_until_s(1.0)
+    assert DynamixelBus(line).read(2, "Present Temperature") == 0
+    assert "write fault KIND" in say('fault reading "Present Temperature" ids=[2]')
+
+
 def test_the_pace_is_handed_on(line: SimLine) -> None:
     told: list[float] = []
     console = Console(line, FaultPlayer(line, FaultPlan()))
