@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from snakewalk.config.faults import FaultPlan
-from snakewalk.controller.run import backend
 from snakewalk.controller.run.execute import Finished, execute
+from snakewalk.controller.run.external import simulated_bus
 from snakewalk.controller.run.factory import prepare_gait, with_compliance
 from snakewalk.controller.studies.trials import Case, prepare_case
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
@@ -48,7 +48,7 @@ def test_lost_replies_hold_the_yield_and_the_run_goes_on(
         FaultPlayer(line, faults)  # type: ignore[arg-type]
         return DynamixelBus(line, *args, **values)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(backend, "servo_bus", faulty)
+    monkeypatch.setattr(simulated_bus, "servo_bus", faulty)
     found = ran(tmp_path, compliance=None)
     cycle = found.record.cycle
     assert found.outcome.tripped is None
