@@ -101,6 +101,8 @@ def examine(
     measured = _FEETECH_MEASURED if _is_feetech(bus) else _MEASURED
     reads = [bus.probe(i, measured) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
+    alone = [] if noise is not None else servos.unshared(found, (*pings, *reads))
+    clocks = servos.read_clocks(bus, alone, servos.PATIENCE_S)
     if noise is not None:
         patience_s = bus.latency_s
         bus = servo_bus(port, models, latency_s=patience_s, tries=_NOISE_TRIES)
@@ -118,16 +120,11 @@ def examine(
     if reports:
         findings += _servo_findings(bus, robot, safety, reports, noise)
         on_progress("group reads")
-        fast = all(s.fast_reads for s in reports)
-        port.drain_until_quiet(line_checks.PATIENCE_S)  # late replies to earlier requests
-        patient = servo_bus(port, models, latency_s=line_checks.PATIENCE_S)
-        cycle = patient.cycle([s.servo_id for s in reports], fast=fast)
-        ids = [s.servo_id for s in reports for _ in range(_ASKED)]
-        findings.append(
-            line_checks.line_quality(port, cycle, latency_s, lambda: [bus.probe(i) for i in ids])
-        )
-    fast = all(s.fast_reads for s in reports)
-    findings.append(adapter.wire(robot_budget(robot, baud, fast=fast), rate_hz))
+        findings.append(_line_quality(bus, models, reports, latency_s))
+    last = servos.read_clocks(bus, [*clocks], servos.PATIENCE_S)
+    findings += servos.restarts(clocks, last, robot)
+    budget = robot_budget(robot, baud, fast=all(s.fast_reads for s in reports))
+    findings.append(adapter.wire(budget, rate_hz))
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
         findings += supply_under_load(bus, robot, safety)
@@ -197,6 +194,22 @@ def _presence(
     already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
     findings += [] if new is None or already else [new]
     return findings
+
+
+def _line_quality(
+    bus: DynamixelBus,
+    models: Mapping[int, ServoModel],
+    reports: Sequence[ServoReport],
+    latency_s: float,
+) -> Finding:
+    port, patience_s = bus.port, line_checks.PATIENCE_S
+    port.drain_until_quiet(patience_s)  # late replies to earlier requests
+    ids, fast = [s.servo_id for s in reports], all(s.fast_reads for s in reports)
+    cycle = servo_bus(port, models, latency_s=patience_s).cycle(ids, fast=fast)
+    asked = [each for each in ids for _ in range(_ASKED)]
+    return line_checks.line_quality(
+        port, cycle, latency_s, lambda: [bus.probe(each) for each in asked]
+    )
 
 
 def _servo_findings(
@@ -328,11 +341,11 @@ def _settings(
     bus.port.clock.sleep_until_s(bus.port.clock.now_s() + _STILL_S)
     try:
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
+        supply = servos.unsteady_supply(bus, reports)
     except BusError as error:
         return [_unreadable(error, noise)]
     units = JointUnits.of(robot, [ServoUnits.of(facts) for facts in robot.servo_records])
     moving = _moving(robot, units, reports, registers)
-    supply = servos.unsteady_supply(bus, reports)
     return [*moving, *supply, *register_findings(registers, robot, units)]
 
 

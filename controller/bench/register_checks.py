@@ -113,6 +113,7 @@ class _Checks:
             self._exchanged(),
             self._secondary(),
             self._current_limit(),
+            self._no_current(),
             self._bad(
                 "status return level",
                 "warn",
@@ -344,6 +345,18 @@ class _Checks:
             *("current limit", "fail", "Current Limit"),
             f"a {self._at('Current Limit')} below the robot's current limit",
             "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
+        )
+
+    def _no_current(self) -> Finding | None:
+        """Joints without a limit in the robot's file; a run checks the others."""
+        return self._bad(
+            "current limit",
+            "warn",
+            lambda servo: (
+                self._robot.all_axes[servo.joint] != "p" and servo.values.get("Current Limit") == 0
+            ),
+            f"a {self._at('Current Limit')} of 0: no torque in modes that control the current",
+            remedy="snakewalk bus set --current-limit",
         )
 
     def _weak(

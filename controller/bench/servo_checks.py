@@ -1,6 +1,8 @@
 """The other side: each servo against the robot that was described."""
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from statistics import median
 
 from snakewalk.config.robot import RobotConfig
@@ -8,6 +10,7 @@ from snakewalk.controller.console.finding import Finding, shown_ids, shown_subje
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.probe import Probe
 from snakewalk.drivers.chain.start_up import ServoReport
+from snakewalk.drivers.errors import NoAnswerError, ServoError
 from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, alarm_names
 
 _HOT_C = 60.0
@@ -18,6 +21,19 @@ _UNSTEADY_V = 0.3
 _WARMER_C = 20.0
 """A servo at rest that is warmer than the others by more has a reason (ours)."""
 _CABLE_DROP_V = 0.5
+_TICK = "Realtime Tick"
+_TICKS = 32_768
+"""Realtime Tick(120) counts milliseconds from 0 to 32,767, and then from 0 again."""
+_TICK_S = 1e-3
+_DRIFT = 0.03
+"""Share by which the clock of a servo may be wrong (ours)."""
+_SLACK_S = 0.05
+"""Additional difference of a clock that did not restart (ours)."""
+PATIENCE_S = 0.5
+"""How long a servo without a reply is asked for its clock (ours); a restart is shorter."""
+_POWER_REMEDY = (
+    "a loose plug, a bad cable, or a supply that sags: the servo loses its torque in a run"
+)
 _DUPLICATE_REMEDY = (
     "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
 )
@@ -285,3 +301,72 @@ def heat(servos: Sequence[ServoReport], robot: RobotConfig, limit_c: float) -> F
         remedy = "did it push against something? is its joint tight, or its sensor off?"
         return Finding("temperature", "warn", found, remedy)
     return Finding("temperature", "ok", found)
+
+
+@dataclass(frozen=True, slots=True)
+class ServoClock:
+    """Realtime Tick of a servo, read between two times of the computer."""
+
+    ticks: int
+    asked_s: float
+    received_s: float
+
+
+def unshared(servo_ids: Sequence[int], probes: Sequence[Probe]) -> list[int]:
+    """Servos without a damaged or doubled reply: an ID of two servos has two clocks."""
+    shared = {each.servo_id for each in probes if each.doubled or each.damaged}
+    return [servo_id for servo_id in servo_ids if servo_id not in shared]
+
+
+def read_clocks(
+    bus: DynamixelBus, servo_ids: Sequence[int], patience_s: float = 0.0
+) -> dict[int, ServoClock]:
+    """Clock of each servo that has one and replies; the others are asked for ``patience_s``.
+
+    Raises:
+        PortError: the port is gone.
+
+    """
+    clocks: dict[int, ServoClock] = {}
+    now_s = bus.port.clock.now_s
+    asked = [servo_id for servo_id in servo_ids if _TICK in bus.table_of(servo_id)]
+    end_s = now_s() + patience_s
+    while asked:
+        for servo_id in asked:
+            asked_s = now_s()
+            with suppress(NoAnswerError, ServoError):
+                clocks[servo_id] = ServoClock(bus.read(servo_id, _TICK), asked_s, now_s())
+        asked = [servo_id for servo_id in asked if servo_id not in clocks]
+        if now_s() > end_s:
+            break
+    return clocks
+
+
+def restarts(
+    before: Mapping[int, ServoClock], after: Mapping[int, ServoClock], robot: RobotConfig
+) -> list[Finding]:
+    """Findings on the servos whose clocks began again between two reads, or that fell silent."""
+    silent = [servo_id for servo_id in before if servo_id not in after]
+    findings = []
+    if silent:
+        found = f"{shown_subject(silent, 'reply', robot.label_of_servo)} no more since the start"
+        findings.append(Finding("power", "fail", found, _POWER_REMEDY))
+    restarted = [
+        servo_id
+        for servo_id, first in before.items()
+        if servo_id in after and _is_restarted(first, after[servo_id])
+    ]
+    if restarted:
+        found = f"{shown_subject(restarted, 'restart', robot.label_of_servo)} while doctor runs"
+        findings.append(Finding("power", "fail", found, _POWER_REMEDY))
+    return findings
+
+
+def _is_restarted(before: ServoClock, after: ServoClock) -> bool:
+    shortest_s = after.asked_s - before.received_s
+    longest_s = after.received_s - before.asked_s
+    low_s = shortest_s * (1.0 - _DRIFT) - _SLACK_S
+    high_s = longest_s * (1.0 + _DRIFT) + _SLACK_S
+    counted_s = (after.ticks - before.ticks) * _TICK_S
+    beyond_s = (counted_s - low_s) % (_TICKS * _TICK_S)
+    return beyond_s > high_s - low_s

@@ -1,6 +1,7 @@
 """A command as it is called: checks its words and files first, then imports what it uses."""
 
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import wraps
@@ -37,12 +38,27 @@ class CalledCommand(TyperCommand):
                 if order.count(option) > 1 and _takes_one_value(option):
                     fault = f"given {order.count(option)} times, but has one value; leave one"
                     raise typer.BadParameter(fault, ctx=ctx, param=option)
+            for each in self.params:
+                _check_finite(ctx, each)
         return rest
 
 
 def _takes_one_value(option: Any) -> bool:
     """Whether a second value of an option replaces the first; a flag that only sets does not."""
     return not (option.multiple or (option.is_flag and not option.secondary_opts))
+
+
+def _check_finite(ctx: Any, parameter: Any) -> None:
+    """Reject NaN and infinity, unless the help of the option names the value.
+
+    Bounds do not reject NaN in each comparison, and a configuration names its own keys.
+    """
+    value = ctx.params.get(parameter.name)
+    words = (getattr(parameter, "help", None) or "").replace(":", " ").split()
+    for each in value if isinstance(value, list | tuple) else (value,):
+        if isinstance(each, float) and not math.isfinite(each) and f"{abs(each)}" not in words:
+            fault = f"must be a finite number (got {each:g})"
+            raise typer.BadParameter(fault, ctx=ctx, param=parameter)
 
 
 def called(

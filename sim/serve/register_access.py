@@ -1,5 +1,6 @@
 """Registers and loads of simulated servos, set by a console or a test."""
 
+import math
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import Final
@@ -56,10 +57,13 @@ def set_register(line: BenchLine, rows: Sequence[int], name: str, value: int) ->
     """Set a register of servos, like their firmware; return its name in the tables.
 
     Raises:
-        InputError: the register is unknown, or measured by the servo.
+        InputError: the register is unknown or measured by the servo, or the value is not whole.
         ControlTableError: the value does not fit.
 
     """
+    if not isinstance(value, int | np.integer):
+        raise InputError(f"{name} {value}: must be a whole number")
+    value = int(value)
     found = register_name(line, name, rows)
     if found.startswith(_MEASURED):
         raise InputError(f"{found}: is measured, not set; see load and fault")
@@ -82,9 +86,12 @@ def set_load(line: BenchLine, rows: Sequence[int], load_n_m: float) -> None:
     """Put a constant torque on shafts.
 
     Raises:
-        InputError: the servos turn a robot's body, which has the ground as its load.
+        InputError: the servos turn a robot's body, which has the ground as its load, or the torque
+            is not finite.
 
     """
+    if not math.isfinite(load_n_m):
+        raise InputError(f"load {load_n_m:g}: must be a finite number of N m")
     plant = line.firmware.plant if isinstance(line, SimLine) else line.servos.plant
     if not isinstance(plant, BenchPlant):
         raise InputError("load: only shafts of a bench (--servos) have one; a robot has ground")

@@ -234,6 +234,7 @@ class Firmware:
         self._reset_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
         self._last_on[rows] = False
+        self._present_values.restart_clock(rows, self._time_s)
         names = "Startup Configuration"
         start = self.bank[names] if names in self.bank else np.zeros(len(self.bank), np.uint8)
         for row in rows:

@@ -40,7 +40,7 @@ class PresentValues:
         control_loops: ControlLoops,
         protection: Protection,
     ) -> None:
-        self._start_s = plant.time_s
+        self._start_s = np.full(len(bank), plant.time_s)
         self._bank, self._plant, self._drive = bank, plant, drive
         self._motor_output, self._control_loops, self._protection = (
             motor_output,
@@ -61,6 +61,10 @@ class PresentValues:
         """Addresses of the registers that show time and shafts."""
         self.supply_at = _span(bank, "Present Input Voltage", "Present Temperature")
         """Addresses of voltage and temperature."""
+
+    def restart_clock(self, rows: NDArray[np.intp], time_s: float) -> None:
+        """Realtime Tick(120) of these servos counts from 0 again."""
+        self._start_s[rows] = time_s
 
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
@@ -85,7 +89,7 @@ class PresentValues:
         path = control_loops.trajectory
         output = self._motor_output.pwm(self._plant.velocity_rad_s) * sign
         bank["Present PWM"][:] = np.rint(output * self._scales.full_pwm)
-        bank["Realtime Tick"][:] = int((time_s - self._start_s) * 1e3) % 32_768
+        bank["Realtime Tick"][:] = ((time_s - self._start_s) * 1e3).astype(np.int64) % 32_768
         goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
         places = path.position * sign * self._scales.positions_per_rad + zero
         shown = np.where(control_loops.position, places, goal)

@@ -66,7 +66,7 @@ Cell = Annotated[
 HeightStep = Annotated[
     float | None, typer.Option(help="height of one step of the file's values, in the unit")
 ]
-NoData = Annotated[float | None, typer.Option(help="value of empty cells")]
+NoData = Annotated[float | None, typer.Option(help="value of empty cells, such as -9999 or nan")]
 PointOf = Annotated[
     str | None,
     typer.Option(help="point of a cell that counts: lowest, median, highest; default: median"),

@@ -35,6 +35,7 @@ from tests.controller.bench.test_broken_buses import (
     set_register,
     supply,
 )
+from tests.controller.bench.test_restarts import losing_power
 
 Step = Callable[[TestLine], None]
 
@@ -262,6 +263,19 @@ FURTHER = [
         set_register("Drive Mode", 2),
         "drive mode",
         "joint yaw_03 (ID 3) follows another servo's sync cable",
+    ),
+    Kind(
+        "a servo that restarts",
+        losing_power(0.9),
+        "power",
+        "joint yaw_03 (ID 3) restarts while doctor runs",
+        "fail",
+    ),
+    Kind(
+        "a current limit of 0 without a limit in the robot's file",
+        set_register("Current Limit", 0),
+        "current limit",
+        "joint yaw_03 (ID 3) has a Current Limit(38) of 0",
     ),
     Kind("a supply that changes at rest", sagging, "supply", "changes by", "warn"),
     Kind(

@@ -73,7 +73,7 @@ def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path: Path) -> None:
     words = ("terrain", "from", file, "-o", world)
     for more, expected in (
         (("--scale", -1), "--scale -1: must be above 0"),
-        (("--spacing", "nan"), "--spacing nan: must be above 0"),
+        (("--spacing", 0), "--spacing 0: must be above 0"),
         (("--fill", -1), "--fill -1: must be 0 or more"),
         (("--unit", "parsec"), "is none of m, cm, mm, km, ft, us-ft, deg"),
         (("--point", "best"), "is none of lowest, median, highest"),

@@ -1,11 +1,13 @@
 """The fixture's bus: registers and loads set by a test, lateness in reports, and light imports."""
 
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Callable
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
@@ -60,6 +62,22 @@ def test_a_misspelt_register_has_the_closest_names(servo_bus: MakeBus) -> None:
         bus.set("Present Position", 3)
     with pytest.raises(ControlTableError):
         bus.set("Torque Enable", 300)
+
+
+@pytest.mark.parametrize("load_n_m", [math.nan, math.inf])
+def test_a_load_that_is_not_finite_is_rejected(servo_bus: MakeBus, load_n_m: float) -> None:
+    """It made the simulated shafts NaN."""
+    bus = servo_bus("1-2")
+    with pytest.raises(InputError, match="must be a finite number of N m"):
+        bus.load(load_n_m)
+
+
+def test_a_register_has_whole_numbers(servo_bus: MakeBus) -> None:
+    bus = servo_bus("1-2")
+    with pytest.raises(InputError, match=r"Goal Position 1.5: must be a whole number"):
+        bus.set("Goal Position", 1.5)  # type: ignore[arg-type]
+    bus.set("Goal Position", np.int64(2100), ids=[2])
+    assert bus["Goal Position"].tolist() == [2048, 2100]
 
 
 def test_the_server_measures_how_late_it_came() -> None:
