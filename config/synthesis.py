@@ -1,5 +1,6 @@
 """Synthesis of a motion without a robot ([PT] 2.6): rate, speed law, behaviour over time."""
 
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Self
 
@@ -83,6 +84,13 @@ class WavesConfig(Strict):
         return {band: part / total for band, part in bands.items() if part > 0.0}
 
 
+class Adaptation(StrEnum):
+    """How a skeleton in the plane gets onto the ground ([PT] 2.6.5)."""
+
+    ARC = "arc"
+    HEIGHT = "height"
+
+
 class SynthesisConfig(Strict):
     """`snakewalk synthesise`: a motion on paper ([PT] 2.6). A curve is a number or [[s, value]...].
 
@@ -101,6 +109,11 @@ class SynthesisConfig(Strict):
         le=1.0,
         description="share of each state that is walked, from its tail; default: "
         "walk.decision_fraction. walk-printed walks whole states",
+    )
+    ground: Adaptation = Field(
+        Adaptation.ARC,
+        description="arc: segments keep their length on the ground; height: points keep their "
+        "place in the plane and get the ground's height, which stretches segments on slopes",
     )
     target_spacing_m: float = Field(
         0.6, gt=0.05, description="between targets on the path, in addition to the waypoints"

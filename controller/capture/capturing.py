@@ -24,7 +24,7 @@ from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, Part
 from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
-from snakewalk.controller.capture.plots.capture import contact_sheet, step_picture
+from snakewalk.controller.capture.plots.capture import contact_sheet, step_picture, trail_picture
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
@@ -284,6 +284,8 @@ def _write_pictures(
     captured, footage, region = held.captured, film.footage, film.region
     if options.sheet is not None:
         contact_sheet(options.sheet, footage.read(), captured)
+    if options.trail is not None:
+        trail_picture(options.trail, footage.read(), captured, detector.polarity)
     if options.steps is not None:
         number = int(np.argmax(captured.used))
         shot = next(islice(footage.read(), number, None))

@@ -35,6 +35,8 @@ class CaptureOptions:
     overlay: Path | None = None
     sheet: Path | None = None
     steps: Path | None = None
+    trail: Path | None = None
+    """Picture of the brightest, or of the darkest, value of each pixel over the film."""
     review: Path | None = None
     corrections: Path | None = None
     animals: str | None = None
@@ -55,6 +57,8 @@ def check_options(options: CaptureOptions) -> None:
     """
     if options.cropped and options.background is not None:
         raise InputError("--cropped and --background: a camera that moves has no one background")
+    if options.cropped and options.trail is not None:
+        raise InputError("--cropped and --trail: the camera must stand still; leave one out")
     if options.length_m is not None and options.marker is not None:
         raise InputError("--length-m and --marker both give the scale: say one of them")
     if options.length_m is not None and not 0.0 < options.length_m < float("inf"):
@@ -79,13 +83,20 @@ def check_options(options: CaptureOptions) -> None:
         _check_animals(options, options.animals)
     if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:
         raise InputError(f"{options.overlay}: an overlay film is one of {', '.join(_FILMS)}")
-    for picture in (options.sheet, options.steps):
+    for picture in (options.sheet, options.steps, options.trail):
         if picture is not None and picture.suffix.lower() not in _SHEETS:
             raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
     if options.review is not None and options.review.suffix.lower() not in _PAGES:
         raise InputError(f"{options.review}: a review page is an .html")
     refuse_to_overwrite(
-        [options.output, options.overlay, options.sheet, options.steps, options.review],
+        [
+            options.output,
+            options.overlay,
+            options.sheet,
+            options.steps,
+            options.trail,
+            options.review,
+        ],
         options.force,
     )
 
@@ -95,7 +106,12 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
         raise InputError(
             f"--animals {animals}: expected a number from 1 to {MOST_ANIMALS}, or {AUTO}"
         )
-    given = {"--head": options.head, "--steps": options.steps, "--sheet": options.sheet}
+    given = {
+        "--head": options.head,
+        "--steps": options.steps,
+        "--sheet": options.sheet,
+        "--trail": options.trail,
+    }
     one = [name for name, value in given.items() if value is not None]
     if one:
         raise InputError(f"--animals and {one[0]}: this option is for one animal; leave it out")

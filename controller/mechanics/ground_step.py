@@ -107,6 +107,20 @@ class GroundStep:
             return GroundedSkeleton(points[0], pitch[0], gap[0])
         return GroundedSkeleton(points, pitch, gap)
 
+    def lift(self, points_m: Floats, half_height_m: ArrayLike) -> GroundedSkeleton:
+        """Keep skeletons (..., N + 1, 2) in the plane, and compute their heights only.
+
+        This is the cheap form of [PT] 2.6.5. A segment of slope ``a`` is longer by ``1 / cos a``.
+        """
+        z_m, x0_m, y0_m, spacing_m = self._field
+        field = HeightField(z_m, spacing_m, x0_m, y0_m)
+        height_m = field.elevation_m(points_m[..., 0], points_m[..., 1])
+        height_m = height_m + np.asarray(half_height_m, float)
+        points = np.concatenate([points_m, height_m[..., None]], axis=-1)
+        ahead = -np.diff(points, axis=-2)
+        pitch_rad = np.arctan2(ahead[..., 2], np.hypot(ahead[..., 0], ahead[..., 1]))
+        return GroundedSkeleton(points, pitch_rad, np.zeros(height_m.shape))
+
 
 @compiled(f"UniTuple(float64, 3)({FIELD}, float64, float64)", makes_arrays=False)
 def plane(

@@ -47,7 +47,7 @@ class Dashboard:
         self._gui = gui = server.gui
         self._picture: viser.GuiImageHandle | None = None
         self._state = gui.add_html("")
-        self.follow = gui.add_checkbox("follow the body", not header.run.waypoints_m)
+        self.follow = gui.add_checkbox("follow the body", True)
         self._checks_pose = header.backend == POSE_CHECK
         self.goals = gui.add_checkbox(
             "show goals",

@@ -67,12 +67,16 @@ class PersonGait:
 
 
 WALK: Final = PersonGait(
-    name="walk", cycle_s=1.08, height=0.022, length=0.228, duty=0.62, middle=-0.024, side=0.036,
-    bob=-0.011, lean=2.0, turn=6.0, drop=3.5, arm=(4.0, 19.0), elbow=(17.0, 9.0), spread=8.0,
-    pitch=((0.0, 18.0), (0.09, 0.0), (0.33, 0.0), (0.50, -22.0), (0.62, -52.0), (0.72, -45.0),
-           (0.86, 2.0), (0.94, 17.0)),
+    name="walk", cycle_s=1.08, height=0.022, length=0.228, duty=0.62, middle=-0.046, side=0.036,
+    bob=-0.0075, lean=2.0, turn=6.0, drop=3.5, arm=(4.0, 19.0), elbow=(17.0, 9.0), spread=8.0,
+    pitch=((0.0, 18.0), (0.09, 0.0), (0.34, 0.0), (0.41, -0.7), (0.50, -10.0), (0.62, -58.0),
+           (0.72, -46.0), (0.86, 2.0), (0.94, 17.0)),
 )  # fmt: skip
-"""A walk at 1.2 m/s. A foot is on the ground for 62 % of a cycle (Perry, Gait Analysis)."""
+"""A walk at 1.2 m/s. A foot is on the ground for 62 % of a cycle (Perry, Gait Analysis).
+
+Middle, rise and pitch are fitted to the knee angles of the same book: the leg stretches behind the
+hip until 50 % of a cycle, while the heel rises.
+"""
 RUN: Final = PersonGait(
     name="run", cycle_s=0.72, height=0.060, length=0.215, duty=0.35, middle=-0.050, side=0.022,
     bob=0.020, lean=9.0, turn=8.0, drop=3.0, arm=(12.0, 34.0), elbow=(108.0, 14.0), spread=14.0,

@@ -9,7 +9,14 @@ import numpy as np
 
 from snakewalk.config.arrays import Complexes, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.synthesis import Along, Curve, SynthesisConfig, along_body, curve_at
+from snakewalk.config.synthesis import (
+    Adaptation,
+    Along,
+    Curve,
+    SynthesisConfig,
+    along_body,
+    curve_at,
+)
 from snakewalk.controller.animals.synthesis.film_graph import FilmStates, film_angles
 from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, graph_motion
 from snakewalk.controller.animals.synthesis.synthesis import (
@@ -115,8 +122,15 @@ class SynthesisedWalk:
             "bend_k_rad": round(float(np.median(plan.angles_rad.std(axis=1))), 3),
             "steepest_deg": round(float(np.degrees(self.skeleton.steepest_rad)), 1),
             "tongue_learned_from": self.tongue_evidence,
+            "segments_stretched_most": round(self._stretch(length_m), 4),
             "ground_gap_most_m": round(float(np.abs(self.skeleton.gap_m).max()), 9),
         }
+
+    def _stretch(self, length_m: float) -> float:
+        """Return the largest stretch of a segment on the ground, as a share of its length."""
+        points = self.skeleton.points_m
+        segment_m = length_m / (points.shape[-2] - 1)
+        return float(np.linalg.norm(np.diff(points, axis=-2), axis=-1).max() / segment_m - 1.0)
 
     def save(self, file: Path, name: str, source: str) -> None:
         """Write a track that every command for recordings accepts, with additional arrays.
@@ -241,7 +255,7 @@ class SnakeSynthesis:
         half_m = half_heights_m(robot, POINTS)
         return SynthesisedWalk(
             plan,
-            self.ground_step.place(plan.angles_rad, plan.points_m[:, -1], self.segment_m, half_m),
+            self._on_ground(plan, half_m),
             half_m,
             how.rate_hz,
             self.path,
@@ -255,6 +269,12 @@ class SnakeSynthesis:
             self._tongue(made),
             f"{self.tongue.source} ({self.tongue.evidence})",
         )
+
+    def _on_ground(self, plan: Locomotion, half_m: Floats) -> GroundedSkeleton:
+        """[PT] 2.6.5: the plan's skeletons on the ground of the world."""
+        if self.how.ground is Adaptation.HEIGHT:
+            return self.ground_step.lift(plan.points_m, half_m)
+        return self.ground_step.place(plan.angles_rad, plan.points_m[:, -1], self.segment_m, half_m)
 
     def _on_star(
         self, most: int, targets: Targets, curves: "_Curves", until: Callable[[Floats], bool]

@@ -106,6 +106,14 @@ Steps = Annotated[
     Path | None, typer.Option(help="draw the first usable frame step by step (.png, .jpg)")
 ]
 
+Trail = Annotated[
+    Path | None,
+    typer.Option(
+        help="draw all places of the animal as one picture: each pixel's brightest, or darkest, "
+        "value over the film (.png, .jpg)"
+    ),
+]
+
 
 @command(
     "capture",
@@ -134,6 +142,7 @@ def capture(
     overlay: Overlay = None,
     sheet: Sheet = None,
     steps: Steps = None,
+    trail: Trail = None,
     review: Review = None,
     corrections: Corrections = None,
     animals: Animals = None,
@@ -158,6 +167,7 @@ def capture(
         overlay=overlay,
         sheet=sheet,
         steps=steps,
+        trail=trail,
         review=review,
         corrections=corrections,
         animals=animals,

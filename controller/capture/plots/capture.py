@@ -12,6 +12,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.video import in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -77,6 +78,39 @@ def contact_sheet(
     with atomic_write(path) as part:
         if not _written(part, sheet):
             raise InputError(f"{path}: a contact sheet is a .png or .jpg")
+
+
+def trail_picture(
+    path: Path, frames: Iterable[DeepImage], captured: Capture, polarity: Polarity
+) -> None:
+    """Draw all places of the animal as one picture ([PT] Fig. 4: maximum intensity over time).
+
+    Each pixel has its brightest value over the used frames, or its darkest for a dark animal. For
+    an animal with dark and light parts it is the extreme that is farther from the mean.
+    Skeletons of twelve frames are drawn on it.
+    """
+    high, low, total = None, None, np.zeros(())
+    for image, used in zip(frames, captured.used, strict=False):
+        if used:
+            plain = in_8_bits(image)
+            high = plain.copy() if high is None else np.maximum(high, plain)
+            low = plain.copy() if low is None else np.minimum(low, plain)
+            total = total + plain
+    if high is None or low is None:
+        raise InputError(f"{path}: no frame of the film is used; nothing to draw")
+    picture = low if polarity is Polarity.DARK else high
+    if polarity is Polarity.BOTH:
+        mean = total / captured.used.sum()
+        picture = np.where(high - mean >= mean - low, high, low)
+    canvas = picture if picture.ndim == 3 else cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
+    for number in np.unique(np.linspace(0, captured.used.sum() - 1, 12).astype(int)):
+        points = captured.points_px[np.flatnonzero(captured.used)[number]]
+        line = np.rint(points * 16.0).astype(np.int32)
+        cv2.polylines(canvas, [line], False, _BODY, 1, cv2.LINE_AA, 4)
+        cv2.circle(canvas, tuple(int(v) for v in line[0]), 3 * 16, _HEAD, -1, cv2.LINE_AA, 4)
+    with atomic_write(path) as part:
+        if not _written(part, np.asarray(canvas, dtype=np.uint8)):
+            raise InputError(f"{path}: a picture is a .png or .jpg")
 
 
 def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> Image:

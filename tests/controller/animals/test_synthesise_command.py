@@ -47,6 +47,16 @@ def traverse() -> SynthesisedWalk:
     return SnakeSynthesis(prepare_walk("jacksboro-traverse")).synthesise()
 
 
+def test_heights_alone_are_the_cheap_way_onto_the_ground(traverse: SynthesisedWalk) -> None:
+    keys = {"run.synthesis.ground": "height"}
+    flat = SnakeSynthesis(prepare_walk("jacksboro-traverse", keys=keys)).synthesise()
+    plan = flat.plan.points_m
+    np.testing.assert_array_equal(flat.skeleton.points_m[..., :2], plan)
+    assert len(plan) == len(traverse.plan.points_m)
+    assert float(str(traverse.facts()["segments_stretched_most"])) == 0.0
+    assert 0.005 < float(str(flat.facts()["segments_stretched_most"])) < 0.3
+
+
 def test_all_waypoints_are_reached_on_the_ground(traverse: SynthesisedWalk) -> None:
     facts = traverse.facts()
     assert facts["waypoints_reached"] == facts["waypoints"] == 4

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,8 +14,10 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.plots.capture import trail_picture
 from snakewalk.controller.capture.recording import examine
 from snakewalk.controller.capture.scale import scale_of_marker
+from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.video import open_footage
 from snakewalk.controller.track.analysis import analyse
 from snakewalk.controller.track.readers.arrays import save_track
@@ -36,6 +39,42 @@ def write_film(path: Path, frames: Iterable[np.ndarray]) -> Path:
 @pytest.fixture(scope="module")
 def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_film(tmp_path_factory.mktemp("films") / "swim.avi", film(SCENE))
+
+
+def test_a_trail_holds_the_darkest_value_of_each_pixel(swim: Path, tmp_path: Path) -> None:
+    trail = tmp_path / "trail.png"
+    done = snakewalk(
+        "capture", str(swim), "-o", str(tmp_path / "t.npz"), "--trail", str(trail), "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["animal"] == "dark"
+    frames = np.stack([np.asarray(one) for one in open_footage(swim).read()])
+    darkest = np.broadcast_to(frames.min(axis=0).reshape(160, 200, -1), (160, 200, 3))
+    drawn = cv2.imread(str(trail))
+    same = (drawn == darkest).all(axis=2)
+    assert 0.9 < same.mean() < 1.0  # skeletons cover the rest
+    shadow = np.median(drawn) - darkest.mean(axis=2) > 30.0
+    assert (shadow & same).sum() > 100  # and the animal is around them
+    done = snakewalk(
+        "capture", str(swim), "-o", str(tmp_path / "u.npz"), "--cropped", "--trail", str(trail)
+    )
+    assert done.returncode == 2
+    assert "--cropped and --trail" in done.stderr
+
+
+@pytest.mark.parametrize("polarity", list(Polarity))
+def test_a_trail_shows_dark_and_light_animals(polarity: Polarity, tmp_path: Path) -> None:
+    frames = np.full((5, 40, 60), 100, np.uint8)
+    for k in range(5):
+        frames[k, 5:9, 10 * k : 10 * k + 8] = 20
+        frames[k, 30:34, 10 * k : 10 * k + 8] = 220
+    used = np.ones(5, bool)
+    captured = SimpleNamespace(used=used, points_px=np.tile([[1.0, 20.0], [9.0, 20.0]], (5, 1, 1)))
+    trail_picture(tmp_path / "t.png", iter(frames), captured, polarity)  # type: ignore[arg-type]
+    drawn = cv2.imread(str(tmp_path / "t.png"))[..., 0]
+    dark, light = polarity is not Polarity.LIGHT, polarity is not Polarity.DARK
+    assert (drawn[6, 12:18] == (20 if dark else 100)).all()
+    assert (drawn[31, 12:18] == (220 if light else 100)).all()
 
 
 def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Path) -> None:

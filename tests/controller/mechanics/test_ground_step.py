@@ -80,6 +80,19 @@ def test_tail_first_and_head_first_give_the_same_body() -> None:
     np.testing.assert_allclose(head_first.points_m, tail_first.points_m, atol=1e-9)
 
 
+def test_heights_alone_keep_the_plane_and_stretch_the_segments() -> None:
+    arc = GroundStep(None).place(WAVE, (0.0, 0.0), R, 0.0)
+    placed = GroundStep(slope(0.4)).lift(arc.points_m[:, :2], TAPERED)
+    np.testing.assert_array_equal(placed.points_m[:, :2], arc.points_m[:, :2])
+    over = placed.points_m[:, 2] - slope(0.4).elevation_m(*arc.points_m[:, :2].T)
+    np.testing.assert_allclose(over, TAPERED, atol=1e-12)
+    straight = np.stack([np.linspace(0.5, -0.5, 21), np.zeros(21)], axis=-1)
+    up = GroundStep(slope(0.4)).lift(straight, 0.03)
+    np.testing.assert_allclose(up.pitch_rad, 0.4, atol=1e-9)
+    stretched = np.linalg.norm(np.diff(up.points_m, axis=0), axis=1)
+    np.testing.assert_allclose(stretched, 0.05 / np.cos(0.4), rtol=1e-9)
+
+
 def test_all_frames_at_once_are_the_frames_one_by_one() -> None:
     ground = GroundStep(rough(7, 0.05))
     angles = WAVE + np.linspace(0, 6, 12)[:, None]

@@ -180,10 +180,26 @@ def test_the_command_refuses_in_a_line(
 def test_the_first_camera_frames_the_body(page: LogPage, record: RunRecord) -> None:
     page.step(0.05, 0.0)
     camera, length_m = page.server.initial_camera, record.header.robot.length_m
-    centre_m = record.pose.centre_m[0]
+    centre_m = record.pose.centre_m[0] * [0.0, 0.0, 1.0]  # the page follows the body
     assert np.linalg.norm(np.array(camera.look_at) - centre_m) < 0.3 * length_m
     assert np.linalg.norm(np.array(camera.position) - centre_m) < 1.2 * length_m
     assert camera.position[2] > centre_m[2] + 0.3 * length_m
+
+
+def test_the_body_of_a_run_with_waypoints_stays_in_the_picture(
+    page: LogPage, record: RunRecord
+) -> None:
+    assert record.header.run.waypoints_m
+    page.step(0.05, 0.0)
+    shown = page._shown[0]
+    shown.draw(float(record.cycle.time_s[-1]), curves=False)
+    links_m = np.asarray(shown.scene._body.batched_positions)
+    centre_m = links_m.mean(axis=0) + shown.scene._frame.position
+    assert np.hypot(*links_m.mean(axis=0)[:2]) > 0.2 * record.header.robot.length_m
+    assert np.hypot(*centre_m[:2]) < 0.1 * record.header.robot.length_m
+    shown.board.follow.value = False
+    shown.draw(float(record.cycle.time_s[-1]), curves=False)
+    np.testing.assert_array_equal(shown.scene._frame.position, 0.0)
 
 
 def test_contours_lie_on_the_ground_at_round_heights() -> None:

@@ -117,6 +117,30 @@ def test_legs_keep_their_lengths_and_reach_the_feet(
     )
 
 
+KNEE_OF_A_WALK = ((0.0, 5.0), (0.12, 17.0), (0.25, 11.0), (0.40, 5.0), (0.50, 11.0))
+"""Share of a cycle and flexion in degrees (Perry, Gait Analysis: knee, free walking), in stance."""
+
+
+def test_the_knees_of_a_walk_bend_as_published(person: Person) -> None:
+    made = animate(person.skeleton, GAITS["walk"], frames=100)
+    for side, first in (("left", 0), ("right", 1)):
+        hip, knee, ankle = (
+            made.bones.front_m[:-1, INDEX[f"{side} {part}"]] for part in ("thigh", "shank", "foot")
+        )
+        thigh, shank = (
+            each / np.linalg.norm(each, axis=1)[:, None] for each in (knee - hip, ankle - knee)
+        )
+        bend = np.degrees(np.arccos((thigh * shank).sum(axis=1)))
+        at = made.feet.at[:-1, first]
+        order = np.argsort(at)
+        for share, published in KNEE_OF_A_WALK:
+            assert np.interp(share, at[order], bend[order]) == pytest.approx(published, abs=7.0)
+        assert 50.0 < bend.max() < 65.0  # in the air; published: 60
+        # the trailing leg is behind the hip before the other foot comes down
+        before = np.argmin(np.abs(at - 0.48))
+        assert np.degrees(np.arctan2(thigh[before, 0], -thigh[before, 2])) < -10.0
+
+
 @pytest.mark.parametrize("gait", list(GAITS))
 def test_the_sole_stays_above_the_ground(gait: str, person: Person) -> None:
     made = animate(person.skeleton, GAITS[gait])
