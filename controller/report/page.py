@@ -146,7 +146,8 @@ def _headline(n: RunSummary) -> str:
 
 def _believed_headline(n: RunSummary, where: str, missed: str) -> str:
     """Return the sentence of a run whose pose was dead-reckoned."""
-    travelled = f"{_fmt(n.dead_reckoned_travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s"
+    travelled = f"{_fmt(n.dead_reckoned_travelled_m, 1)} m by dead reckoning in "
+    travelled += f"{_fmt(n.duration_s, 1)} s"
     unknown = "Nothing measured the pose: distances and arrivals are dead-reckoned."
     if n.waypoints == 0:
         moved = f"{n.robot} moved by {n.motion} {where} and believes it went"
