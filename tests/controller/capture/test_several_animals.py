@@ -169,6 +169,12 @@ def test_tables_of_all_animals_are_read_back_identically(
                 np.testing.assert_array_equal(again.points, expected.points)
                 assert again.length_m == expected.length_m
             np.testing.assert_allclose(again.points, expected.points, rtol=1e-14)
+            assert again.status == expected.status
+            assert FrameStatus.GOOD in again.status
+            assert again.head_sure == expected.head_sure is not None
+            assert again.name == expected.name
+            if name.endswith(".wcon"):
+                assert again.source == expected.source != "not stated"
 
 
 def test_two_animals_in_a_film_of_one_are_rejected() -> None:
