@@ -30,7 +30,7 @@ class Detections:
     skeletons: list[Skeleton] = field(default_factory=list)
     area_px: list[float] = field(default_factory=list)
     contrast: list[float] = field(default_factory=list)
-    """Half of the contrast of what stands out most, grey levels; 0 where it is not searched."""
+    """Half of the contrast of the clearest region, grey levels; 0 if the frame is skipped."""
     distractors: list[float] = field(default_factory=list)
     expected_px: list[float] = field(default_factory=list)
     """Error of long bodies, whose medial axis is kept; NaN for all others."""

@@ -31,7 +31,7 @@ def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton
 
     Args:
         skeletons: (T)
-        contrast: (T,) of what stands out most.
+        contrast: (T,) of the clearest region in each frame.
 
     """
     good = [k for k, one in enumerate(skeletons) if one.status is FrameStatus.GOOD]
