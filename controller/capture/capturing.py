@@ -245,7 +245,7 @@ def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
     """Reject a film in which a few rough frames are all that is found of an unclear outline."""
     used, good = int(captured.used.sum()), int(captured.good.sum())
     unclear = [one for one in captured.status if one in _UNCLEAR]
-    if used < _FEW_ROUGH * (used + len(unclear)) and good < 0.5 * used:
+    if used < _FEW_ROUGH * (used + len(unclear)) and good <= 0.5 * used:
         reason = max(dict.fromkeys(unclear), key=unclear.count)
         raise InputError(
             f"{options.recording}: only {used} of {len(captured.status)} frames show a whole body, "
