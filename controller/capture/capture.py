@@ -14,7 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.coil_film import COIL_LEAST, solve_coils
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
-from snakewalk.controller.capture.outlier_frames import mark_outliers
+from snakewalk.controller.capture.outlier_frames import mark_empty, mark_outliers
 from snakewalk.controller.capture.small_body.film_fit import (
     fit_film,
     with_least_errors,
@@ -154,7 +154,8 @@ def captured_from(
 
     A ``part`` of a film may be without motion or without any body.
     """
-    checked = mark_outliers(align_ends(found.skeletons).skeletons, np.array(found.area_px))
+    seen = mark_empty(found.skeletons, np.array(found.contrast))
+    checked = mark_outliers(align_ends(seen).skeletons, np.array(found.area_px))
     if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
         if part:
             return _without_body(found, checked, rate_hz, fixed=fixed)

@@ -45,6 +45,13 @@ from snakewalk.controller.track.track import UNSURE_HEAD
 _MANY = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
 _EXPLAINED = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED, FrameStatus.LEFT_OUT}
 _TOO_FEW = 1.0 / 3.0  # of the frames that show the animal: fewer are used if its outline is unseen
+_UNCLEAR = REJECTED | {
+    FrameStatus.SEVERAL,
+    FrameStatus.BLOB,
+    FrameStatus.PART,
+    FrameStatus.GHOST,
+}  # in most frames: the outline of the animal is not seen
+_FEW_ROUGH = 0.25  # of the frames in which it should be seen: rough frames are then chance finds
 _INACCURATE = 0.015  # of the length: a larger expected error needs a look
 
 
@@ -230,7 +237,21 @@ def _captured_clearly(
     few = captured.used.sum() < _TOO_FEW * len(_shown(captured))
     if few and stands_out_both_ways(film.some):
         raise fault
+    check_chance_finds(options, captured)
     return captured
+
+
+def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
+    """Reject a film in which a few rough frames are all that is found of an unclear outline."""
+    used, good = int(captured.used.sum()), int(captured.good.sum())
+    unclear = [one for one in captured.status if one in _UNCLEAR]
+    if used < _FEW_ROUGH * (used + len(unclear)) and good <= 0.5 * used:
+        reason = max(dict.fromkeys(unclear), key=unclear.count)
+        raise InputError(
+            f"{options.recording}: only {used} of {len(captured.status)} frames show a whole body, "
+            f"and these are rough; mostly: {reason}; use other light, or give --background, --roi "
+            "or --threshold"
+        )
 
 
 def _shown(captured: Capture) -> list[FrameStatus]:

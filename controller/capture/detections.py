@@ -29,6 +29,8 @@ class Detections:
 
     skeletons: list[Skeleton] = field(default_factory=list)
     area_px: list[float] = field(default_factory=list)
+    contrast: list[float] = field(default_factory=list)
+    """Half of the contrast of the clearest region, grey levels; 0 if the frame is skipped."""
     distractors: list[float] = field(default_factory=list)
     expected_px: list[float] = field(default_factory=list)
     """Error of long bodies, whose medial axis is kept; NaN for all others."""
@@ -57,6 +59,7 @@ class Detections:
         body, silhouette = detection.skeleton, detection.silhouette
         self.skeletons.append(body)
         self.area_px.append(silhouette.area_px)
+        self.contrast.append(silhouette.threshold)
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
         ends_px = NO_ENDS
@@ -98,6 +101,7 @@ class Detections:
         """Add a frame in which the animal is not searched for."""
         self.skeletons.append(no_skeleton(status))
         self.area_px.append(0.0)
+        self.contrast.append(0.0)
         self.distractors.append(0.0)
         self.expected_px.append(np.nan)
         self.axis_error_px.append(np.nan)

@@ -20,7 +20,27 @@ _THICK = 0.3
 _LEAST_PX = 0.3
 _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
+_FAINT = 0.25  # of the usual contrast: compression and noise of an empty frame, not an animal
 _FEWEST = 5  # frames from which outliers can be found
+
+
+def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton]:
+    """Give frames whose regions are far fainter than the film's animal the status ``NOTHING``.
+
+    Blocks of a compressed frame without an animal would otherwise be several animals.
+
+    Args:
+        skeletons: (T)
+        contrast: (T,) of the clearest region in each frame.
+
+    """
+    good = [k for k, one in enumerate(skeletons) if one.status is FrameStatus.GOOD]
+    least = _FAINT * float(np.median(contrast[good])) if len(good) >= _FEWEST else 0.0
+    several = {FrameStatus.SEVERAL, FrameStatus.BLOB}
+    return [
+        no_skeleton(FrameStatus.NOTHING) if one.status in several and level < least else one
+        for one, level in zip(skeletons, contrast.tolist(), strict=True)
+    ]
 
 
 def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:

@@ -1,5 +1,6 @@
 """Whether the body of a frame is usable, and why not."""
 
+from collections.abc import Sequence
 from enum import StrEnum
 
 
@@ -41,3 +42,9 @@ class FrameStatus(StrEnum):
             FrameStatus.BY_HAND,
             FrameStatus.COIL,
         }
+
+
+def statuses_named(words: Sequence[str]) -> list[FrameStatus]:
+    """Statuses by their names in lower case; an empty list if one is unknown."""
+    known = {one.name.lower(): one for one in FrameStatus}
+    return [known[word] for word in words] if known.keys() >= set(words) else []

@@ -104,7 +104,7 @@ def _show(facts: dict[str, Any]) -> None:
     low, high = facts["pulse_quartiles_body_lengths_s"]
     direction = "towards the tail" if facts["wave_towards_tail"] else "towards the head"
     no_wave, no_pulse, no_travel = (
-        facts[f"{what}_not_told"] and f"not told: {facts[f'{what}_not_told']}"
+        facts[f"{what}_not_told"] and f"not stated: {facts[f'{what}_not_told']}"
         for what in ("wave", "pulse", "travel")
     )
     rows = {

@@ -126,7 +126,7 @@ def _show(facts: "RecordingFacts") -> None:
         f"{facts.wave_share:.0%} of the bending; towards the head "
         f"{facts.time_towards_head:.0%} of the time"
         if facts.time_towards_head is not None
-        else f"not told: {facts.wave_not_told}",
+        else f"not stated: {facts.wave_not_told}",
         "bend K": f"{facts.bend_k_rad} rad, at most {facts.bend_k_most_rad}",
         "in 7 coefficients": f"{facts.energy_kept:.2%} of the energy",
         "states": f"{facts.states_kept} of {facts.frames} usable by {facts.robot}"

@@ -16,6 +16,8 @@ from snakewalk.controller.images.silhouette import body_threshold, connected_par
 SMALLEST = 0.3
 """Area of a blob over the usual area of an animal; smaller ones are dirt."""
 _AS_LARGE = 0.97  # of the largest area of all animals: a background shows all of them
+_SURFACE = "a smooth surface through each frame"
+_WHOLE = 1.25  # times the area against a fixed background: it contains parts of the animals
 FEATURES = ("length", "width", "contrast")
 """Columns of ``Blobs.shape``."""
 
@@ -117,6 +119,8 @@ def detector_of_several(
 
     The median over frames shows animals where they rest or come back. A lighter or darker quantile
     of each pixel is used if animals are larger against it, or nearer to the number ``wanted``.
+    All of them contain animals that hardly move. A surface fitted to each frame is used if it
+    shows the same moving animals clearly larger, and more alike in size.
 
     Args:
         frames: (H, W[, C]), spread over the film.
@@ -148,7 +152,38 @@ def detector_of_several(
     nearest = min(away for _, away, _ in tried)
     tried = [one for one in tried if one[1] == nearest]
     largest = max(area for _, _, area in tried)
-    return next(detector for detector, _, area in tried if area >= _AS_LARGE * largest)
+    fixed = next(detector for detector, _, area in tried if area >= _AS_LARGE * largest)
+    surface = BodyDetector(None, polarity, _SURFACE, 0, inside, threshold)
+    return surface if _shows_more(surface, fixed, frames) else fixed
+
+
+def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[DeepImage]) -> bool:
+    """Whether a fixed background hides parts of animals that a surface shows whole."""
+    whole, parts = (
+        [blobs_of(one, detector.ground_of(one), detector) for one in frames]
+        for detector in (surface, fixed)
+    )
+    least = SMALLEST * usual_area(whole)
+    moving = []
+    for one, changed in zip(whole, parts, strict=True):
+        seen = np.unique(one.label[changed.label > 0])
+        areas = one.area_px[seen[seen > 0] - 1]
+        moving.append(areas[areas >= least])
+    if sum(one.sum() for one in moving) < _WHOLE * sum(one.area_px.sum() for one in parts):
+        return False
+    count, _ = count_of(parts)
+    counts = [len(one) for one in moving]
+    least = SMALLEST * usual_area(parts)
+    pieces = np.concatenate([one.area_px[one.area_px >= least] for one in parts])
+    steadier = np.std(counts) < np.std([int((one.area_px >= least).sum()) for one in parts])
+    more_alike = _unlike(np.concatenate(moving)) < _unlike(pieces)
+    return bool(steadier and more_alike and np.median(counts) >= 0.5 * count)
+
+
+def _unlike(areas: Floats) -> float:
+    """Median difference of areas from their median, over the median."""
+    usual = float(np.median(areas))
+    return float(np.median(np.abs(areas - usual))) / usual
 
 
 def own_window(blobs: Blobs, number: int, around_px: int) -> tuple[slice, slice]:

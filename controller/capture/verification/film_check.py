@@ -1,5 +1,6 @@
 """A film's skeletons checked against the pixels of their own frames."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -155,8 +156,10 @@ def _usual(profiles: Sequence[BodyProfile]) -> _Usual | None:
     strong = mean[np.argsort(np.linalg.norm(mean, axis=1))[len(mean) // 2 :]]
     direction = np.median(strong, axis=0)
     direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
-    along = np.array([np.nanmean(one.sides, axis=0) @ direction for one in profiles])
-    level = np.nanmean(along, axis=1)
+    with warnings.catch_warnings():  # a point may have no ground on either side
+        warnings.simplefilter("ignore", RuntimeWarning)
+        along = np.array([np.nanmean(one.sides, axis=0) @ direction for one in profiles])
+        level = np.nanmean(along, axis=1)
     best = along[level >= np.nanpercentile(level, _USUAL) * 0.5]
     if not len(best):
         return None

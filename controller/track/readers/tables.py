@@ -1,12 +1,14 @@
 """Recordings as tables: midlines point by point, keypoints frame by frame."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
@@ -45,12 +47,15 @@ def load_csv(
         if {"t", "frame", "point", *pair} <= column.keys():
             rows = _of_animal(file, rows, column, choice)
             columns = [column[name] for name in ("t", "frame", "point", *pair)]
-            return _midline(file, _numbers(file, rows, columns), scale_m, rate_hz)
+            table = _numbers(file, rows, columns)
+            track = _midline(file, table, scale_m, rate_hz, _status_of(rows, column))
+            return _about(file, track, rows, column)
     for name, scale_m in _WIDE.items():
         if {"t", "frame", f"{name}_1", f"{name}_4"} <= column.keys():
             rows = _of_animal(file, rows, column, choice)
             table = _long(file, rows, column, name.removeprefix("x_"))
-            return _midline(file, table, scale_m, rate_hz)
+            track = _midline(file, table, scale_m, rate_hz, _status_of(rows, column))
+            return _about(file, track, rows, column)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, rate_hz, least_score, choice)
@@ -74,6 +79,27 @@ def _of_animal(
     listed = list(dict.fromkeys(names))
     mine = choice.animal(file, listed, listed)
     return [rows[0], *(row for row, name in zip(rows[1:], names, strict=True) if name == mine)]
+
+
+def _status_of(rows: list[list[str]], column: dict[str, int]) -> dict[float, FrameStatus]:
+    """Status of each frame by its number; empty if the table does not state it."""
+    if "status" not in column:
+        return {}
+    frame, at = column["frame"], column["status"]
+    words = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+    numbers = [float(row[frame]) for row in rows[1:]]
+    found = statuses_named(words)
+    return dict(zip(numbers, found, strict=True)) if found else {}
+
+
+def _about(file: Path, track: Track, rows: list[list[str]], column: dict[str, int]) -> Track:
+    """The track with the animal's name and with the certainty of its head, where stated."""
+    if "head_sure" in column:
+        sure = float(_numbers(file, rows[:2], [column["head_sure"]])[0, 0])
+        track = replace(track, head_sure=sure if np.isfinite(sure) else None)
+    if "animal" in column:
+        track = replace(track, name=rows[1][column["animal"]].strip())
+    return track
 
 
 def _long(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) -> Floats:
@@ -106,7 +132,13 @@ def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     return table
 
 
-def _midline(file: Path, table: Floats, scale_m: float | None, rate_hz: float | None) -> Track:
+def _midline(
+    file: Path,
+    table: Floats,
+    scale_m: float | None,
+    rate_hz: float | None,
+    status: dict[float, FrameStatus],
+) -> Track:
     """Track from rows of t (s), frame, point (1 is the head), x, y."""
     if not np.isfinite(table[:, :3]).all():
         lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())
@@ -143,6 +175,7 @@ def _midline(file: Path, table: Floats, scale_m: float | None, rate_hz: float | 
         scale_m=scale_m,
         frame=frame_numbers(str(file), frames),
         time_s=time_s,
+        status=[status[one] for one in frames.tolist()] if status else (),
     )
 
 

@@ -17,9 +17,13 @@ import numpy as np
 from snakewalk.config.archive import DAMAGE, check_members, parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.track.frame_status import statuses_named
 from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.resample import equal_arc_length
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
+
+_OWN = "@snakewalk"
+"""Key of a record with facts for which WCON has no name."""
 
 
 def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
@@ -51,9 +55,11 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         mine = choice.animal(file, animals, animals)
         records = [r for r in records if not isinstance(r, dict) or str(r.get("id")) == mine]
     bodies: list[tuple[float, Floats]] = []
+    words: list[tuple[float, str]] = []
     for number, record in enumerate(records):
         try:
             bodies += _bodies(record, metres)
+            words += _words(record)
         except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
             raise InputError(
                 f"{file}: data[{number}]: expected id, t, x and y, as many lists x and y as times: "
@@ -79,11 +85,38 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         scale_m=None if metres["x"] is None else 1.0,
         frame=frame,
         time_s=time if rate_hz is None else None,
+        status=statuses_named([word for _, word in sorted(words)])
+        if len(words) == len(time)
+        else (),
     )
-    about = held.get("metadata")
-    if isinstance(about, dict) and about.get("places_recorded") is False:
-        return replace(track, places_recorded=False)
+    return _about(track, held.get("metadata"), records)
+
+
+def _about(track: Track, about: Any, records: list[Any]) -> Track:
+    """The track with the facts that snakewalk writes into a WCON."""
+    if isinstance(about, dict):
+        stated = [about.get(name) for name in ("source", "licence")]
+        source, licence = (one if isinstance(one, str) else "not stated" for one in stated)
+        recorded = about.get("places_recorded") is not False
+        track = replace(track, source=source, licence=licence, places_recorded=recorded)
+    own = [one for one in records if isinstance(one.get(_OWN), dict)]
+    if len(own) == len(records):
+        sure = [one[_OWN].get("head_sure") for one in own]
+        numbers = [float(one) for one in sure if isinstance(one, (int, float))]
+        source = own[0][_OWN].get("source", track.source)
+        track = replace(track, name=str(own[0].get("id")), source=str(source))
+        return replace(track, head_sure=min(numbers, default=None))
     return track
+
+
+def _words(record: dict[str, Any]) -> list[tuple[float, str]]:
+    """Times and names of the statuses of a record; empty where they are not stated."""
+    own = record.get(_OWN)
+    words = own.get("status") if isinstance(own, dict) else None
+    times = record["t"] if isinstance(record["t"], list) else [record["t"]]
+    if not isinstance(words, list) or len(words) != len(times):
+        return []
+    return [(float(at), str(word)) for at, word in zip(times, words, strict=True)]
 
 
 def zipped_text(file: Path) -> str | None:

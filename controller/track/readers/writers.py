@@ -66,6 +66,7 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
 
     Columns are ``x_m, y_m``; without a scale ``x_lengths`` or ``x_px``. Wide rows have ``x_m_1,
     y_m_1, x_m_2`` and so on. Several animals add a column ``animal``. Missing frames have no rows.
+    The last columns are ``status``, a word of ``FrameStatus``, and ``head_sure``, where known.
     """
     if not all(one.places_recorded for one in tracks):
         raise InputError(
@@ -79,23 +80,32 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
         heads += [f"{axis}_{unit}_{point + 1}" for point in range(count) for axis in "xy"]
     else:
         heads += ["point", f"x_{unit}", f"y_{unit}"]
+    has_status = any(one.status for one in tracks)
+    has_sure = any(one.head_sure is not None for one in tracks)
+    heads += [*(["status"] if has_status else []), *(["head_sure"] if has_sure else [])]
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(heads)
         for track in tracks:
             number = np.rint(track.time_s * track.rate_hz).astype(int).tolist()
-            for frame, body in zip(number, track.points.tolist(), strict=True):
+            words = [one.name.lower() for one in track.status] or [""] * len(number)
+            sure = ["" if track.head_sure is None else track.head_sure] if has_sure else []
+            for frame, body, word in zip(number, track.points.tolist(), words, strict=True):
                 first = [frame / track.rate_hz, frame, *([track.name] if several else [])]
+                last = [*([word] if has_status else []), *sure]
                 if wide:
-                    writer.writerow([*first, *(value for place in body for value in place)])
+                    writer.writerow([*first, *(value for place in body for value in place), *last])
                     continue
                 writer.writerows(
-                    [*first, point, *place] for point, place in enumerate(body, start=1)
+                    [*first, point, *place, *last] for point, place in enumerate(body, start=1)
                 )
 
 
 def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
-    """Write a WCON; bodies without a scale have unit 1."""
+    """Write a WCON; bodies without a scale have unit 1.
+
+    ``@snakewalk`` of a record states the status of each frame, ``head_sure`` and its source.
+    """
     first = tracks[0]
     about = {
         "software": {"name": "snakewalk"},
@@ -119,6 +129,11 @@ def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
                 "x": one.points[..., 0].tolist(),
                 "y": one.points[..., 1].tolist(),
                 "head": "L",
+                "@snakewalk": {
+                    "status": [status.name.lower() for status in one.status],
+                    "head_sure": one.head_sure,
+                    "source": one.source,
+                },
             }
             for one in tracks
         ],

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -46,6 +47,18 @@ def test_an_animal_that_is_mostly_absent_is_found_where_it_is(kind: str) -> None
         found = seen.points_px[k]
         line = found[::-1] if swapped(found, truth[k]) else found
         assert point_error(line, truth[k]) < 2.0 * seen.expected_px[k]
+
+
+def test_compressed_frames_without_an_animal_show_nothing() -> None:
+    scene, present = FILMS["dark"]
+    frames, _ = visited(scene, present)
+    packed = [cv2.imencode(".jpg", one, [cv2.IMWRITE_JPEG_QUALITY, 20])[1] for one in frames]
+    images = [np.asarray(cv2.imdecode(one, cv2.IMREAD_GRAYSCALE)) for one in packed]
+    detector = make_detector(images[::2])
+    assert detector.detect(images[0]).skeleton.status is FrameStatus.SEVERAL
+    seen = capture(images, detector, scene.rate_hz)
+    for k, status in enumerate(seen.status):
+        assert (status is FrameStatus.GOOD) if k in present else (status is FrameStatus.NOTHING)
 
 
 def test_a_shape_that_only_the_background_shows_is_a_ghost() -> None:

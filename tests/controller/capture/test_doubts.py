@@ -11,7 +11,11 @@ from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture, UnusableFilmError, capture
-from snakewalk.controller.capture.capturing import capture_recording, warning_of
+from snakewalk.controller.capture.capturing import (
+    capture_recording,
+    check_chance_finds,
+    warning_of,
+)
 from snakewalk.controller.capture.coil_film import CoilFilm
 from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
@@ -132,6 +136,29 @@ def test_an_animal_as_bright_as_its_ground_is_rejected_with_that_reason(tmp_path
     with pytest.raises(InputError, match="the animal is about as bright as its ground"):
         capture_recording(CaptureOptions(folder, tmp_path / "track.npz", rate_hz=4.0))
     assert not (tmp_path / "track.npz").exists()
+
+
+CHANCE: dict[str, tuple[list[FrameStatus], int, bool]] = {
+    "few rough ones": ([FrameStatus.ROUGH], 3, True),
+    "few good ones": ([FrameStatus.GOOD], 3, False),
+    "many rough ones": ([FrameStatus.ROUGH], 8, False),
+}
+
+
+@pytest.mark.parametrize("kind", CHANCE)
+def test_a_few_rough_frames_of_an_unclear_outline_are_no_result(kind: str, tmp_path: Path) -> None:
+    used, count, rejected = CHANCE[kind]
+    status = (*used * count, *[FrameStatus.SEVERAL] * (14 - count), *[FrameStatus.NOTHING] * 9)
+    scene = replace(SCENE, frames=8, rate_hz=3.0)
+    seen = capture(film(scene), BodyDetector(empty(scene), Polarity.DARK, "given"), 3.0)
+    length = np.where([one.has_points for one in status], 100.0, np.nan)
+    altered = replace(seen, status=status, length_px=length)
+    options = CaptureOptions(tmp_path / "film.avi", tmp_path / "track.npz")
+    if not rejected:
+        check_chance_finds(options, altered)
+        return
+    with pytest.raises(InputError, match="only 3 of 23 frames show a whole body"):
+        check_chance_finds(options, altered)
 
 
 def test_a_hidden_light_band_at_the_tail_is_part_of_the_expected_error() -> None:

@@ -16,6 +16,7 @@ from snakewalk.controller.capture.capture import capture, load_capture, save_cap
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
+from snakewalk.controller.capture.several.blobs import detector_of_several
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
 from snakewalk.controller.capture.several.tracklets import Tracklet
@@ -30,6 +31,7 @@ PAIR = CrossingScene(
     animals=2, rows=420, columns=420, length_px=130.0, frames=24, rate_hz=10.0, speed=1.0,
     sizes=0.05, seed=25,
 )  # fmt: skip
+PLATE = CrossingScene(length_px=50.0, sizes=0.1, greys=10.0)
 
 
 @pytest.mark.parametrize("seed", [500, 503])
@@ -40,6 +42,27 @@ def test_identities_are_kept_through_crossings(seed: int) -> None:
     assert count.found == 3
     assert count.kept == count.bridged > 0
     assert count.swapped_silently == 0
+
+
+def test_animals_that_hardly_move_are_not_part_of_the_background() -> None:
+    """In 24 frames each worm crawls 0.7 of its length: most of its pixels stay covered."""
+    scene = replace(PLATE, animals=10, rows=420, columns=520, roam=0.38, frames=24, seed=3101)
+    midlines = crossing_midlines(scene)
+    images = list(crossing_film(scene, midlines))
+    detector = detector_of_several(images)
+    assert detector.background is None
+    count = compare(identities_in(images), midlines, scene.length_px)
+    assert count.found >= 9
+    assert count.short <= 1
+
+
+def test_stains_do_not_replace_a_background_that_shows_the_animals() -> None:
+    scene = replace(PLATE, animals=4, rows=300, columns=300, frames=90, seed=3102)
+    images = list(crossing_film(scene, crossing_midlines(scene)))
+    for image in images:
+        for k in range(6):
+            cv2.circle(image, (30 + 45 * k, 20 + 40 * (k % 2)), 9, 60, -1)
+    assert detector_of_several(images[::4]).background is not None
 
 
 def _alone(
@@ -146,6 +169,12 @@ def test_tables_of_all_animals_are_read_back_identically(
                 np.testing.assert_array_equal(again.points, expected.points)
                 assert again.length_m == expected.length_m
             np.testing.assert_allclose(again.points, expected.points, rtol=1e-14)
+            assert again.status == expected.status
+            assert FrameStatus.GOOD in again.status
+            assert again.head_sure == expected.head_sure is not None
+            assert again.name == expected.name
+            if name.endswith(".wcon"):
+                assert again.source == expected.source != "not stated"
 
 
 def test_two_animals_in_a_film_of_one_are_rejected() -> None:

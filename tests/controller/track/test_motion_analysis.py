@@ -226,7 +226,7 @@ def test_what_is_not_told_is_no_number_anywhere(tmp_path: Path) -> None:
         assert few[key] is None
     assert (tmp_path / "coarse.png").read_bytes().startswith(b"\x89PNG")
     for command in ("analyse", "track"):
-        assert "not told: 3.2 frames" in " ".join(snakewalk(command, files[0]).stdout.split())
+        assert "not stated: 3.2 frames" in " ".join(snakewalk(command, files[0]).stdout.split())
 
 
 def test_nothing_to_analyse_is_one_line() -> None:
