@@ -314,10 +314,13 @@ def test_on_servos_it_is_the_same(
 def clicked(
     panel: WaypointPanel, word: str, at_m: tuple[float, float], modifier: str | None = None
 ) -> None:
-    """Click on a place of the floor, from above and beside it, after a button was pressed."""
+    """Click on a place of the floor, from above and beside it, after a button was pressed.
+
+    The page's scene is moved below the camera while it follows the body.
+    """
     if word:
         panel._arming(word)(None)
-    origin_m = np.add([*at_m, 0.0], [-1.0, -2.0, 3.0])
+    origin_m = np.add([*at_m, 0.0], [-1.0, -2.0, 3.0]) + panel._scene._frame.position
     panel._clicked(
         SimpleNamespace(ray_origin=origin_m, ray_direction=(1.0, 2.0, -3.0), modifier=modifier)  # type: ignore[arg-type]
     )
