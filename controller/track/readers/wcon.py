@@ -93,7 +93,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
 
 
 def _about(track: Track, about: Any, records: list[Any]) -> Track:
-    """The track with the facts that snakewalk writes into a WCON."""
+    """The track with the facts that a WCON of this program states."""
     if isinstance(about, dict):
         stated = [about.get(name) for name in ("source", "licence")]
         source, licence = (one if isinstance(one, str) else "not stated" for one in stated)
