@@ -234,7 +234,7 @@ class ServoModel(Strict):
             raise ValueError(f"registers: {', '.join(missing)} missing")
         if len(set(self.bauds)) != len(self.bauds) or any(baud <= 0 for baud in self.bauds):
             raise ValueError("bauds: positive rates, each once")
-        known = FEETECH_MODES if self.protocol == "feetech" else MODES
+        known = FEETECH_MODES if self.is_feetech else MODES
         unknown = [mode for mode in self.modes if mode not in known]
         if unknown:
             shown = ", ".join(map(str, known))
@@ -253,8 +253,7 @@ class ServoModel(Strict):
 
     def missing_for_a_run(self) -> list[str]:
         """Names of the registers and keys that a run needs and the model lacks."""
-        is_feetech = self.protocol == "feetech"
-        missing = [] if is_feetech else self._missing(_FOR_A_RUN)
+        missing = [] if self.is_feetech else self._missing(_FOR_A_RUN)
         if not {"Present Current", "Present Load"} & set(self.registers):
             missing.append("Present Current or Present Load")
         if "Present Current" in self.registers and self.units.current_a is None:
@@ -263,13 +262,18 @@ class ServoModel(Strict):
             missing.append("units.full_pwm")
         if not self.bauds:
             missing.append("bauds")
-        position_mode = 0 if is_feetech else 3
+        position_mode = 0 if self.is_feetech else 3
         if position_mode not in self.modes:
             missing.append(f"modes with {position_mode}")
         return missing
 
     def _missing(self, names: Sequence[str]) -> list[str]:
         return [name for name in names if name not in self.registers]
+
+    @property
+    def is_feetech(self) -> bool:
+        """Whether the servo speaks Feetech's protocol."""
+        return self.protocol == "feetech"
 
     @property
     def measures_current(self) -> bool:
@@ -321,6 +325,6 @@ def wire_format(facts: ServoModel) -> tuple[int | str, str, bool]:
 
 def protocol_name(facts: ServoModel) -> str:
     """Protocol of a model in words."""
-    if facts.protocol == "feetech":
+    if facts.is_feetech:
         return "Feetech's protocol"
     return f"Protocol {facts.protocol}.0"

@@ -47,7 +47,7 @@ class JointValues(LinkValues):
     @property
     def is_feetech(self) -> bool:
         """Whether all servos speak Feetech's protocol."""
-        return all(each.protocol == "feetech" for each in self.records_by_model.values())
+        return all(each.is_feetech for each in self.records_by_model.values())
 
     @property
     def is_mixed(self) -> bool:

@@ -98,7 +98,7 @@ def examine(
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    measured = _FEETECH_MEASURED if _is_feetech(bus) else _MEASURED
+    measured = _FEETECH_MEASURED if bus.table.facts.is_feetech else _MEASURED
     reads = [bus.probe(i, measured) for i in found]
     noise = line_checks.noise(pings, reads, overheard)
     alone = [] if noise is not None else servos.unshared(found, (*pings, *reads))
@@ -139,7 +139,7 @@ def _find(
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
     for servo_id in [*pinged, *expected][:_TIMED]:
-        if _is_feetech(bus):
+        if bus.table.facts.is_feetech:
             timed = bus.probe(servo_id)
         else:
             timed = probe(port, servo_id, _TIMED, patience_s)
@@ -150,10 +150,6 @@ def _find(
         if late_s:
             break
     return bus, pinged
-
-
-def _is_feetech(bus: DynamixelBus) -> bool:
-    return bus.table.facts.protocol == "feetech"
 
 
 def _presence(
@@ -176,7 +172,7 @@ def _presence(
     baud = port.getBaudRate()
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
-    feetech = _is_feetech(bus)
+    feetech = bus.table.facts.is_feetech
     foreign = foreign_replies(port, silent, bus.latency_s, feetech=feetech)
     findings += foreign.findings(bus.table.facts.model)
     findings += servos.presence(
@@ -220,7 +216,7 @@ def _servo_findings(
     noise: Finding | None,
 ) -> list[Finding]:
     return [
-        *([] if _is_feetech(bus) else [servos.firmware(reports)]),
+        *([] if bus.table.facts.is_feetech else [servos.firmware(reports)]),
         servos.return_delay(reports),
         servos.alarms(reports, robot),
         servos.torque(reports),
@@ -330,7 +326,8 @@ def _reports(
         return ()
     wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
     port_format = wire_format(bus.table.facts)
-    models = {each.model: each for each in robot.servo_records if wire_format(each) == port_format}
+    known = robot.records_by_model.items()
+    models = [name for name, facts in known if wire_format(facts) == port_format]
     findings.append(servos.models(inspection.servos, wrong, ", ".join(models)))
     return inspection.servos
 
@@ -391,7 +388,7 @@ def _at_other_bauds(
         return {}
     port = bus.port
     before = port.getBaudRate()
-    feetech = _is_feetech(bus)
+    feetech = bus.table.facts.is_feetech
     others = [baud for baud in (bus.table.facts.bauds if feetech else BAUDS) if baud != before]
     if len(missing) > _PINGED:
         if feetech:

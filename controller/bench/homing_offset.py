@@ -103,7 +103,7 @@ def without_zeros(robot: RobotConfig) -> RobotConfig:
 
 def _sign(facts: ServoModel) -> int:
     """Change of the position for a change of the register by 1."""
-    return -1 if facts.protocol == "feetech" else 1
+    return -1 if facts.is_feetech else 1
 
 
 def _write(bus: DynamixelBus, offset: HomingOffset) -> None:

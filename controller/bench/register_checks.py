@@ -106,7 +106,7 @@ class _Checks:
         """Findings in the order of their weight; None where all is well."""
         facts = self._facts
         all_reply, shutdown = ALL_REPLY, SHUTDOWN_ALARMS
-        if facts.protocol == "feetech":
+        if facts.is_feetech:
             all_reply, shutdown = 1, feetech.shutdown_alarms(facts)
         return [
             self._pose(),
@@ -411,7 +411,7 @@ class _Checks:
 
 def _factory_values(facts: ServoModel) -> dict[str, int]:
     """Initial values of the registers; empty if the model's file does not give them."""
-    if facts.protocol == "feetech":
+    if facts.is_feetech:
         return {name: row.initial for name, row in facts.registers.items()}
     try:
         rules = registers_of(facts).rules

@@ -166,7 +166,7 @@ def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
     budgets = []
     for ids in [set(port.ids) for port in robot.ports] or [{*robot.servo_ids, *imu}]:
         facts = next(iter(robot.models_on(ids).values()))
-        if facts.protocol == "feetech":
+        if facts.is_feetech:
             budgets.append(_feetech_budget(facts, len(ids), baud))
         else:
             budgets.append(_port_budget(len(ids - imu), baud, fast=fast, with_imu=bool(imu & ids)))

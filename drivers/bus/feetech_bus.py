@@ -59,7 +59,7 @@ class FeetechBus(DynamixelBus):
         """
         super().__init__(port, model, latency_s=latency_s, tries=tries)
         for table in (self.table, *self._tables.values()):
-            if table.facts.protocol != "feetech":
+            if not table.facts.is_feetech:
                 raise ControlTableError(
                     f"{table.model}: does not speak Feetech's protocol; on one port all servos "
                     "speak one protocol"
@@ -284,6 +284,6 @@ def servo_bus(
 
     """
     bus = DynamixelBus(port, model, latency_s=latency_s, tries=tries)
-    if bus.table.facts.protocol == "feetech":
+    if bus.table.facts.is_feetech:
         return FeetechBus(port, model, latency_s=latency_s, tries=tries)
     return bus

@@ -38,7 +38,7 @@ class FeetechServo:
 def feetech_bauds() -> tuple[int, ...]:
     """Baud rates of the shipped models, the factory's first."""
     models = map(servo_model, shipped_models())
-    rates = [baud for facts in models if facts.protocol == "feetech" for baud in facts.bauds]
+    rates = [baud for facts in models if facts.is_feetech for baud in facts.bauds]
     return tuple(dict.fromkeys(rates))
 
 

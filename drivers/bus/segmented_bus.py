@@ -152,7 +152,7 @@ class SegmentedBus:
         spans = {
             (cycle.read_address, cycle.read_bytes)
             for bus, cycle in cycles.items()
-            if bus.table.facts.protocol != "feetech"
+            if not bus.table.facts.is_feetech
         }
         if len(spans) > 1:
             raise ControlTableError(

@@ -48,7 +48,7 @@ def chain_settings(
     pitch = robot.all_axes[joint] == "p"
     if pitch and not units.limits_current[joint]:  # such a model is soft only with a small output
         goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
-    if robot.servo_records[joint].protocol == "feetech":
+    if robot.servo_records[joint].is_feetech:
         return _feetech_settings(robot, units, joint, goal_pwm)
     mode = CURRENT_POSITION_MODE if units.current_mode[joint] else POSITION_MODE
     return (

@@ -163,7 +163,7 @@ class StateDecoder:
 
         """
         for table in tables:
-            if table.facts.protocol == "feetech":
+            if table.facts.is_feetech:
                 continue  # the bus converts the state
             registers = [table[name] for name in table.state_names]
             start = registers[0].address

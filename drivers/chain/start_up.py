@@ -151,7 +151,7 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
 
     """
     table = bus.table_of(servo_id)
-    own = FEETECH_SETTINGS if table.facts.protocol == "feetech" else ()
+    own = FEETECH_SETTINGS if table.facts.is_feetech else ()
     names = [each for each in (*_REPORTED, *_COMPARED, *own) if each in table]
     values = bus.read_each(servo_id, names)
     return ServoReport(
@@ -276,7 +276,7 @@ def _read_settings(bus: ChainBus, servo_id: int) -> dict[str, int]:
     """Values of the registers of ``configure`` that the model has."""
     table = bus.table_of(servo_id)
     names: tuple[str, ...] = _SETTINGS
-    if table.facts.protocol == "feetech":
+    if table.facts.is_feetech:
         names = (*_SETTINGS, *FEETECH_SETTINGS)
     return bus.read_each(servo_id, [each for each in names if each in table], (STARTUP,))
 
@@ -355,7 +355,7 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]
     by_level: dict[int, list[int]] = {}
     for each in right:
-        is_feetech = bus.table_of(each).facts.protocol == "feetech"
+        is_feetech = bus.table_of(each).facts.is_feetech
         by_level.setdefault(1 if is_feetech else ALL_REPLY, []).append(each)
     for level, ids in by_level.items():
         bus.sync_write(ids, "Status Return Level", level)

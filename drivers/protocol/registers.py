@@ -102,7 +102,7 @@ class ServoUnits:
                 f"{facts.model}: its file lacks {', '.join(missing)}; a run needs "
                 "them: docs/how-to/add-a-servo-model.md"
             )
-        if facts.protocol == "feetech":
+        if facts.is_feetech:
             limits_current = "Goal Current" in facts.registers
         else:
             limits_current = measures and CURRENT_POSITION_MODE in facts.modes

@@ -68,6 +68,6 @@ def decoder_for(facts: ServoModel, models: Mapping[int, Model] | None = None) ->
 
     ``models`` are those of the servos of Protocol 2.0, by ID.
     """
-    if facts.protocol == "feetech":
+    if facts.is_feetech:
         return FeetechDecoder(facts)
     return Decoder1(facts) if facts.protocol == 1 else Decoder(facts, models)

@@ -119,7 +119,7 @@ def simulated_line(
     mounting = Mounting(mounting.sign[at], mounting.zero_rad[at])
     on_it = [motors[row] for row in joints]
     line: SimLine | FeetechLine
-    if records[0].protocol == "feetech":
+    if records[0].is_feetech:
         volts = robot.servo.supply_v
         servos = FeetechServos(ids, plant, records[0], volts, mounting, on_it)
         line = feetech_line(servos, rate, clock)
