@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from snakewalk.config.robot.joint_values import JointValues
-from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.servo_model import RegisterRow, ServoModel
 
 _GAINS: Final = {
     "position_p_gain": ("Position P Gain", "position_p_gains"),
@@ -27,10 +27,10 @@ def initial_gains(robot: JointValues) -> dict[str, int]:
         *((key, register) for key, (register, _) in _GAINS.items()),
         ("pitch_p_gain", "Position P Gain"),
     ):
-        row = facts.registers.get(name)
-        if key in robot.servo.model_fields_set or row is None or row.range is None:
+        if key in robot.servo.model_fields_set:
             continue
-        if not row.range[0] <= getattr(robot.servo, key) <= row.range[1]:
+        row = _row_without(facts, name, getattr(robot.servo, key))
+        if row is not None:
             gains[key] = row.initial
     return gains
 
@@ -44,12 +44,10 @@ def initial_joint_gains(robot: JointValues) -> dict[int, dict[str, int]]:
         for key, (register, values) in _GAINS.items():
             is_soft = key == "position_p_gain" and robot.all_axes[joint] == "p"
             given = "pitch_p_gain" if is_soft else key
-            row = facts.registers.get(register)
             if getattr(own, key) is not None or given in robot.servo.model_fields_set:
                 continue
-            if row is None or row.range is None:
-                continue
-            if not row.range[0] <= getattr(robot, values)[joint] <= row.range[1]:
+            row = _row_without(facts, register, getattr(robot, values)[joint])
+            if row is not None:
                 found.setdefault(joint, {})[key] = row.initial
     return found
 
@@ -83,11 +81,19 @@ def half_range_rad(facts: ServoModel) -> float:
     return min(most_rad, min(zero - row.range[0], row.range[1] - zero) * facts.rad_per_position)
 
 
+def _row_without(facts: ServoModel, name: str, value: int) -> RegisterRow | None:
+    """Return the register if its range is known and does not contain the value."""
+    row = facts.registers.get(name)
+    if row is None or row.range is None or row.range[0] <= value <= row.range[1]:
+        return None
+    return row
+
+
 def _fault(
     facts: ServoModel, name: str, value: int, shown: str, unit: float = 1.0, unit_name: str = ""
 ) -> str | None:
-    row = facts.registers.get(name)
-    if row is None or row.range is None or row.range[0] <= value <= row.range[1]:
+    row = _row_without(facts, name, value)
+    if row is None or row.range is None:
         return None
     low, high = max(row.range[0], 0) * unit, row.range[1] * unit
     return (

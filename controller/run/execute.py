@@ -60,7 +60,7 @@ from snakewalk.drivers.errors import DriverError
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
-from snakewalk.drivers.safety.safe_link import SafeLink
+from snakewalk.drivers.safety.safe_link import TORQUE_IS_OFF, SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.safety.stop_output import StopCall, StopOutput, parse_stop_output
 from snakewalk.drivers.safety.trip_hold import TripHold
@@ -338,19 +338,20 @@ def _live(
 def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
     """Note what became of torque and log when a signal, a full disk or a dead port ends a run."""
     try:
-        yield  # the link is closed when an error comes out of it
+        yield  # the link is closed when an error comes out of it, with a note about torque
     except DriverError as fault:  # says itself what it knows of torque
         if link.tripped is not None:
             log.event(clock.now_s(), "interrupt", str(fault), "warning")
             fault.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
         raise
     except (KeyboardInterrupt, SystemExit, OSError) as stop:
-        failed = getattr(stop, "__notes__", [])
-        torque = "torque is off" if link.was_enabled else "torque was not switched on"
-        stop.add_note(torque if not failed else "torque may be on: switch the supply off")
+        if not link.was_enabled:
+            stop.add_note("torque was not switched on")
+        torque = "; ".join(stop.__notes__)
+        if link.was_enabled and TORQUE_IS_OFF not in stop.__notes__:
+            stop.add_note("torque may be on: switch the supply off")
         if not isinstance(stop, OSError):
-            text = "; ".join(failed) if failed else torque
-            log.event(clock.now_s(), "interrupt", text, "warning")
+            log.event(clock.now_s(), "interrupt", torque, "warning")
             stop.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
         raise
 

@@ -37,7 +37,7 @@ class BoneMotion:
         return float(self.bone_m.sum())
 
 
-def even_points(track: Track) -> Floats:
+def thinned_points(track: Track) -> Floats:
     """(T, P, 2) midlines; those of more than 101 points resampled to 100 equal arcs."""
     points = track.points
     if points.shape[1] > SEGMENTS + 1:

@@ -33,6 +33,8 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 RESTART_S = 2.0
 """After a servo's reboot the goals' rate grows for this time until it is the limit again (ours)."""
+TORQUE_IS_OFF = "torque is off"
+"""Note on an error that ended the context, after every servo has confirmed it."""
 _DOUBTS = 10
 """Impossible angles after which they are reported a second and last time (ours)."""
 _LAST_DOUBT = f" ({_DOUBTS} times so far; later ones are not reported); stop the run and check it"
@@ -51,7 +53,7 @@ class SafeLink:
     ``tripped`` contains the reason, and ``write`` raises. ``read`` still works, and repeats an
     unconfirmed torque off a few times. Only ``reset`` by an operator and a new ``enable`` permit
     motion. Inside the context SIGTERM, SIGINT, SIGHUP (unless ignored), SIGQUIT and SIGTSTP leave
-    the program through the exit.
+    the program through the exit, and its exception gets a note about the torque.
     With a ``recovery`` the chain holds when the line or a servo is lost, and continues if the
     policy permits it. With a ``hold``, a joint that does not follow and ``request_stop(...,
     may_hold=True)`` (the first Ctrl-C) hold with low currents before torque goes off;
@@ -126,6 +128,8 @@ class SafeLink:
         try:
             if self._touched:
                 self.disable()
+                if error is not None and not isinstance(error, DriverError):
+                    error.add_note(TORQUE_IS_OFF)
         except DriverError as fault:
             if error is None:
                 if self._tripped_by is not None:

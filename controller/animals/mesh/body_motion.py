@@ -22,9 +22,9 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.track.bone_motion import (
     BoneMotion,
-    even_points,
     from_points,
     swimming,
+    thinned_points,
 )
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.drivers.types import BodyPose
@@ -85,7 +85,7 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
         points[..., 2] += _belly_m(skin, fish.length) - points[..., 2].min(initial=0.0)
         return time_s, points
     track = load_track(source)
-    flat = even_points(track)
+    flat = thinned_points(track)
     if not track.places_recorded:
         flat = flat - flat.mean(axis=1, keepdims=True)  # the images were cropped: no travel
     belly_m = _belly_m(skin, 1.0 if track.length_m is None else track.length_m)

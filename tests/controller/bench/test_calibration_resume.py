@@ -117,6 +117,28 @@ def test_every_repeated_question_has_its_reason(trio: Trio) -> None:
         assert reason in result.output, result.output
 
 
+def test_an_interrupted_motion_says_that_torque_is_off(trio: Trio) -> None:
+    """Ctrl-C in a range printed only "interrupted"."""
+    file, like = ProgressFile(trio.out), load_robot(str(trio.folder / "like.toml"))
+    journal = file.start(like, resume=False, force=False)
+
+    def interrupt_after_one_range() -> str | None:
+        if len(journal.known.ranges) == 1:
+            raise KeyboardInterrupt
+        return None
+
+    with pytest.raises(KeyboardInterrupt) as stop:
+        calibrate(
+            trio.line,
+            like,
+            Script(),
+            name="mine",
+            journal=journal,
+            stop_requested=interrupt_after_one_range,
+        )
+    assert stop.value.__notes__ == ["torque is off"]
+
+
 def test_an_overload_has_the_advice_to_hang_the_robot_up(trio: Trio) -> None:
     faults(trio, {"kind": "overload", "ids": [4], "at_s": 2.0})
     result = trio()

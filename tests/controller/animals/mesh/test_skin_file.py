@@ -17,7 +17,7 @@ from snakewalk.controller.animals.mesh.patches import Tube
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin, pde_skin
 from snakewalk.controller.animals.mesh.skin_file import Y_UP, write_skin
-from snakewalk.controller.track.bone_motion import BoneMotion, even_points, from_points
+from snakewalk.controller.track.bone_motion import BoneMotion, from_points, thinned_points
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.track import Track
 from tests.oracles.gltf_player import GltfPlayer
@@ -52,7 +52,7 @@ def tumbling(frames: int = 30, bones: int = 9) -> BoneMotion:
 def test_every_frame_of_a_recording_is_read_back(track: Track, skin: Skin, tmp_path: Path) -> None:
     file = tmp_path / "snake.glb"
     length = float(track.length_m or 1.0)
-    flat = even_points(track)
+    flat = thinned_points(track)
     spine = np.concatenate([flat, np.full((*flat.shape[:2], 1), 0.01)], axis=-1)
     motion = from_points(spine, track.time_s)
     write_skin(
