@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from snakewalk.config.schema_fault import fault_in_words
 from snakewalk.controller.cli.called_command import CalledCommand, called
 from snakewalk.controller.console.command import (
     BUS,
@@ -141,7 +142,14 @@ def _print_fault(error: Any) -> None:
         return
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
-    text = " ".join(error.format_message().split()).replace(": Value error, ", ": ")  # pydantic's
+    if hasattr(error.__cause__, "errors"):  # pydantic's, the cause of a typer.BadParameter
+        fault = error.__cause__.errors(include_url=False)[0]
+        error.message = (
+            fault["msg"].removeprefix("Value error, ")
+            if fault["type"] == "value_error"
+            else fault_in_words(fault)
+        )
+    text = " ".join(error.format_message().split())
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 

@@ -98,11 +98,18 @@ class StopCommand(_Plain):
             PortError: it does not exist, or is not executable.
 
         """
-        program = self.words[0]
-        if not Path(program).is_file() or not os.access(program, os.X_OK):
-            what = "is not executable" if Path(program).is_file() else "no such program"
-            raise PortError(f"stop output {self.name}: {what}; name a program that can be started")
+        if self.fault is not None:
+            raise PortError(self.fault)
         return self
+
+    @property
+    def fault(self) -> str | None:
+        """Why the program cannot be started on this computer, or None."""
+        program = self.words[0]
+        if Path(program).is_file() and os.access(program, os.X_OK):
+            return None
+        what = "is not executable" if Path(program).is_file() else "no such program"
+        return f"stop output {self.name}: {what}; name a program that can be started"
 
     def activate(self) -> None:
         """Run the program in its own session: Ctrl-C in the terminal does not end it.

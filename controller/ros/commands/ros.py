@@ -83,7 +83,10 @@ def ros(
     network: Network = False,
     timeout: Timeout = 1.0,
     seconds: Annotated[
-        float, typer.Option(help="switch torque off after this many seconds", show_default="a week")
+        float,
+        typer.Option(
+            min=0.1, help="switch torque off after this many seconds", show_default="a week"
+        ),
     ] = _WEEK_S,
     set_: Set = None,
     view: View = False,

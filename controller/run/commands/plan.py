@@ -28,6 +28,7 @@ from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.terrain.summary import path_relief, path_warnings
 from snakewalk.drivers.chain.chain_settings import missing_watchdogs
+from snakewalk.drivers.safety.stop_output import StopCommand, parse_stop_output
 from snakewalk.drivers.safety.trip_hold import TripHold
 
 
@@ -141,6 +142,10 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         found["states"] = prepared.library.counts
     missing = missing_watchdogs(prepared.robot)
     warnings = [*prepared.warnings, *prepared.climb_warnings, *missing]
+    if safety.stop_output is not None:
+        output = parse_stop_output(safety.stop_output)
+        if isinstance(output, StopCommand) and output.fault is not None:
+            warnings.append(f"{output.fault}, or plan on the computer of the robot")
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
         found |= facts

@@ -1,6 +1,7 @@
 """The command line on paper: plans, lists, and refuses bad input with exit code 2."""
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,16 @@ def test_a_plan_as_json() -> None:
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["waypoints_reached"] == found["waypoints"] == 5
+
+
+@pytest.mark.parametrize(("program", "warnings"), [("/nosuch/relay", 1), (sys.executable, 0)])
+def test_a_stop_output_that_cannot_be_started_is_a_warning(program: str, warnings: int) -> None:
+    """The run rejected it after a plan without a warning."""
+    output = f"run.safety.stop_output=command:{program}"
+    done = snakewalk("plan", "flat-square", "--json", "--set", output)
+    found = json.loads(done.stdout)["warnings"]
+    assert len(found) == warnings
+    assert all(f"stop output {program}: no such program" in line for line in found)
 
 
 def test_a_plan_tells_the_slopes_under_the_body_and_warns() -> None:
