@@ -98,6 +98,24 @@ def parse_json(text: str | bytes) -> Any:
         raise ValueError("nested too deeply") from None
 
 
+def read_json_object(path: Path, what: str = "a JSON object") -> dict[str, Any]:
+    """Read a file whose JSON is an object; ``what`` names it in a message.
+
+    Raises:
+        InputError: the file cannot be read, or holds something else.
+
+    """
+    try:
+        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except ValueError:
+        raise InputError(f"{path}: is not JSON; expected {what}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: expected {what}")
+    return data
+
+
 def check_matrices(file: Path) -> None:
     """Check a file of OpenCV's FileStorage before OpenCV reads it.
 

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
+from snakewalk.config.archive import read_json_object
 from snakewalk.config.base import Strict
-from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked
 from snakewalk.controller.bench.port_lines import PortLines
 from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
@@ -99,16 +98,10 @@ def load_backup(path: Path) -> BackupFile:
     """Read a file of ``backup_text``.
 
     Raises:
-        ConfigError: it is another kind of file.
-        OSError: it cannot be read.
+        InputError: it cannot be read, or is another kind of file.
 
     """
-    try:
-        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
-    except ValueError as error:
-        raise ConfigError(f"{path}: not JSON: {error}") from None
-    if not isinstance(data, dict):
-        raise ConfigError(f"{path}: no backup of servos: it holds no table")
+    data = read_json_object(path, "a backup of servos, a JSON object")
     return checked(BackupFile, data, str(path))
 
 

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from pydantic import Field
 
-from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
+from snakewalk.config.archive import read_json_object
 from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
@@ -58,14 +58,7 @@ def read_corrections(path: Path) -> Corrections:
         InputError: the file is not there, or holds something else.
 
     """
-    try:
-        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except ValueError:
-        raise InputError(f"{path}: is no JSON; corrections are what a review page saves") from None
-    if not isinstance(data, dict):
-        raise InputError(f"{path}: expected a JSON object, as a review page saves it")
+    data = read_json_object(path, "the corrections that a review page saves, a JSON object")
     return checked(Corrections, data, str(path))
 
 

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from snakewalk.config.archive import read_json_object
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.studies.identification.servo_constants import read_json
 
 _COLUMNS: Final = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
 _ABOUT: Final = ("mass", "length", "kp")
@@ -49,7 +49,7 @@ def read_pendulum_log(path: Path) -> PendulumLog:
         InputError: it is not such a file, with its missing parts.
 
     """
-    data = read_json(path)
+    data = read_json_object(path)
     entries = data.get("entries")
     faults = [f"{path}: {key}: is missing" for key in (*_ABOUT, "entries") if key not in data]
     if faults:

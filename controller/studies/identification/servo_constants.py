@@ -12,14 +12,14 @@ M6.)
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
+from snakewalk.config.archive import read_json_object
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import with_keys
@@ -135,7 +135,7 @@ def read_bam(path: Path) -> ServoConstants:
         InputError: it is not such a file, or needs a term that is not modelled here.
 
     """
-    data = read_json(path)
+    data = read_json_object(path)
     if data.get("model") not in _FORMS:
         raise InputError(
             f"{path}: model is {data.get('model')!r}; expected one of {', '.join(_FORMS)}"
@@ -214,21 +214,3 @@ def robot_comment(constants: ServoConstants, paths: Sequence[Path]) -> str:
         if math.isfinite(low)
     ]
     return "\n".join(lines)
-
-
-def read_json(path: Path) -> dict[str, object]:
-    """Read a JSON object.
-
-    Raises:
-        InputError: the file is not there, or holds something else.
-
-    """
-    try:
-        data = parse_json(read_bytes(path, MOST_JSON_BYTES))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except ValueError:
-        raise InputError(f"{path}: is not JSON") from None
-    if not isinstance(data, Mapping):
-        raise InputError(f"{path}: expected a JSON object")
-    return dict(data)

@@ -90,8 +90,8 @@ def test_a_file_that_is_not_of_these_servos_is_refused_before_anything_is_writte
         (text.replace("XL330-M288", "XM430-W350"), "ID 3: is a XL330-M288"),
         (text.replace('"Shutdown"', '"Shut down"'), "has no Shut down to restore"),
         (text.replace('"servos"', '"servo"'), "servos: is required"),
-        ("[]", "no backup of servos"),
-        ("{", "not JSON"),
+        ("[]", "expected a backup of servos"),
+        ("{", "is not JSON"),
     ):
         file.write_text(broken)
         fault = call("restore", file, "--yes")[2]

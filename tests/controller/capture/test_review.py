@@ -158,7 +158,7 @@ def test_wrong_files_and_options_are_refused(folder: Path, tmp_path: Path) -> No
     track = folder / "track.npz"
     new = tmp_path / "new.npz"
     for options, said in (
-        (CaptureOptions(track, new, corrections=junk), "is no JSON"),
+        (CaptureOptions(track, new, corrections=junk), "is not JSON"),
         (CaptureOptions(track, new, corrections=tmp_path / "no.json"), "No such file"),
         (
             CaptureOptions(track, new, corrections=junk, roi="1,2,3,4"),
