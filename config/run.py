@@ -4,13 +4,14 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import STOP_OUTPUT_PATTERN, Name, Strict
+from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import CameraConfig, MappingConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
+from snakewalk.config.value_faults import STOP_OUTPUT_PATTERN
 
 MOTIONS: Final = (
     "walk",

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
 
 from snakewalk.config.archive import read_text
-from snakewalk.config.base import PATTERNS_IN_WORDS
 from snakewalk.config.errors import ConfigError
+from snakewalk.config.value_faults import given, in_words
 
 M = TypeVar("M", bound=BaseModel)
 Schemas = Callable[[], Mapping[str, type[BaseModel]]]
@@ -154,32 +154,6 @@ def _meant(model: type[BaseModel], key: str, others: Schemas) -> str:
     return "" if owner is None else f"; it is a key of a {owner}'s file"
 
 
-def _pattern_in_words(pattern: str) -> str:
-    """Return the message for a text that does not match."""
-    if pattern in PATTERNS_IN_WORDS:
-        return PATTERNS_IN_WORDS[pattern]
-    letters = re.fullmatch(r"\^\[([a-z]+)\](?:\*|\{(\d+),(\d+)\})\$", pattern)
-    if letters is not None:
-        which, least, most = letters.groups()
-        return f"must have the letters {' and '.join(which)} only" + (
-            f", {least} to {most} of them" if least else ""
-        )
-    classes = re.fullmatch(r"\^(?:\[([^]]+)\])?\[([^]]+)\][*+]\$", pattern)
-    if classes is None:
-        return f"must match {pattern}"
-    first, others = classes.groups()
-    begin = f"must begin with {_class_in_words(first)}, and " if first else "must "
-    return f"{begin}have only {_class_in_words(others)}"
-
-
-def _class_in_words(characters: str) -> str:
-    ranges = {"a-z": "small letters", "A-Z": "capital letters", "0-9": "digits"}
-    words = [name for each, name in ranges.items() if each in characters]
-    rest = re.sub("a-z|A-Z|0-9", "", characters)
-    listed = words + [repr(each) for each in rest]
-    return " or ".join([", ".join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)
-
-
 def _line(
     model: type[BaseModel], path: str, text: str, fault: dict[str, Any], others: Schemas
 ) -> str:
@@ -188,38 +162,6 @@ def _line(
     number = line_number(text, loc)
     if number is not None:
         path = f"{path}:{number}"
-    given = fault.get("input")
-    shown = f" (got {given!r})" if isinstance(given, int | float | str | bool) else ""
-    context = fault.get("ctx", {})
-    bounds = {key: context[key] for key in ("gt", "ge", "lt", "le") if key in context}
-    tag, known = context.get("tag"), context.get("expected_tags")
-    said = {
-        "missing": "is required",
-        "tuple_type": "must be a list: [ ... ]",
-        "model_type": "must be a table",
-        "model_attributes_type": "must be a table",
-        "dict_type": "must be a table",
-        "string_type": "must be text",
-        "int_type": "must be a whole number",
-        "int_from_float": "must be a whole number",
-        "float_type": "must be a number",
-        "bool_type": "must be true or false",
-        "finite_number": "must be a finite number",
-        "union_tag_invalid": f"kind {tag!r} is unknown; use one of {known}",
-        "union_tag_not_found": "needs a key kind, which says what it is",
-        "literal_error": f"must be {context.get('expected')}",
-        "greater_than": f"must be over {bounds.get('gt', 0):g}",
-        "greater_than_equal": f"must be at least {bounds.get('ge', 0):g}",
-        "less_than": f"must be under {bounds.get('lt', 0):g}",
-        "less_than_equal": f"must be at most {bounds.get('le', 0):g}",
-        "too_long": f"must have at most {context.get('max_length')} values",
-        "too_short": f"must have at least {context.get('min_length')} values",
-        "string_too_long": f"must have at most {context.get('max_length')} characters",
-        "string_too_short": "must not be empty",
-    }
-    if fault["type"] == "extra_forbidden":
-        said["extra_forbidden"] = f"unknown key{_meant(model, str(loc[-1]), others)}"
-    pattern = str(context.get("pattern"))
-    said["string_pattern_mismatch"] = _pattern_in_words(pattern)
-    what = said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
-    return f"{path}: {where}: {what}{shown}" if where else f"{path}: {what}{shown}"
+    hint = _meant(model, str(loc[-1]), others) if fault["type"] == "extra_forbidden" else ""
+    text_of = in_words(fault, hint) + given(fault)
+    return f"{path}: {where}: {text_of}" if where else f"{path}: {text_of}"

@@ -1,5 +1,6 @@
 """The command line: every command that a manifest lists, imported when it is called."""
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -141,7 +142,10 @@ def _print_fault(error: Any) -> None:
         return
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
-    text = " ".join(error.format_message().split()).replace(": Value error, ", ": ")  # pydantic's
+    text = " ".join(error.format_message().split())
+    text = re.sub(r"^Invalid value for '([^']+)'(?: / '[^']+')*: ", r"\1: ", text)
+    text = re.sub(r": (?:dir|file) ('.*' is a (?:file|directory))\.$", r": \1", text)
+    text = re.sub(r"^Missing (?:option|argument) '([^']+)'.*\.$", r"\1: is required", text)
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 

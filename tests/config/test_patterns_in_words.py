@@ -8,7 +8,7 @@ import pytest
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.servo_model import ServoModel
-from snakewalk.config.strict_toml import _pattern_in_words
+from snakewalk.config.value_faults import _pattern_in_words
 from snakewalk.config.world import WorldConfig
 
 
