@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
-from snakewalk.config.text_patterns import NAME_PATTERN
+from snakewalk.config.value_faults import NAME_PATTERN
 
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100, pattern=NAME_PATTERN)]
 """A name that becomes part of a file's: no path, nothing that steers a terminal, not hidden."""

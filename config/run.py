@@ -11,7 +11,7 @@ from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
-from snakewalk.config.text_patterns import STOP_OUTPUT_PATTERN
+from snakewalk.config.value_faults import STOP_OUTPUT_PATTERN
 
 MOTIONS: Final = (
     "walk",

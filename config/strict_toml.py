@@ -13,7 +13,7 @@ from pydantic_core import PydanticSerializationError, to_json
 
 from snakewalk.config.archive import read_text
 from snakewalk.config.errors import ConfigError
-from snakewalk.config.schema_fault import fault_in_words, given_value
+from snakewalk.config.value_faults import given, in_words
 
 M = TypeVar("M", bound=BaseModel)
 Schemas = Callable[[], Mapping[str, type[BaseModel]]]
@@ -162,7 +162,6 @@ def _line(
     number = line_number(text, loc)
     if number is not None:
         path = f"{path}:{number}"
-    what = fault_in_words(fault)
-    if fault["type"] == "extra_forbidden":
-        what = f"unknown key{_meant(model, str(loc[-1]), others)}{given_value(fault)}"
-    return f"{path}: {where}: {what}" if where else f"{path}: {what}"
+    hint = _meant(model, str(loc[-1]), others) if fault["type"] == "extra_forbidden" else ""
+    text_of = in_words(fault, hint) + given(fault)
+    return f"{path}: {where}: {text_of}" if where else f"{path}: {text_of}"

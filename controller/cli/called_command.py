@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.value_faults import given, in_words
 from snakewalk.controller.console.command import command_info
 from snakewalk.controller.console.messages import LOGGER, messages
 from snakewalk.controller.console.options import (
@@ -31,7 +32,16 @@ class CalledCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Read the words behind a command's name."""
         words = list(args)
-        rest = super().parse_args(ctx, args)  # --help ends here
+        try:
+            rest = super().parse_args(ctx, args)  # --help ends here
+        except typer.BadParameter as error:
+            faults = getattr(error.__cause__, "errors", None)  # pydantic's, behind typer's
+            if faults is None:
+                raise
+            fault = dict(faults()[0])
+            text = in_words(fault).rstrip(".")
+            text += "" if repr(fault.get("input")) in text else given(fault)
+            raise typer.BadParameter(text, ctx=ctx, param=error.param) from None
         if not ctx.resilient_parsing:  # of completion
             order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
             for option in dict.fromkeys(order):

@@ -1,5 +1,6 @@
 """The command line: every command that a manifest lists, imported when it is called."""
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -142,14 +143,10 @@ def _print_fault(error: Any) -> None:
         return
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
-    if hasattr(error.__cause__, "errors"):  # pydantic's, the cause of a typer.BadParameter
-        fault = error.__cause__.errors(include_url=False)[0]
-        error.message = (
-            fault["msg"].removeprefix("Value error, ")
-            if fault["type"] == "value_error"
-            else fault_in_words(fault)
-        )
     text = " ".join(error.format_message().split())
+    text = re.sub(r"^Invalid value for '([^']+)'(?: / '[^']+')*: ", r"\1: ", text)
+    text = re.sub(r": (?:dir|file) ('.*' is a (?:file|directory))\.$", r": \1", text)
+    text = re.sub(r"^Missing (?:option|argument) '([^']+)'.*\.$", r"\1: is required", text)
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 

@@ -98,7 +98,7 @@ Shadow = Annotated[
         "--shadow", help="compare the run with a simulation, and name the cause of differences"
     ),
 ]
-View = Annotated[bool, typer.Option("--view", help="show the running robot in a browser")]
+View = Annotated[bool, typer.Option("--view", help="show the robot in a browser")]
 ViewAt = Annotated[
     str,
     typer.Option("--view-at", metavar="HOST:PORT", help="address of the page"),

@@ -98,7 +98,8 @@ def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:
         for k, (x, y) in enumerate(job.run.waypoints_m, start=1):
             ring = Circle((x, y), job.run.waypoint_radius_m, fill=False, edgecolor=GREY)
             axis.add_patch(ring)
-            axis.annotate(str(k), (x, y), ha="center", va="center", fontsize=9, color=INK)
+            top = (x, y + job.run.waypoint_radius_m)
+            axis.annotate(str(k), top, ha="center", va="bottom", fontsize=9, color=INK)
         axis.set_aspect("equal")
         axis.set_xlabel("x (m)")
         axis.set_ylabel("y (m)")

@@ -30,9 +30,9 @@ from snakewalk.controller.runlog.reader import read_log
     group=JOB,
     examples=(
         "export runs/flat-square-walk-seed0/log.mcap --csv tables",
-        "export LOG --parquet tables --foxglove body.mcap",
-        "export LOG --ros2 bag.mcap --json",
-        "export LOG --csv tables --joint-numbers",
+        "export runs/flat-square-walk-seed0/log.mcap --parquet tables --foxglove body.mcap",
+        "export runs/flat-square-walk-seed0/log.mcap --ros2 bag.mcap --json",
+        "export runs/flat-square-walk-seed0/log.mcap --csv tables --joint-numbers",
     ),
 )
 def export(

@@ -13,7 +13,7 @@ from snakewalk.config.colours import INK, SKY
 PICTURES = Path(__file__).resolve().parents[1]
 SIZE = 240, 135
 CROPS = {
-    "simulation": ("traverse.jpg", (0.5, 0.5, 1.0, 1.0)),
+    "simulation": ("traverse.jpg", (0.06, 0.13, 0.5, 1.0)),
     "bench": ("view.jpg", (0.1, 0.05, 1.0, 0.95)),
     "rehearsal": ("view-two.jpg", (0.25, 0.3, 0.85, 0.95)),
     "animals": ("capture-worm.jpg", (0.0, 0.0, 0.5, 0.45)),

@@ -14,7 +14,8 @@ import av
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
-WIDTH, HEIGHT = 640, 360
+WIDTH, HEIGHT, CAPTION = 640, 360, 36
+"""Size of a picture, and height of the caption below it, in pixels."""
 PART_S = 2.0
 RATE_HZ = 10
 CAPTIONS = (
@@ -34,11 +35,12 @@ def chosen(total: int) -> list[int]:
 
 
 def captioned(image: Image.Image, caption: str) -> Image.Image:
-    """Write ``caption`` across the lower edge of ``image``."""
-    draw = ImageDraw.Draw(image)
-    draw.rectangle((0, HEIGHT - 36, WIDTH, HEIGHT), fill="black")
-    draw.text((12, HEIGHT - 31), caption, fill="white", font=ImageFont.load_default(22))
-    return image
+    """Write ``caption`` below ``image``."""
+    canvas = Image.new("RGB", (WIDTH, HEIGHT + CAPTION), "black")
+    canvas.paste(image)
+    draw = ImageDraw.Draw(canvas)
+    draw.text((12, HEIGHT + 5), caption, fill="white", font=ImageFont.load_default(22))
+    return canvas
 
 
 def film_part(film: Path, caption: str) -> list[Image.Image]:
@@ -61,8 +63,8 @@ def animal_part(folder: Path, track: Path, caption: str) -> list[Image.Image]:
     files = sorted(folder.iterdir())
     all_px = np.load(track)["points_px"]  # (frames, 101, 2): x, y
     high_px, wide_px = np.ptp(all_px, axis=1).max(axis=0)
-    zoom = float(min(0.9 * WIDTH / wide_px, 0.9 * (HEIGHT - 36) / high_px))
-    middle = np.array([WIDTH, HEIGHT - 36]) / 2.0
+    zoom = float(min(0.9 * WIDTH / wide_px, 0.9 * HEIGHT / high_px))
+    middle = np.array([WIDTH, HEIGHT]) / 2.0
     shown = []
     for k in chosen(len(files)):
         image = Image.open(files[k]).convert("L")

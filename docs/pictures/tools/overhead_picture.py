@@ -7,9 +7,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from snakewalk.config.camera import CameraConfig
+from snakewalk.config.colours import SKY, TO_COME
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.cameras.pose_fit import fit_both_ends
+from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.rendering.top_view import TopView
 
@@ -31,24 +33,33 @@ def main(file: Path) -> None:
     line = model.in_image(line_m, robot.body_radius_m)
     left, top = line.min(axis=0) - 15
     right, bottom = line.max(axis=0) + 15
-    figure = Figure(figsize=(12.0, 3.4), layout="constrained")
-    whole, cut, fitted = figure.subplots(1, 3)
-    whole.imshow(image)
-    whole.set_title("frame, 640 x 480")
-    cut.imshow(shape.level, cmap="gray")
-    cut.contour(shape.level, [shape.threshold], colors="tab:red", linewidths=1.0)
-    cut.set_title("contrast and silhouette")
-    fitted.imshow(image)
-    fitted.plot(*line.T, "-", color="white", linewidth=1.0, label="seen axis")
-    fitted.plot(*links.T, "o", color="tab:blue", markersize=4, label="fitted links")
-    fitted.plot(*links[0], "o", color="tab:red", markersize=7, label="head")
-    fitted.set(xlim=(left, right), ylim=(bottom, top))
-    off_mm = 1e3 * np.hypot(*(fit.links_m - plant.link_positions_m[:, :2]).T).mean()
-    fitted.set_title(f"links, {off_mm:.1f} mm from the truth")
-    fitted.legend(loc="best", fontsize=8)
-    for axes in (whole, cut, fitted):
-        axes.set_axis_off()
-    figure.savefig(file, dpi=70)
+    with style():
+        figure = Figure(figsize=(WIDTH_IN, 2.9), layout="constrained")
+        whole, cut, fitted = figure.subplots(1, 3)
+        whole.imshow(image)
+        whole.set_title("frame")
+        cut.imshow(shape.level, cmap="gray")
+        cut.contour(shape.level, [shape.threshold], colors=TO_COME, linewidths=1.0)
+        cut.set_title("contrast, silhouette")
+        fitted.imshow(image)
+        fitted.plot(*line.T, "-", color="white", linewidth=1.0, label="visible axis")
+        fitted.plot(*links.T, "o", color=SKY, markersize=4, label="fitted links")
+        fitted.plot(*links[0], "o", color=TO_COME, markersize=7, label="head")
+        fitted.set(xlim=(left, right), ylim=(bottom, top))
+        off_mm = 1e3 * np.hypot(*(fit.links_m - plant.link_positions_m[:, :2]).T).mean()
+        fitted.set_title(f"links, off by {off_mm:.1f} mm")
+        whole.set_ylabel("y (px)")
+        for axes in (whole, cut, fitted):
+            axes.set_xlabel("x (px)")
+            axes.grid(visible=False)
+        figure.legend(
+            *fitted.get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=3,
+            frameon=True,
+            facecolor="0.6",
+        )
+        save_picture(figure, file)
 
 
 if __name__ == "__main__":

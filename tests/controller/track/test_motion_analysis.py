@@ -283,7 +283,7 @@ def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "Missing argument"),
+        ([], ": is required"),
         (["nosuch"], "nosuch: no such recording or file"),
         (["worm-like", "--picture", "a.docx"], "a.docx: a picture ends in"),
         (["worm-like", "lamprey-like", "--picture", "a.png"], "a.png: one file for 2"),
