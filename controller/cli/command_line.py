@@ -11,7 +11,6 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from snakewalk.config.schema_fault import fault_in_words
 from snakewalk.controller.cli.called_command import CalledCommand, called
 from snakewalk.controller.console.command import (
     BUS,

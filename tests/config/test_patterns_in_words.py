@@ -7,7 +7,6 @@ import pytest
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.config.schema_fault import _pattern_in_words
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.value_faults import _pattern_in_words
 from snakewalk.config.world import WorldConfig
