@@ -58,4 +58,6 @@ def test_the_reference_has_every_public_name() -> None:
 def test_the_readme_is_a_screen_and_leads_to_pages_that_exist() -> None:
     readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
     assert len(readme.splitlines()) <= 60
-    assert len(re.findall(r"`docs/start/\w+\.md`", readme)) == 4
+    assert set(re.findall(r"\]\((docs/start/\w+\.md)\)", readme)) == {
+        f"docs/start/{page.name}" for page in (DOCS / "start").glob("*.md")
+    }
