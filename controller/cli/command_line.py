@@ -196,7 +196,7 @@ def _stub(name: str, listed: Plugin) -> Any:
 
 def _full_command(name: str, listed: Plugin) -> Any:
     """Build the options of a command; its module is imported when it is called."""
-    declared = declaration(listed.target) if listed.is_own else None
+    declared = declaration(listed.target) if listed.is_builtin else None
     function: Callable[..., Any] = declared or listed.load()
     info = command_info(function)
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)

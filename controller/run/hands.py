@@ -82,7 +82,7 @@ class Hands:
 
     def _held(self) -> bool:
         """Whether nobody who has a dead man's button has let it go."""
-        return all(device.held for device in self._devices)
+        return all(device.is_enabled for device in self._devices)
 
 
 def open_hands(

@@ -21,7 +21,7 @@ class PageControls(Watcher, OffersStop, Protocol):
     """The page of a run, which may also command it."""
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether the dead man's button is held; True without one."""
         ...
 

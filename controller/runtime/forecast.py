@@ -38,7 +38,7 @@ class Slide:
 
     slope_rad: float
     """Mean slope under the body, where it was held least."""
-    held_rad: float
+    holding_rad: float
     """Torque that it could have held there, in that shape."""
     lasted_s: float
     """All the time that nothing held it."""
@@ -242,11 +242,11 @@ def _worse(
     """Add a step that nothing holds; keep where the body falls short most."""
     factor = holding_factor(points_m, headings_rad, friction, tangential, normal)
     steepness = float(np.hypot(*(tangential / normal[:, None]).mean(axis=0)))
-    slope_rad, held_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))
+    slope_rad, holding_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))
     lasted_s = step_s + (slide.lasted_s if slide else 0.0)
-    if slide is not None and slide.held_rad - slide.slope_rad <= held_rad - slope_rad:
-        slope_rad, held_rad = slide.slope_rad, slide.held_rad
-    return Slide(slope_rad, held_rad, lasted_s)
+    if slide is not None and slide.holding_rad - slide.slope_rad <= holding_rad - slope_rad:
+        slope_rad, holding_rad = slide.slope_rad, slide.holding_rad
+    return Slide(slope_rad, holding_rad, lasted_s)
 
 
 _HEADROOM = 1.05

@@ -228,9 +228,9 @@ class FrictionMonitor(FrictionEstimator):
 
     def _judge(self, span: Span) -> Iterator[FoundFriction | None]:
         """Replay a span, a hypothesis a cycle; the result comes last."""
-        foretold = []
+        predicted = []
         for friction in self._filter.hypotheses():
-            foretold.append(self._model.slid(span, friction))
+            predicted.append(self._model.slid(span, friction))
             yield None
         since_s, self._since_s = self._since_s, 0.0
-        yield self._filter.update(span.slid, np.array(foretold), since_s)
+        yield self._filter.update(span.slid, np.array(predicted), since_s)

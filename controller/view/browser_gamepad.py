@@ -91,7 +91,7 @@ class PadState:
     """State of each axis: -1, 0 or 1."""
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether a dead man's button is down."""
         return not self.pressed.isdisjoint(DEAD_MAN)
 
@@ -200,7 +200,7 @@ class BrowserGamepad:
             self._keys.clear()
             if self._is_new:
                 self._is_new = False
-                held = self.state is not None and self.state.held
+                held = self.state is not None and self.state.is_enabled
                 found.append(hold_command(held, self._told_s))
         return found
 

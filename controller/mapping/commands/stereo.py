@@ -174,6 +174,6 @@ def _facts(made: "StereoGround") -> dict[str, object]:
         "camera_height_m": round(stand.height_m, 4),
         "camera_tilt_deg": round(math.degrees(stand.tilt_rad), 2),
         "camera_roll_deg": round(math.degrees(stand.roll_rad), 2),
-        "matched_share": round(made.told_share, 4),
+        "matched_share": round(made.known_share, 4),
         "mapped_share": round(made.used_share, 4),
     }

@@ -135,7 +135,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
     if ahead.slide is not None:
         found["steeper_than_held"] = (
             f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "
-            f"{math.degrees(ahead.slide.held_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
+            f"{math.degrees(ahead.slide.holding_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts

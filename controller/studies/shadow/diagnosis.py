@@ -233,7 +233,7 @@ class Constants:
             slip_rad=slip_rad if slip_rad.any() else None,
         )
 
-    def spoken(self, cause: Cause, values: Floats) -> tuple[float, ...]:
+    def reported(self, cause: Cause, values: Floats) -> tuple[float, ...]:
         """Return the numbers of a cause as people say them."""
         if cause == "friction":
             return tuple(float(1.0 + value) for value in values)
@@ -374,7 +374,7 @@ class Signatures:
         for k, (values, rest, slopes) in refined.items():
             cause, at, parts = constants.causes[k]
             evidence = likely.cause(rest, slopes, values, constants.faulty[parts]) - well
-            named.append(NamedCause(cause, at, evidence, constants.spoken(cause, values)))
+            named.append(NamedCause(cause, at, evidence, constants.reported(cause, values)))
         named.sort(key=lambda one: -one.evidence)
         return Diagnosis(tuple(named), *_residuals(self._goals, apart))
 
