@@ -112,7 +112,6 @@ def _shipped(name: str) -> ServoModel:
 
 @cache
 def _shipped_data(name: str) -> tuple[dict[str, Any], str]:
-    """Merged data of a shipped model, and its text."""
     path = FOLDER / f"{name}.toml"
     data, text = read_toml(path)
     return _merged(path, data, 1), text

@@ -182,5 +182,4 @@ def _limb_joints(pairs: tuple[str, ...]) -> tuple[LimbJoint, ...]:
 
 @cache
 def _even_ends(links: int) -> tuple[float, ...]:
-    """Ends of links of the same length, in units of that length."""
     return tuple(float(k) for k in range(links + 1))

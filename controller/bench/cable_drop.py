@@ -301,7 +301,6 @@ def _step_stays(step_v: Floats, cable: int) -> bool:
 
 
 def _block_error(values: Floats) -> Floats:
-    """Standard errors of the means of columns, from the scatter of the means of blocks."""
     means = np.stack([block.mean(axis=0) for block in np.array_split(values, _BLOCKS)])
     return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS))
 

@@ -83,7 +83,6 @@ class LiveScreen:
 
 
 def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
-    """Draw what comes until the server is gone."""
     give_way()
     decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
     screen = PlainConsole(file=sys.stderr)

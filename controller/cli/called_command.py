@@ -134,7 +134,6 @@ def called(
 
 
 def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
-    """Return the options for which a parameter of a command stands."""
     group = parameter.annotation
     if not is_dataclass(group):
         return [parameter]

@@ -267,7 +267,6 @@ def _ground(record: RunRecord) -> Json:
 
 
 def _water(record: RunRecord) -> Iterator[Json]:
-    """The surface, seen through."""
     surface_m = water_surface_m(record.header.world, record.header.ground)
     if surface_m is not None:
         middle_m, size_m = surface_m

@@ -233,7 +233,6 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._result()
 
     def _open(self, initial: InitialPose) -> SimulatedRobot:
-        """Put a robot on the ground."""
         prepared = self._prepared
         return simulated(prepared.run, prepared.robot, prepared.world, prepared.ground, initial)
 
@@ -400,7 +399,6 @@ def _fill(
 
 
 def _names(robot: RobotConfig) -> tuple[str, ...]:
-    """Name of each number of an observation."""
     kinds = ("measured", "rad"), ("velocity", "rad_s"), ("current", "a"), ("sent", "rad")
     joints = [f"{of}_joint{k}_{unit}" for of, unit in kinds for k in range(robot.joint_count)]
     body = ("up_forward", "up_left", "up_up", "heading_cos", "heading_sin")

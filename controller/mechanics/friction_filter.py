@@ -43,7 +43,6 @@ class _Square(NamedTuple):
 
     @property
     def inverse(self) -> "_Square":
-        """Inverse of a positive definite matrix."""
         whole = self.uu * self.vv - self.uv * self.uv
         return _Square(self.vv / whole, -self.uv / whole, self.uu / whole)
 
@@ -52,11 +51,9 @@ class _Square(NamedTuple):
         return _Square(*(a + times * b for a, b in zip(self, other, strict=True)))
 
     def times(self, u: float, v: float) -> tuple[float, float]:
-        """Product with a vector."""
         return self.uu * u + self.uv * v, self.uv * u + self.vv * v
 
     def about(self, u: float, v: float) -> float:
-        """Quadratic form of a vector."""
         a, b = self.times(u, v)
         return u * a + v * b
 

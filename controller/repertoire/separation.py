@@ -141,7 +141,6 @@ def _boxes(points, scale, radius):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _apart(box, i, j):  # type: ignore[no-untyped-def]
-    """Whether two boxes have no common point."""
     across = box[i, 0] > box[j, 1] or box[j, 0] > box[i, 1]
     return across or box[i, 2] > box[j, 3] or box[j, 2] > box[i, 3]
 
@@ -174,7 +173,6 @@ def _stop(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _is_clear(points, scale, radius, i):  # type: ignore[no-untyped-def]
-    """Whether body i intersects no other one."""
     box = _boxes(points, scale, radius)
     for j in range(len(points)):
         if j == i or _apart(box, i, j):

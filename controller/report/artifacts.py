@@ -130,7 +130,6 @@ def _write_page(
 
 
 def _film(record: RunRecord, path: Path, fine: bool, look: str, notes: list[str]) -> bool:
-    """Draw the film; return whether it was drawn."""
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:

@@ -125,7 +125,6 @@ class RunEnd:
         self._line.close()
 
     def _next(self) -> bool:
-        """Whether there is anything to send."""
         if len(self._out):
             return True
         if self._kept:
@@ -164,7 +163,6 @@ class RunEnd:
             self._in.clear()
 
     def _end_line(self) -> None:
-        """Accept or reject the line that is complete."""
         size, line = self._in_bytes, bytes(self._in)
         self._in_bytes = 0
         self._in.clear()

@@ -227,7 +227,6 @@ class RunLog:
             self._write_batch()
 
     def _flush(self) -> None:
-        """Give all rows to the operating system."""
         self._write_batch()
         self._writer.flush()
 
@@ -272,7 +271,6 @@ class RunLog:
 
 
 def _kept(row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a row whose arrays nobody changes."""
     return {
         name: value.copy() if isinstance(value, np.ndarray) and value.flags.writeable else value
         for name, value in row.items()

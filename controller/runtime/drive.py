@@ -223,7 +223,6 @@ class Drive:
 
     @property
     def _waypoints(self) -> int:
-        """How many are in force."""
         return len(self._run.waypoints_m if self._waypoints_m is None else self._waypoints_m)
 
     def run(self) -> Outcome:
@@ -323,7 +322,6 @@ class Drive:
                 )
 
     def _log_battery(self, time_s: float, state: JointState) -> None:
-        """Log supply and load once a second."""
         load = self._load
         if load is None or time_s < self._battery_s + BATTERY_S:
             return

@@ -165,7 +165,6 @@ class _PaperBody:
         self.joints = joints
 
     def view(self) -> BodyView:
-        """Return the body in the world."""
         pose = pose_at(self._head_m, self._head_rad)
         return body_in_world(self._robot, pose, self.joints)
 

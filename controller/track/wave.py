@@ -122,7 +122,6 @@ def measure_wave(track: Track) -> Wave:
 
 
 def _of_runs(track: Track, number: Ints) -> Wave:
-    """Wave of a recording with gaps, from runs of frames."""
     curvature = smooth_curvature(track.angles_rad)
     found = gapped_wave(number, curvature)
     slope = _slope(found.mode)

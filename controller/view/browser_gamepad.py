@@ -159,7 +159,6 @@ class BrowserGamepad:
 
     @property
     def _is_free(self) -> bool:
-        """Whether another gamepad may steer."""
         return self._steers is None or self.is_stale
 
     def take(self, source: Hashable, message: str | bytes) -> bool:

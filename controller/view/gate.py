@@ -156,7 +156,6 @@ def _is_address(name: str) -> bool:
 
 
 def _is_of(origin: str, host: str) -> bool:
-    """Whether an origin is the page that is served at a host."""
     try:
         place = urlsplit(origin)
     except ValueError:

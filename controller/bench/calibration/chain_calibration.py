@@ -226,11 +226,9 @@ class _Steps:
 
     @property
     def known(self) -> CalibrationProgress:
-        """The progress so far."""
         return self.journal.known
 
     def label(self, servo_id: int) -> str:
-        """Label of the joint that a servo moves."""
         return joint_label(self.like.joint_names[self.known.bends[servo_id].joint], servo_id)
 
     def ask(self, observer: Observer, servo_id: int, wiggle: Callable[[], None]) -> None:

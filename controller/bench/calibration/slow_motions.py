@@ -288,7 +288,6 @@ class CalibrationBench:
             raise
 
     def _tripped(self, reason: str, state: JointState) -> Exception:
-        """Error for a latch with this state."""
         overloaded = np.flatnonzero(state.hardware_error & Alarm.OVERLOAD)
         if len(overloaded):
             ids = ", ".join(str(self._robot.servo_ids[row]) for row in overloaded)

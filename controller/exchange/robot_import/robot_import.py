@@ -196,7 +196,6 @@ def _keys(
     joints: list[dict[str, object]],
     legs: list[LegPair],
 ) -> dict[str, object]:
-    """Keys of a robot's file."""
     radius_m = max(link.radius_m for link in links)
     keys: dict[str, object] = {
         "name": name,
@@ -247,7 +246,6 @@ def _limb_keys(pair: LegPair, scale: float) -> dict[str, object]:
 def _plan_limits(
     source: ModelSource, joints: set[str], servo_model: str, notes: list[str]
 ) -> dict[str, object]:
-    """Torque and speed that a plan may use, from the limits of the model's joints."""
     keys: dict[str, object] = {}
     efforts = [value for name, value in source.effort_n_m.items() if name in joints]
     speeds = [value for name, value in source.speed_rad_s.items() if name in joints]

@@ -141,7 +141,6 @@ def stereo(
 
 
 def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list[str]:
-    """Faults of the options of the camera's stand."""
     faults = [
         f"{option} {angle:g}: must be within 90 degrees"
         for option, angle in (("--tilt", tilt or 0.0), ("--roll", roll))

@@ -104,7 +104,6 @@ def plan(
 
 
 def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
-    """Return the figures of a run on paper, and its warnings."""
     ahead = prepared.forecast()
     found: dict[str, object] = {
         "run": prepared.run.name,
@@ -149,7 +148,6 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
 
 
 def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
-    """Return slopes of the ground along the path, and warnings about them."""
     relief = path_relief(prepared.planner, prepared.path)
     facts: dict[str, object] = {
         "slope_median_deg": _deg(relief.median_slope_rad),
