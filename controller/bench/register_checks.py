@@ -1,7 +1,7 @@
-"""Settings that other programs left in the servos' registers, against those that a run expects.
+"""Register values of other programs, against those that a run expects.
 
-A value that a factory or a run sets gives no finding. A run sets most others by itself and reports
-it; the doctor names them for users of other programs.
+Factory values and those of a run give no finding. A run sets most others and reports them; the
+doctor names them for users of other programs.
 """
 
 import math

@@ -1,7 +1,6 @@
-"""A log as Foxglove opens it in 3-D: body, ground, path and waypoints, joints and events.
+"""A log for Foxglove in 3-D: body, ground, path and waypoints, joints and events.
 
-An MCAP file of Foxglove's well-known messages in JSON, which needs no package. Frames and joints
-have the names of ``robot export``.
+The MCAP file has Foxglove's well-known messages in JSON, which needs no package.
 """
 
 from collections import Counter

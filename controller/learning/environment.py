@@ -1,8 +1,7 @@
-"""A snake of simulated servos as a Gymnasium environment: a step is a control cycle on the bus.
+"""A snake of simulated servos as a Gymnasium environment: a step is a control cycle.
 
-Everything between the action and the physics equals that of a run: the safety link vets the goals,
-the chain turns them into packets, and simulated servos answer on a simulated line. A learnt policy
-has met clamps, wire time, quantised readings and servo lag.
+Between action and physics everything equals a run: safety link, packets, simulated servos and line.
+A policy thus meets clamps, wire time, quantised readings and servo lag.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,9 +1,8 @@
 """Bodies of a crowd that do not intersect: a body that would enter another one waits.
 
-A body is a chain of capsules along its links, seen from above. A frame is tried for all bodies.
-While two of them intersect, the one whose motion alone makes them meet returns to where it was.
-Bodies that all return are apart, as they were before, so a start without intersections keeps its
-property for ever.
+A body is a chain of capsules along its links, seen from above. In each frame, while two bodies
+intersect, the one whose motion makes them meet returns to its former place. Bodies that all return
+do not intersect, so a start without intersections keeps this property.
 """
 
 from typing import Final

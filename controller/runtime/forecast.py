@@ -1,9 +1,8 @@
-"""A run on paper: the pilot steers a quasi-static body, so that a plan is checked before torque.
+"""A run on paper: the pilot steers a quasi-static body, to check a plan before torque.
 
-Each step asks the pilot for joint goals, lets the shape change, and finds the rigid velocity that
-balances Coulomb friction and the pull of the slope under each link
-(``controller.mechanics.rigid_motion``). No servo lag; inertia only where nothing holds the body.
-Links lie flat in plan, bear equal weights.
+In each step the shape follows the pilot's goals, and the rigid velocity balances Coulomb friction
+and gravity under each link (``controller.mechanics.rigid_motion``). Servos do not lag, and inertia
+counts only where nothing holds the body. Links lie flat in plan with equal weights.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
-"""A gamepad at the computer of the page's user: the browser sends its state, this process reads it.
+"""A gamepad at the computer of the page's user.
 
-viser has no support for it, so a script of our own in the page sends the state of the gamepad to a
-socket of its own behind the gate. It sends when the state changes, and ten times a second while it
-does not. It sends no state before the last one was received, so that none waits on the way.
+viser does not support gamepads. A script in the page sends the state to a socket behind the gate,
+at changes and ten times a second, and only after the last state was received.
 """
 
 import math
@@ -131,9 +130,9 @@ class _Source:
 
 
 class BrowserGamepad:
-    """The gamepad that steers, of all browsers that have the page open; any of them may stop.
+    """The steering gamepad among all browsers with the page; any of them may stop.
 
-    ``take`` and ``leave`` are called by the threads of the page's server.
+    The threads of the page's server call ``take`` and ``leave``.
     """
 
     path = PATH

@@ -1,9 +1,9 @@
 """Robot models of other programs as robot files: ``snakewalk robot import``.
 
-MuJoCo reads the model. The joints' axes, order and ranges, and the links' lengths, masses and radii
-are taken from it. Links here are straight, have their joints on one line and their mass spread
-evenly about it. Other properties of a model are rejected, or reported in a note. An anchor may lie
-anywhere along its own axis, which changes no motion: anchors are moved there to the line.
+MuJoCo reads axes, order and ranges of the joints, and lengths, masses and radii of the links. Links
+here are straight, with their joints on one line and their mass spread evenly about it. Other
+properties are rejected, or reported in a note. An anchor is moved along its axis to the line, which
+changes no motion.
 """
 
 import math
