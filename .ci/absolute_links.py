@@ -9,7 +9,9 @@ import tomllib
 from pathlib import Path
 
 PICTURES = (".webp", ".jpg", ".png", ".svg")
-LINK = re.compile(r"""(?<=\]\()(?:docs|examples)/[^)\s]+|(?<=src=")docs/[^"]+""")
+LINK = re.compile(
+    r"""(?<=\]\()(?:(?:docs|examples)/[^)\s]+|CONTRIBUTING\.md)|(?<=src=")docs/[^"]+"""
+)
 
 
 def absolute(text: str, source_url: str) -> str:

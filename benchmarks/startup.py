@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 from benchmarks.rows import Row
-from snakewalk.controller.console.plugins import own_plugins
+from snakewalk.controller.console.plugins import builtin_plugins
 
 TITLE = "start of the program"
 TRIES = 5
@@ -21,7 +21,7 @@ def run() -> list[Row]:
     starts = ("--help", "--version", "run --help")
     for words in starts:
         rows.append(_row(words, min(_start_s(words) for _ in range(TRIES)), base_s))
-    names = [each.name for each in own_plugins() if each.kind == "command"]
+    names = [each.name for each in builtin_plugins() if each.kind == "command"]
     first = sorted(((_start_s(f"{name} --help"), name) for name in names), reverse=True)
     slowest = max((min(_start_s(f"{n} --help") for _ in range(TRIES)), n) for _, n in first[:5])
     rows.append(_row(f"slowest help of {len(names)} commands: {slowest[1]}", slowest[0], base_s))

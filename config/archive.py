@@ -212,7 +212,6 @@ def read_arrays(
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> "NDArray[Any]":
-    """One array; its header must not promise more than the archive has."""
     import numpy as np  # noqa: PLC0415  a TOML file needs none
 
     with archive.open(member) as stream:

@@ -141,7 +141,6 @@ def _shipped(kind: Kind) -> list[str]:
 
 
 def _comment(kind: Kind, name: str) -> str:
-    """Head comment of a shipped file."""
     lines = locate(kind, name).read_text(encoding="utf-8").splitlines()
     return " ".join(line.removeprefix("# ") for line in takewhile(_is_comment, lines))
 

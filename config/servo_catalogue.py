@@ -1,6 +1,7 @@
 """Servo models by name, by number or by file."""
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -39,10 +40,14 @@ def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
     """
     path = model_file(name_or_path, beside)
     if path is None:
-        shown = ", ".join(shipped_models())
+        shipped = shipped_models()
+        name = name_or_path.upper()
+        series = [each for each in shipped if each.startswith(name[:2])] or shipped
+        near = ", ".join(get_close_matches(name, series, 5, 0.2))
+        similar = f"similar are {near} ({len(shipped)} are in {FOLDER}); " if near else ""
         raise ConfigError(
-            f"{name_or_path}: no such servo model; shipped are {shown}; describe another one in a "
-            "file: docs/how-to/add-a-servo-model.md"
+            f"{name_or_path}: no such servo model; {similar}describe another one in a file: "
+            "docs/how-to/add-a-servo-model.md"
         )
     return _shipped(path.stem) if path.parent == FOLDER else _read(path)
 
@@ -107,7 +112,6 @@ def _shipped(name: str) -> ServoModel:
 
 @cache
 def _shipped_data(name: str) -> tuple[dict[str, Any], str]:
-    """Merged data of a shipped model, and its text."""
     path = FOLDER / f"{name}.toml"
     data, text = read_toml(path)
     return _merged(path, data, 1), text

@@ -135,7 +135,6 @@ def _parts(key: str) -> list[str]:
 
 
 def _keys(kind: Any) -> Iterator[str]:
-    """Keys of a schema and of all its tables."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         for name, field in kind.model_fields.items():
             yield name

@@ -40,7 +40,6 @@ def _table(
     place: str,
     without: Collection[str] = (),
 ) -> Iterator[str]:
-    """Lines of a table, then of its tables; all comments if nothing is given."""
     inner: list[str] = []
     for key, field in model.model_fields.items():
         where = f"{place}.{key}".removeprefix(".")
@@ -111,7 +110,6 @@ def robot_toml(robot: RobotConfig, comment: str = "") -> str:
 
 
 def _plain_table(data: Mapping[str, Any], place: str) -> Iterator[str]:
-    """Lines of a table's values, then of its tables, then of its rows of tables."""
     tables = {key: value for key, value in data.items() if isinstance(value, Mapping)}
     rows = {key: value for key, value in data.items() if _is_rows(value)}
     for key, value in data.items():

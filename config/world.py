@@ -217,7 +217,7 @@ class PoleObstacle(Strict):
     at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of its middle")
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
 
-    def stands_at(self, x_m: float, y_m: float) -> bool:
+    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether no body can be at this place of the floor."""
         return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
 
@@ -232,7 +232,7 @@ class PipeObstacle(Strict):
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
 
-    def stands_at(self, x_m: float, y_m: float) -> bool:
+    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether this place is unreachable: nothing enters the pipe from outside."""
         return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
 
@@ -271,7 +271,7 @@ class PegsObstacle(Strict):
                 found.append((x_m, self.at_m[1] + along * self.spacing_m))
         return tuple(found)
 
-    def stands_at(self, x_m: float, y_m: float) -> bool:
+    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether a peg is at this place of the floor."""
         return any(math.dist(peg_m, (x_m, y_m)) <= self.radius_m for peg_m in self.places_m())
 
@@ -290,7 +290,7 @@ class CorridorObstacle(Strict):
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
     friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
 
-    def stands_at(self, x_m: float, y_m: float) -> bool:
+    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether a wall is at this place of the floor."""
         along_m, across_m = abs(x_m - self.at_m[0]), abs(y_m - self.at_m[1])
         inner_m = 0.5 * self.width_m

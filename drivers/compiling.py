@@ -98,7 +98,6 @@ _UNCOUNTED = {"_nrt": False}
 
 
 def _doubled(values: Any) -> float:
-    """Double all values but the first; return the sum of a view of them."""
     total = 0.0
     behind = values[1:]
     for k in range(len(behind)):

@@ -97,7 +97,6 @@ class Imu:
         }
 
     def _set(self, name: str, value: int) -> None:
-        """Set a register, if the device has it."""
         register = self._public.registers.get(name)
         if register is not None:
             data = np.frombuffer(register.encode(value), np.uint8)

@@ -265,7 +265,6 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _ranges_are_within_a_turn(self) -> Self:
-        """Check that each joint's range is within one turn of its servo."""
         for joint, (limit_rad, facts) in enumerate(
             zip(self.limit_rad, self.servo_records, strict=True)
         ):
@@ -317,7 +316,6 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _is_spelled_canonically(self) -> Self:
-        """Give the same robot the same spelling, whatever its file."""
         for keys in (canonical_links(self), canonical_joints(self)):
             self.__dict__.update(keys)  # frozen from here on
         return self

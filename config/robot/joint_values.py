@@ -174,5 +174,4 @@ class JointValues(LinkValues):
 
 @cache
 def _joints_about(axes: str, axis: str) -> tuple[int, ...]:
-    """Indices of the joints with this axis; cached for the control cycle."""
     return tuple(i for i, other in enumerate(axes) if other == axis)

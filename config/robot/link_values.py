@@ -99,7 +99,7 @@ class LinkValues(RobotKeys):
         return self._of_links("mass_kg", parsed(self, "link_mass_kg"))
 
     @property
-    def middles_apart_m(self) -> float:
+    def centre_distance_m(self) -> float:
         """Distance along the spine between the middles of the first and the last link."""
         lengths_m = self.link_lengths_m
         if len(set(lengths_m)) == 1:
@@ -182,5 +182,4 @@ def _limb_joints(pairs: tuple[str, ...]) -> tuple[LimbJoint, ...]:
 
 @cache
 def _even_ends(links: int) -> tuple[float, ...]:
-    """Ends of links of the same length, in units of that length."""
     return tuple(float(k) for k in range(links + 1))

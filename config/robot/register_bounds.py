@@ -103,7 +103,6 @@ def _fault(
 
 
 def _key(robot: JointValues, joint: int, key: str) -> str:
-    """Where a value comes from."""
     if robot.joints and getattr(robot.joints[joint], key) is not None:
         return f"joints: {robot.joint_label(joint)}: {key}"
     pitch = robot.all_axes[joint] == "p"

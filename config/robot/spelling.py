@@ -149,5 +149,4 @@ def _fold(
 
 
 def _commonest(values: Iterable[V]) -> V:
-    """Most frequent value, the first of several."""
     return Counter(values).most_common(1)[0][0]

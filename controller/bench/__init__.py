@@ -1,6 +1,5 @@
-"""Service of a bus: ``scan`` lists servos, ``servo_settings`` changes one, ``sniff`` taps the line.
+"""Bench tools: list, examine, set up and calibrate the servos of a bus.
 
-``doctor`` examines whether a bus is fit for a run. Each of its checks (``adapter``,
-``servo_checks``) makes findings from the readings; their order ensures that no fault hides the
-next. Only ``servo_settings`` writes to a servo.
+The order of ``doctor``'s checks ensures that no fault hides the next. Only ``servo_settings``
+writes to a servo.
 """

@@ -1,7 +1,7 @@
-"""Voltage drop of the cables along a chain, and the best place for another lead of the supply.
+"""Voltage drop of the cables along a chain, and the best place for another supply lead.
 
-The voltages that the servos measure under load give the resistance of each cable between them. A
-ladder of such cables predicts the effect of another place to inject power.
+Voltages under load give the resistance of each cable. A ladder of these cables predicts the effect
+of another lead.
 """
 
 from collections.abc import Sequence
@@ -74,9 +74,8 @@ def estimate_cables(voltage_v: Floats, drawn_a: Floats, leads: Cabling) -> Cable
     """Estimate the cables from T readings of S servos under load.
 
     The mean step of the voltage over a cable is the mean current in it times its resistance. The
-    current follows from the currents of the servos (Kirchhoff). A bad cable is detected against the
-    median of all, which it does not move. The others' resistance is their mean, weighted by the
-    current.
+    currents of the servos give it (Kirchhoff). The median of all reveals a bad cable; the others'
+    resistance is their mean, weighted by the current.
 
     Args:
         voltage_v: (T, S) in steps of 0.1 V.
@@ -124,10 +123,9 @@ def _flow(
 ) -> tuple[Floats, Floats]:
     """Current in each cable, positive away from the first servo, and its standard error, (S - 1,).
 
-    Outside the leads it is what the servos beyond draw. Between two leads, the cables decide how
-    the current divides. If most are alike, the step falls from cable to cable by the current of the
-    servo between them times their resistance; no current flows where the step is 0. Line and slope
-    are medians (Theil, Sen), so that a bad cable does not move them.
+    Outside the leads it is the current of the servos beyond. Between two leads of equal cables, the
+    voltage step falls by the servo's current times the resistance, so no current flows where the
+    step is 0. Line and slope are medians (Theil, Sen), which a bad cable does not move.
     """
     passed_a = np.cumsum(drawn_a)[:-1]  # of all servos up to the cable
     rows = np.flatnonzero(fed)
@@ -156,7 +154,7 @@ def best_injection(
     drawn_a: Floats,
     count: int = 1,
 ) -> Injection:
-    """Place ``count`` more leads so that the lowest voltage is the highest that they can make it.
+    """Place ``count`` more leads for the highest possible lowest voltage.
 
     Args:
         cabling: cables, and the leads that there are.
@@ -198,14 +196,14 @@ def drop_along(robot: RobotConfig, power: PowerConfig, current_a: float) -> Drop
 
 
 def leads_of(robot: RobotConfig, voltage_v: Floats) -> tuple[Cabling, str]:
-    """Where power comes in: as the robot's file says, else at the end that has more volts.
+    """Leads of the robot's file, or one at the end with the higher voltage.
 
     Args:
         robot: with or without a table ``[power]``.
         voltage_v: (S,) under load.
 
     Returns:
-        Cables as the file has them, or as new ones; a note where the file does not say it.
+        Cables of the file or new ones; a note if the file has none.
 
     """
     if robot.power is not None:
@@ -271,7 +269,7 @@ def advice(cabling: Cabling, servo_ids: Sequence[int], source_v: float, drawn_a:
 
 
 def drawn_a(robot: RobotConfig, duty: Floats, current_a: Floats) -> Floats:
-    """Supply current of servos, A: the share of the bridges, and that of the electronics.
+    """Supply current of servos, A: bridges and electronics.
 
     Args:
         robot: its models.
@@ -292,25 +290,23 @@ def _standby_a(robot: RobotConfig) -> Floats:
 
 
 def _step_stays(step_v: Floats, cable: int) -> bool:
-    """Whether the voltage stays down behind a cable: one servo that measures too little does not.
+    """Whether the voltage stays down behind a cable.
 
-    A servo whose own reading is off makes one step down and the next one up.
+    A servo with a wrong reading makes one step down and the next one up.
     """
     beside = [step_v[k] for k in (cable - 1, cable + 1) if 0 <= k < len(step_v)]
     return all(each > -0.5 * step_v[cable] for each in beside)
 
 
 def _block_error(values: Floats) -> Floats:
-    """Standard errors of the means of columns, from the scatter of the means of blocks."""
     means = np.stack([block.mean(axis=0) for block in np.array_split(values, _BLOCKS)])
     return np.asarray(means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS))
 
 
 def _rounding_errors(voltage_v: Floats) -> tuple[Floats, Floats]:
-    """Errors of the means before and behind each cable that the rounding to 0.1 V leaves.
+    """Errors of the means before and behind each cable from rounding to 0.1 V.
 
-    A reading that changes often rounds up as often as down; one that stands still may be off by the
-    whole rounding.
+    A changing reading averages the rounding; a constant one may be off by all of it.
     """
     changes = (np.diff(voltage_v, axis=0) != 0.0).sum(axis=0)
     error_v = VOLTAGE_UNIT_V / np.sqrt(12.0) / np.sqrt(1.0 + changes)

@@ -134,7 +134,6 @@ def examine(
 def _find(
     port: BytePort, models: Mapping[int, ServoModel], expected: Sequence[int], latency_s: float
 ) -> tuple[DynamixelBus, Collection[int]]:
-    """The bus, and the servos that reply; the bus waits longer if all replies are later."""
     bus = servo_bus(port, models, latency_s=latency_s)
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
@@ -289,7 +288,6 @@ def _readable(
     noise: Finding | None,
     findings: list[Finding],
 ) -> list[int]:
-    """Return the servos that reply to reads, alone under their ID; adds a finding on the others."""
     probes = (*pings, *reads)
     shared = {p.servo_id for p in probes if p.doubled}
     if noise is None:
@@ -383,7 +381,6 @@ def _unreadable(error: BusError, noise: Finding | None) -> Finding:
 def _at_other_bauds(
     bus: DynamixelBus, missing: Sequence[int], on_progress: Callable[[str], None]
 ) -> dict[int, int]:
-    """Baud rate of each missing servo that answers at another one."""
     if not missing:
         return {}
     port = bus.port

@@ -1,7 +1,7 @@
-"""The persistent settings of servos as a file: read from a bus, compared, written back.
+"""Persistent settings of servos as a file: read, compared and restored.
 
-ID, baud rate and protocol stay as they are: they are needed to find a servo, and a replacement has
-received its ID before.
+ID, baud rate and protocol stay: they are needed to find a servo, and a replacement has its ID
+already.
 """
 
 import json

@@ -1,8 +1,7 @@
-"""Emergency stop: has the runs of other programs latch. It imports little, to be quick.
+"""Emergency stop: latches the runs of other programs; imports little, to be quick.
 
-A run is asked through its stop button, and latches within a control cycle. A run that does not
-answer is terminated (its safe link switches torque off at the exit). If it does not end either, it
-is killed; then the bus watchdogs stop the servos, and ``torque_off`` does the rest.
+The stop button of a run latches it within a cycle. A run that does not reply is terminated, so that
+its safe link switches torque off; then it is killed, and the bus watchdogs stop the servos.
 """
 
 import os
@@ -58,7 +57,7 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
         port: the run that holds this device, or URL; of several (``1-8=PORT,9-16=PORT``) any.
         run: name, folder, log or process of a run.
 
-    With neither: all that hold a port; where none does, the newest in simulation.
+    With neither: all runs that hold a port, else the newest simulated one.
 
     """
     every = list(stoppable_runs())

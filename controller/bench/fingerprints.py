@@ -15,7 +15,7 @@ from snakewalk.drivers.chain.fingerprint_file import (
     FingerprintFile,
     changes,
     missing_registers,
-    own_file,
+    user_file,
 )
 from snakewalk.drivers.errors import BusError
 
@@ -31,7 +31,7 @@ def fingerprint_file(robot: str, option: str) -> FingerprintFile:
         InputError: the robot is shipped, or has no file.
 
     """
-    path = own_file(robot)
+    path = user_file(robot)
     if path is None:
         raise InputError(
             f"{option}: {robot} has no fingerprint file; name a robot's file of your own: "

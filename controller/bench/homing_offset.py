@@ -1,8 +1,8 @@
-"""Zeros of a robot in its servos: out of the robot's file, into Homing Offset.
+"""Moves the zeros of a robot's file into the servos' Homing Offset.
 
-A DYNAMIXEL servo adds register 20 to its position. The sign stays if Drive Mode(10) is reversed, as
-the manual says. A Feetech servo subtracts register 31. Each write is checked: the position of a
-resting shaft must change by as much as the register.
+A DYNAMIXEL servo adds register 20 to its position, with the same sign in reverse mode. A Feetech
+servo subtracts register 31. After each write the position of a resting shaft must change by as
+much.
 """
 
 import math
@@ -74,9 +74,9 @@ def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ..
 
 @contextmanager
 def homing_written(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> Iterator[None]:
-    """Torque off, write, read back, and see that the position has moved with it.
+    """Torque off, write, read back, and check that the position has moved with it.
 
-    If that, or what is done in the context, fails, all servos get their old offsets again.
+    If that or the context's body fails, all servos get their old offsets again.
 
     Raises:
         BusError: a servo does not obey; names those that may have their new offset.

@@ -62,10 +62,9 @@ def second_master(overheard: Overheard) -> Finding:
 def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) -> Finding | None:
     """Damage that does not come from a single servo; None if one ID has all or nothing is damaged.
 
-    Two servos with one ID damage their own replies: either all of a kind, or, where they differ by
-    little, some. Noise spares nobody, and hits now this reply, now that. So it is noise if bytes
-    came that nobody had asked for, if two IDs or more have some replies whole and others damaged,
-    or if all of several IDs have nothing but damage.
+    Two servos with one ID damage only their own replies: all, or some of them. So it is noise if
+    unrequested bytes arrived, if two IDs or more have complete and damaged replies, or if all of
+    several IDs have only damaged ones.
 
     Args:
         pings: of the robot's IDs.

@@ -1,7 +1,6 @@
-"""The live table of a served bus, drawn by a process of its own.
+"""Live table of a served bus, drawn by a separate process.
 
-Drawing is slower than a servo's reply may be. A thread would not help: while it draws it holds the
-interpreter for 5 ms at a time, at each byte that the serving thread waits for.
+A thread would hold the interpreter for 5 ms at a time, longer than the delay of a reply.
 """
 
 import sys
@@ -83,7 +82,6 @@ class LiveScreen:
 
 
 def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
-    """Draw what comes until the server is gone."""
     give_way()
     decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
     screen = PlainConsole(file=sys.stderr)

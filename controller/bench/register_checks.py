@@ -1,7 +1,7 @@
-"""Settings that other programs left in the servos' registers, against those that a run expects.
+"""Register values of other programs, against those that a run expects.
 
-A value that a factory or a run sets gives no finding. A run sets most others by itself and reports
-it; the doctor names them for users of other programs.
+Factory values and those of a run give no finding. A run sets most others and reports them; the
+doctor names them for users of other programs.
 """
 
 import math
@@ -160,7 +160,6 @@ class _Checks:
         ]
 
     def _at(self, name: str) -> str:
-        """Name of a register with its address."""
         row = self._facts.registers.get(name)
         return name if row is None else f"{name}({row.address})"
 
@@ -247,7 +246,6 @@ class _Checks:
         ]
 
     def _not_factory(self, check: str, register: str, remedy: str) -> Finding | None:
-        """Registers of the EEPROM that neither a factory nor a run sets to this value."""
         found = [
             f"{self._robot.joint_label(servo.joint)}: {register} {value}, factory {usual}"
             for servo in self._servos

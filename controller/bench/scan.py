@@ -230,7 +230,6 @@ def _result(port: BytePort, baud: int, reply: StatusPacket, tries: int | None) -
 
 
 def _other(port: BytePort, device_id: int, number: int) -> str:
-    """Name of a device whose model number is not known."""
     published = imu_model(number)
     if published is not None:
         return published

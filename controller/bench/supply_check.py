@@ -123,7 +123,6 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
 
 
 def _supply_block(bus: ChainBus, robot: RobotConfig, *, fast: bool) -> GroupCycle:
-    """Group read of output, current and supply; of the supply alone if a model lacks the block."""
     ids = robot.servo_ids
     if all(_OUTPUT in bus.table_of(each) for each in ids):
         return bus.block(ids, _OUTPUT, "Present Input Voltage", fast=fast)

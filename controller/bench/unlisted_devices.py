@@ -222,7 +222,6 @@ _ALONE = "connect one of them alone and give it another: snakewalk bus set --id 
 
 
 def _state(bus: DynamixelBus, servo_id: int, reply: PingReply) -> tuple[str | None, bool]:
-    """Alarm of a servo, if it has one, and whether its torque is on."""
     try:
         registers = bus.read_each(servo_id, ("Torque Enable", "Hardware Error Status"))
     except (BusError, InputError):

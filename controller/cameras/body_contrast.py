@@ -73,7 +73,7 @@ class BodyContrast:
         high, wide = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
         frame = np.ascontiguousarray(image[high, wide])
         line = to_px(prior.links_m) - (left, top)
-        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.middles_apart_m
+        metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.centre_distance_m
         radius = robot.body_radius_m * metre
         near = np.zeros(frame.shape[:2], dtype=np.uint8)
         _draw(near, line, 2.0 * reach_m * metre)

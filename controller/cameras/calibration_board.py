@@ -119,5 +119,4 @@ class CalibrationBoard:
 
 
 def _on_a_line(places: Floats) -> bool:
-    """Whether corners are on one line and fix no plane."""
     return bool(np.linalg.svd(places - places.mean(axis=0), compute_uv=False)[1] < 1e-6)

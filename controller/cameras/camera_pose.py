@@ -179,7 +179,6 @@ class CameraPose:
         self._place(fit, detection.time_s)
 
     def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
-        """Choose the head's end by the joints' shape; if both fit, by the last estimate."""
         better, worse = sorted(fits, key=lambda fit: fit.error_m)
         apart = worse.error_m > MISFIT * self._robot.mean_link_length_m
         if apart and better.error_m < DECISIVE * worse.error_m:
@@ -189,7 +188,6 @@ class CameraPose:
         return max(fits, key=lambda fit: np.cos(fit.heading_rad) * c + np.sin(fit.heading_rad) * s)
 
     def _at(self, time_s: float) -> _Moment:
-        """Joints and drifting pose at the time of a frame, interpolated."""
         if len(self._history) == 1:
             return self._history[0]
         times = np.array([moment.time_s for moment in self._history])
@@ -202,7 +200,6 @@ class CameraPose:
         return _Moment(time_s, one.place + part * change, joints)
 
     def _report_gap(self, now_s: float) -> None:
-        """Report the loss and the return of the body."""
         blind_s = now_s - (self._fixed_s or 0.0)
         if self._gap != (blind_s > GAP_S):
             self._gap = not self._gap

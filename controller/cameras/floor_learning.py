@@ -76,7 +76,7 @@ def _body(
     """(H, W) 255 at the body and its surroundings."""
     links_px = detector.model.in_image(links_at(prior, found), detector.axis_height_m)
     length_px = float(np.hypot(*np.diff(links_px, axis=0).T).sum())
-    metre = length_px / robot.middles_apart_m
+    metre = length_px / robot.centre_distance_m
     mask = np.zeros(detector.background.shape[:2], dtype=np.uint8)
     spots = np.rint(links_px).astype(np.int32).reshape(-1, 1, 2)
     wide_px = 2.0 * (REACH_M + 2.0 * robot.body_radius_m) * metre

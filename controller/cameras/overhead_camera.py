@@ -293,7 +293,6 @@ class OverheadDetector:
         return self._moved_by_texture(image)
 
     def _moved_by_markers(self, first: Self, move: PictureMove, size_px: tuple[int, int]) -> Self:
-        """Return the first detector with this move of its picture, if it differs from now."""
         known, now = self.bump or Bump((0.0, 0.0)), move.bump
         corners = np.array(
             [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
@@ -454,7 +453,6 @@ def _texture(image: Image) -> NDArray[np.float32]:
 def _parts_explained(
     now: NDArray[np.float32], floor: NDArray[np.float32], moved: NDArray[np.float32]
 ) -> int:
-    """Number of picture parts that the move improves, minus those that it worsens."""
     far = _FURTHEST_PX // _HALF
     before, after = (
         cv2.resize(

@@ -38,9 +38,9 @@ class CalledCommand(TyperCommand):
             faults = getattr(error.__cause__, "errors", None)  # pydantic's, behind typer's
             if faults is None:
                 raise
-            fault = dict(faults()[0])
-            text = in_words(fault).rstrip(".")
-            text += "" if repr(fault.get("input")) in text else given(fault)
+            first = dict(faults()[0])
+            text = in_words(first).rstrip(".")
+            text += "" if repr(first.get("input")) in text else given(first)
             raise typer.BadParameter(text, ctx=ctx, param=error.param) from None
         if not ctx.resilient_parsing:  # of completion
             order: list[Any] = self.make_parser(ctx).parse_args(words)[2]
@@ -134,7 +134,6 @@ def called(
 
 
 def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
-    """Return the options for which a parameter of a command stands."""
     group = parameter.annotation
     if not is_dataclass(group):
         return [parameter]

@@ -183,12 +183,10 @@ def _family(path: str, commands: list[Plugin]) -> Any:
     return made
 
 
-def _nothing() -> None:
-    """A family has no options."""
+def _nothing() -> None: ...
 
 
 def _stub(name: str, listed: Plugin) -> Any:
-    """Return a command with its first line only."""
     return TyperCommand(
         name, help=listed.help, rich_help_panel=listed.group or None, rich_markup_mode="rich"
     )
@@ -196,7 +194,7 @@ def _stub(name: str, listed: Plugin) -> Any:
 
 def _full_command(name: str, listed: Plugin) -> Any:
     """Build the options of a command; its module is imported when it is called."""
-    declared = declaration(listed.target) if listed.is_own else None
+    declared = declaration(listed.target) if listed.is_builtin else None
     function: Callable[..., Any] = declared or listed.load()
     info = command_info(function)
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)
@@ -209,7 +207,6 @@ def _full_command(name: str, listed: Plugin) -> Any:
 
 
 def _group_options(command: Any) -> None:
-    """Put the options of a command into groups, the common options first."""
     panels = {name: panel for panel, names in _PANELS.items() for name in names}
 
     def place(parameter: Any) -> int:
@@ -250,5 +247,4 @@ def _options(
         bool,
         typer.Option("--version", help="print the version", is_eager=True, callback=_show_version),
     ] = False,
-) -> None:
-    """Read the options before a command."""
+) -> None: ...

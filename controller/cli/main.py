@@ -23,9 +23,8 @@ _LEFT_OUT = (
     "AVX512F AVX512CD AVX512_KNL AVX512_KNM AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR "
     "X86_V4"
 )
-"""Loops for AVX-512 that numpy, which is imported later, leaves out on x86-64. Their sines and
-exponentials come from another library and differ in the last bit, and so would runs. numpy ignores
-names that its version or the processor does not have."""
+"""Loops for AVX-512 that numpy leaves out on x86-64: their sines and exponentials differ in the
+last bit, and so would runs. numpy ignores unknown names."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _INTERRUPTED = 130

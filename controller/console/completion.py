@@ -49,7 +49,6 @@ def _loader() -> ModuleType:
 
 
 def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
-    """Files with these endings, and folders, in the typed folder."""
     folder, slash, start = incomplete.rpartition("/")
     place = Path(f"{folder}{slash}") if slash else Path()
     if not place.is_dir():

@@ -58,7 +58,6 @@ def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[s
 
 
 def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
-    """Needed names of an import statement."""
     namespace: dict[str, Any] = {}
     if isinstance(node, ast.ImportFrom):
         needed = [each for each in node.names if (each.asname or each.name) in names]
@@ -88,7 +87,6 @@ def _defined(node: ast.stmt) -> Iterator[str]:
 
 
 def _used(node: ast.stmt) -> set[str]:
-    """Return the names that a statement reads."""
     return {
         each.id
         for each in ast.walk(node)

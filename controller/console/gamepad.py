@@ -35,7 +35,7 @@ class Pad:
         self._down: set[int] = set()
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether a dead man's button is held."""
         return bool(self._down)
 
@@ -79,9 +79,9 @@ class Gamepad:
         return f"{self._path}: the gamepad is gone, and its E-STOP with it" if self._gone else None
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether a shoulder button is held; False for a lost pad."""
-        return self._pad.held and not self._gone
+        return self._pad.is_enabled and not self._gone
 
     def __enter__(self) -> Self:
         return self

@@ -43,7 +43,7 @@ def names(text: str) -> list[str]:
 class Keyboard:
     """A terminal in cbreak mode, as a context manager."""
 
-    held = True
+    is_enabled = True
     """A keyboard has no dead man's button."""
 
     def __init__(self, descriptor: int | None = None) -> None:

@@ -35,7 +35,6 @@ class _Screen(logging.Handler):
     """Current standard error; a progress bar redirects it."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a line; a warning names the program."""
         if not getattr(record, FAULT, False):
             start = "snakewalk: " if record.levelno >= logging.WARNING else ""
             print(f"{start}{plain(record.getMessage())}", file=sys.stderr, flush=True)
@@ -54,7 +53,6 @@ class _KeptFile(logging.FileHandler):
         self._has_failed = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a record."""
         if self._has_failed:
             return
         if len(self._lines) < _KEPT_LINES:
@@ -68,7 +66,6 @@ class _KeptFile(logging.FileHandler):
             self._report(error)
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
-        """Report a rejected record."""
         error = sys.exc_info()[1]
         if isinstance(error, OSError):
             self._report(error)
@@ -76,14 +73,12 @@ class _KeptFile(logging.FileHandler):
             super().handleError(record)
 
     def close(self) -> None:
-        """Close the file; report a fault of the disk."""
         try:
             super().close()
         except OSError as error:
             self._report(error)
 
     def _restore(self) -> None:
-        """Restore folder and file with the messages so far."""
         if self.stream is not None:
             self.stream.close()
         Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
@@ -111,7 +106,6 @@ def _print_warning(text: str) -> None:
 
 class _OneLine(logging.Formatter):
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's name
-        """The line of a record without control characters; a traceback follows it."""
         return plain(super().formatMessage(record))
 
 
@@ -169,7 +163,6 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
 
 
 def _tell_end(error: BaseException) -> None:
-    """Log the end of a command; the function that catches the error prints it."""
     elsewhere = {FAULT: True}
     if isinstance(error, InputError):
         for line in error.faults:

@@ -50,7 +50,7 @@ class Plugin:
     """Distribution, or package of snakewalk, that provides it."""
 
     @property
-    def is_own(self) -> bool:
+    def is_builtin(self) -> bool:
         """Whether it is snakewalk's own."""
         return self.package.startswith(f"{OWN}.")
 
@@ -67,7 +67,7 @@ class Plugin:
         except InputError:
             raise
         except Exception as error:
-            if self.is_own:
+            if self.is_builtin:
                 raise
             raise PluginError(
                 f"{self.kind} {self.name} of {self.package}: cannot be imported "
@@ -77,12 +77,14 @@ class Plugin:
 
 def plugins(kind: str | None = None) -> tuple[Plugin, ...]:
     """Return all plug-ins, or those of one kind, snakewalk's own first."""
-    return tuple(each for each in (*own_plugins(), *foreign_plugins()) if kind in (None, each.kind))
+    return tuple(
+        each for each in (*builtin_plugins(), *foreign_plugins()) if kind in (None, each.kind)
+    )
 
 
 def find(kind: str, name: str) -> Plugin | None:
     """Return a plug-in; snakewalk's own have priority."""
-    for offered in (own_plugins, foreign_plugins):
+    for offered in (builtin_plugins, foreign_plugins):
         for each in offered():
             if each.kind == kind and each.name == name:
                 return each
@@ -118,7 +120,7 @@ def unknown(option: str, name: str, valid: Iterable[str]) -> str:
 
 
 @cache
-def own_plugins() -> tuple[Plugin, ...]:
+def builtin_plugins() -> tuple[Plugin, ...]:
     """Return the plug-ins of snakewalk's own packages."""
     manifests = sorted(Path(__file__).parents[1].glob("*/manifest.py"))
     return tuple(

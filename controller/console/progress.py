@@ -117,7 +117,6 @@ class RunBar(ProgressBar):
         super().__exit__(kind, error, trace)
 
     def _is_due(self, progress: "RunProgress") -> bool:
-        """Count a cycle; return whether it updates the bar."""
         self._cycles += 1
         return self._cycles % EVERY == 0 or progress.done
 

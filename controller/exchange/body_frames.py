@@ -1,7 +1,7 @@
-"""Where every link's coordinate frame was during a run, with the names that ``robot export`` gives.
+"""Coordinate frames of all links during a run, named as by ``robot export``.
 
-The frame of ``link0``, the head, is its centre; the frame of every other link is the joint in front
-of it, as in a URDF. x is forward, y left, z up.
+The frame of ``link0``, the head, is at its centre; that of another link at the joint in front, as
+in a URDF. x is forward, y left, z up.
 """
 
 from collections.abc import Iterator

@@ -1,7 +1,6 @@
-"""A log as Foxglove opens it in 3-D: body, ground, path and waypoints, joints and events.
+"""A log for Foxglove in 3-D: body, ground, path and waypoints, joints and events.
 
-An MCAP file of Foxglove's well-known messages in JSON, which needs no package. Frames and joints
-have the names of ``robot export``.
+The MCAP file has Foxglove's well-known messages in JSON, which needs no package.
 """
 
 from collections import Counter
@@ -267,7 +266,6 @@ def _ground(record: RunRecord) -> Json:
 
 
 def _water(record: RunRecord) -> Iterator[Json]:
-    """The surface, seen through."""
     surface_m = water_surface_m(record.header.world, record.header.ground)
     if surface_m is not None:
         middle_m, size_m = surface_m

@@ -1,7 +1,7 @@
-"""A log as a ROS 2 bag: one MCAP file of profile ``ros2`` with messages in CDR. Needs rosbags.
+"""A log as a ROS 2 bag: one MCAP file of profile ``ros2`` with CDR messages. Needs rosbags.
 
-Messages carry the run's clock, which begins near 0 s: play the bag with ``--clock`` and
-``use_sim_time``. Frames and joints have the names of the URDF that ``robot export`` writes.
+Messages have the run's clock, which begins near 0 s: play the bag with ``--clock`` and
+``use_sim_time``.
 """
 
 from collections import Counter

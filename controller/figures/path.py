@@ -95,7 +95,6 @@ def draw_ground(axes: Axes, ground: HeightField) -> None:
 
 
 def _within(values: Floats, limits: tuple[float, float]) -> slice:
-    """Slice of the rising values inside limits, at least two."""
     first, last = np.searchsorted(values, limits).tolist()
     first = min(max(first, 0), len(values) - 2)
     return slice(first, max(last, first + 2))

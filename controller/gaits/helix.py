@@ -99,8 +99,7 @@ class _Helix(Gait):
     inside: ClassVar[bool]
 
     @abstractmethod
-    def _radius_m(self) -> float:
-        """Radius of the centre line."""
+    def _radius_m(self) -> float: ...
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params

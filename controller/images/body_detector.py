@@ -177,7 +177,6 @@ def make_detector(
 
 
 def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) -> "_Candidate":
-    """Return the best ground for some frames."""
     surface = replace(
         plain,
         polarity=usual_polarity(frames, None),

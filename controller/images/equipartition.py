@@ -88,7 +88,6 @@ class _Curve:
         return Equipartition(points, at, chord, method, 1, self.distance(points, at))
 
     def distance(self, points: Floats, at: Floats) -> float:
-        """Mean distance of the curve from its chords."""
         of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
         chord, away = points[of + 1] - points[of], self.curve - points[of]
         share = (away * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), 1e-300)

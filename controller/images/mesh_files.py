@@ -122,7 +122,6 @@ def _unpacked_glb(file: Path) -> int:
 
 
 def _check_pictures(file: Path, scene: Any) -> None:
-    """Check the size of a mesh's pictures before any is unpacked."""
     found = {id(p): p for g in scene.geometry.values() if (p := _picture_of(g.visual)) is not None}
     pixels = sum(picture.width * picture.height for picture in found.values())
     if pixels > MOST_PIXELS:

@@ -228,7 +228,6 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
 
 
 def _images(path: Path, rate_hz: float | None) -> Footage:
-    """Footage of a folder of images, or of one file with many pages."""
     if path.is_dir():
         found = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=in_order)
     else:

@@ -44,7 +44,6 @@ class _RowEnvironment(SnakeEnvironment):
 
     @property
     def prepared(self) -> Any:
-        """Run, robot and world."""
         return self._prepared
 
     def _open(self, initial: InitialPose) -> SimulatedRobot:
@@ -54,7 +53,6 @@ class _RowEnvironment(SnakeEnvironment):
         return _RowRobot(row, row, row.head_pose, None, row.energy)
 
     def send(self, action: Actions) -> None:
-        """Send the goals of a step."""
         self._send(action)
 
     def result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:

@@ -1,8 +1,7 @@
-"""A snake of simulated servos as a Gymnasium environment: a step is a control cycle on the bus.
+"""A snake of simulated servos as a Gymnasium environment: a step is a control cycle.
 
-Everything between the action and the physics equals that of a run: the safety link vets the goals,
-the chain turns them into packets, and simulated servos answer on a simulated line. A learnt policy
-has met clamps, wire time, quantised readings and servo lag.
+Between action and physics everything equals a run: safety link, packets, simulated servos and line.
+A policy thus meets clamps, wire time, quantised readings and servo lag.
 """
 
 from collections.abc import Callable, Sequence
@@ -233,7 +232,6 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._result()
 
     def _open(self, initial: InitialPose) -> SimulatedRobot:
-        """Put a robot on the ground."""
         prepared = self._prepared
         return simulated(prepared.run, prepared.robot, prepared.world, prepared.ground, initial)
 
@@ -400,7 +398,6 @@ def _fill(
 
 
 def _names(robot: RobotConfig) -> tuple[str, ...]:
-    """Name of each number of an observation."""
     kinds = ("measured", "rad"), ("velocity", "rad_s"), ("current", "a"), ("sent", "rad")
     joints = [f"{of}_joint{k}_{unit}" for of, unit in kinds for k in range(robot.joint_count)]
     body = ("up_forward", "up_left", "up_up", "heading_cos", "heading_sin")

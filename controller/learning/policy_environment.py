@@ -1,8 +1,4 @@
-"""The environment of a policy's training; it runs the policy's own motion.
-
-It is ``SnakeEnvironment`` with the eyes and hands of a ``PolicyMotion``: an observation is what the
-motion observes on a robot without a camera, an action changes the motion's wave.
-"""
+"""Environment of a policy's training: a ``PolicyMotion`` on a robot without a camera."""
 
 from typing import Any
 

@@ -1,6 +1,6 @@
-"""Comparison of policies with gaits: speed and cost of each, over seeds that move the start.
+"""Comparison of policies with gaits: speed and cost over seeds.
 
-Each seed draws the start's heading, the ground's friction and the supply, the same for all motions.
+A seed draws heading, friction and supply, the same for all motions.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""A policy's wave by evolution: CMA-ES over its values, on episodes of the environment.
+"""A policy's wave by CMA-ES, on episodes of the environment.
 
 N. Hansen, A. Ostermeier, Completely Derandomized Self-Adaptation in Evolution Strategies,
-Evolutionary Computation 9 (2), 159-195, 2001, as the package ``cma`` has it.
+Evolutionary Computation 9 (2), 159-195, 2001, in the package ``cma``.
 """
 
 from collections.abc import Callable

@@ -148,7 +148,6 @@ def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
 
 
 def _box(values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Mean over a window around each pixel."""
     return np.asarray(cv2.blur(values, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 

@@ -183,7 +183,6 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
 
 
 def _of_laser(file: Path, options: MapOptions) -> FileMap:
-    """Map of a laser scanner's points."""
     units = options.units
     held = read_las(file, options.classes, options.crop, units.unit)
     points_m, notes = in_metres(file, held, units.unit, units.height_unit)
@@ -210,7 +209,6 @@ def _upright(file: Path, points: Floats, options: MapOptions) -> Floats:
 def _of_points(
     file: Path, points_m: Floats, faces: Ints | None, options: MapOptions, notes: list[str]
 ) -> FileMap:
-    """Map of points, or of triangles between them."""
     if faces is None:
         finite = np.isfinite(points_m).all(axis=1)
         if not finite.all():

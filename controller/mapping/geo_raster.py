@@ -154,7 +154,6 @@ class _Strips:
         self.cells = self._width * (rows.stop - rows.start)
 
     def plain(self) -> tuple[Floats, int]:
-        """All cells, and the number of missing ones."""
         values = self._strip(self._rows.start, self._rows.stop)
         return values, int(np.isnan(values).sum())
 
@@ -309,7 +308,6 @@ def _band_scale(opened: Any, units: RasterUnits) -> tuple[float, float, list[str
 def _cells(
     file: Path, opened: Any, unit: str, cell: tuple[float, float], part: tuple[slice, slice]
 ) -> _Cells:
-    """Cell size in metres on the ground, at the middle of a part."""
     turn, (rows, columns) = opened.transform, part
     middle_x = turn.c + turn.a * 0.5 * (columns.start + columns.stop)
     middle_y = turn.f + turn.e * 0.5 * (rows.start + rows.stop)

@@ -166,7 +166,6 @@ def child(words: str) -> str:
 def _read(
     reader: Any, classes: Collection[int] | None, window: Sequence[float] | None
 ) -> tuple[Floats, list[str]]:
-    """Points, and notes on used and dropped ones."""
     header = reader.header
     count = int(header.point_count)
     if count > _MOST_READ:
@@ -211,7 +210,6 @@ def _read(
 def _class_notes(
     seen: dict[int, int], classes: Collection[int] | None, by_ground: bool, kept: int
 ) -> list[str]:
-    """Numbers of used and dropped points by class."""
     used = set(classes) if classes is not None else set(
         _GROUND if by_ground else (kind for kind in seen if kind not in _NOISE)
     )  # fmt: skip
@@ -229,7 +227,6 @@ def _class_notes(
 
 
 def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
-    """Units of x, y and of z, and the projected system, from the file."""
     wkt, keys = "", {}
     for record in [*header.vlrs, *(header.evlrs or [])]:
         text = getattr(record, "string", None)
@@ -259,7 +256,6 @@ def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
 
 
 def _system(text_or_number: str | int) -> Any:
-    """Coordinate system, if Rasterio knows it."""
     try:
         from rasterio.crs import CRS  # noqa: PLC0415  an extra
 

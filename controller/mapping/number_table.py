@@ -108,7 +108,6 @@ def _uneven(file: Path, rows: list[tuple[int, list[str]]], widths: set[int]) -> 
 
 
 def _plain(cells: list[str]) -> list[float] | None:
-    """Numbers of a row without missing values."""
     try:
         return [float(cell) for cell in cells]
     except ValueError:

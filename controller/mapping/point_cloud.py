@@ -111,7 +111,6 @@ def _pcd(file: Path, data: bytes) -> Floats:
 
 
 def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
-    """Words after each key, and the offset of the data."""
     mark = data[:_HEADER_BYTES].find(b"\nDATA ")
     end = data.find(b"\n", mark + 1) + 1
     if mark < 0 or end == 0:

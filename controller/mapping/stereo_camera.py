@@ -114,7 +114,6 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
 
 
 def _storage(file: Path) -> dict[str, Any]:
-    """Matrices of an OpenCV file by name, or lists of a plain JSON file."""
     check_matrices(file)
     lists = read_json_lists(file)
     if lists is not None:

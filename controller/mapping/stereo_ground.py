@@ -66,7 +66,7 @@ class StereoGround:
     stand: CameraStand
     fitted: bool
     """Whether the stand was fitted to the points, as no one gave it."""
-    told_share: float
+    known_share: float
     """Pixels with a disparity, over those that show something."""
     used_share: float
     """Pixels in the map, over the same."""

@@ -140,7 +140,6 @@ class StereoHead:
         return CameraFrame(at_m, tilted(config.tilt_rad, carrier))
 
     def _exposed(self, now_s: float, qpos: Floats) -> list[CameraFrame]:
-        """Instants of the exposure up to now; more for a faster camera."""
         frame = self._true_frame(qpos)
         if self._before is None or now_s <= self._before[0]:
             return [frame]

@@ -43,7 +43,6 @@ class _Square(NamedTuple):
 
     @property
     def inverse(self) -> "_Square":
-        """Inverse of a positive definite matrix."""
         whole = self.uu * self.vv - self.uv * self.uv
         return _Square(self.vv / whole, -self.uv / whole, self.uu / whole)
 
@@ -52,11 +51,9 @@ class _Square(NamedTuple):
         return _Square(*(a + times * b for a, b in zip(self, other, strict=True)))
 
     def times(self, u: float, v: float) -> tuple[float, float]:
-        """Product with a vector."""
         return self.uu * u + self.uv * v, self.uv * u + self.vv * v
 
     def about(self, u: float, v: float) -> float:
-        """Quadratic form of a vector."""
         a, b = self.times(u, v)
         return u * a + v * b
 
@@ -140,17 +137,17 @@ class FrictionFilter:
         u, v = self._u, self._v
         return self._friction(u, v), self._friction(u + STEP, v), self._friction(u, v + STEP)
 
-    def update(self, measured: Floats, foretold: Floats, span_s: float) -> FoundFriction:
+    def update(self, measured: Floats, predicted: Floats, span_s: float) -> FoundFriction:
         """Process a span of motion.
 
         Args:
             measured: (3,) distance ahead and to the left, m, and turn, rad.
-            foretold: (3, 3) prediction under each of ``hypotheses``; the span is ignored if any
+            predicted: (3, 3) prediction under each of ``hypotheses``; the span is ignored if any
                 value is not finite.
             span_s: duration.
 
         """
-        rows = [measured.tolist(), *foretold.tolist()]
+        rows = [measured.tolist(), *predicted.tolist()]
         is_finite = all(math.isfinite(each) for row in rows for each in row)
         return self.absorb(self._evidence(*rows) if is_finite else None, span_s)
 

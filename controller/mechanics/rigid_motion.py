@@ -424,7 +424,6 @@ def planar_slide(
 
 @compiled("void(float64[::1], int64, float64[::1])", makes_arrays=False)
 def _note_movement(table: Floats, links: int, velocity: Floats) -> None:
-    """Write how each link moves, for a next step with inertia."""
     for k in range(links):
         at = k // LANES * OTHERS + k % LANES
         x, y = table[at + POINT_X], table[at + POINT_Y]

@@ -123,7 +123,6 @@ def _lay(
 
 @compiled("void(float64[::1], float64[::1], boolean)", makes_arrays=False)
 def _keep(table: Floats, moving: Floats, out: bool) -> None:
-    """Copy the links' velocities out of a table, or into it."""
     for g in range(len(table) // ROWS):
         link, kept = table[g * ROWS : (g + 1) * ROWS], moving[2 * g * LANES :]
         for j in range(2 * LANES):

@@ -1,10 +1,8 @@
-"""Effort of a run from its log: energy, cost of transport; of a gait also climb and slip.
+"""Effort of a run from its log: energy, cost of transport; climb and slip of a gait.
 
-Energy is integrated where something adds it up in every step: in the simulation. A real servo has
-no such counter. Its Present Current is a sample at the moment of the reading, just before the next
-goal arrives. The error of position that the last goal made has mostly decayed by then, so power
-from such samples is too low. ``docs/benchmarks/gait-energy.md`` has the factor, measured on the
-same runs.
+Only the simulation integrates energy. A real servo has only samples of Present Current, just before
+the next goal, when the error of the last goal has decayed; so power from samples is too low
+(``docs/benchmarks/gait-energy.md``).
 """
 
 from dataclasses import dataclass

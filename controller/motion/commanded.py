@@ -47,9 +47,7 @@ _TRIED_S: Final = 0.02
 class _Mode(Protocol):
     """Present motion of the joints."""
 
-    def now(self) -> JointsNow:
-        """Angles and speeds."""
-        ...
+    def now(self) -> JointsNow: ...
 
     def step(self, dt_s: float, view: BodyView) -> None:
         """Advance by ``dt_s``."""
@@ -75,7 +73,6 @@ class _Follow:
 
     @property
     def arrived(self) -> bool:
-        """Whether every joint is at its goal."""
         return bool(np.abs(self.goal_rad - self._limiter.angle_rad).max() < _REACHED_RAD)
 
     def stop(self) -> None:
@@ -103,7 +100,6 @@ class _Through:
 
     @property
     def over(self) -> bool:
-        """Whether its end is reached."""
         return self._now_s >= self._end_s
 
     def now(self) -> JointsNow:
@@ -250,7 +246,6 @@ class Commanded:
             self._refusals.add(error.faults[0], self._time_s)
 
     def _follow(self) -> _Follow:
-        """Continue to the present goals, or else stop."""
         if not isinstance(self._mode, _Follow):
             self._mode = _Follow(self._mode.now(), self._limits)
         return self._mode

@@ -186,7 +186,6 @@ class CpgMotion:
         return GaitTransition(self._now_s, parts, needs, settled, under_way, stops=gait is None)
 
     def _begin(self, change: GaitTransition) -> float:
-        """Begin a change; return its duration, s."""
         self._scheduled = ()
         change.parts[0].begin(self.cpg)
         self._next = change.parts[1:]

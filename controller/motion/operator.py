@@ -146,7 +146,6 @@ class Operator(MotionWrapper):
         self._set(name, getattr(self.motion.gait.params, name) + step)
 
     def _set(self, name: str, value: float) -> None:
-        """Change a parameter, within its range."""
         span = self._ranges()[name]
         value = min(max(value, span.low), span.high)
         self._change(**{name: span.kind(round(value, 6))})

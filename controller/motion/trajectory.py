@@ -163,7 +163,6 @@ def _without_first(given: JointTrajectory, angle_rad: Floats) -> JointTrajectory
 
 
 def _spline(given: JointTrajectory, joints: JointNumbers, now: JointsNow) -> PPoly:
-    """Spline of all joints from now through the points."""
     knots_s = np.concatenate([[0.0], given.time_s])
     still = np.zeros(len(now.angle_rad))
 
@@ -214,7 +213,6 @@ def _most(spline: PPoly, order: int) -> Floats:
 
 
 def _check_spline(spline: PPoly, limits: JointLimits) -> None:
-    """Reject a spline that exceeds a limit of angle, speed or acceleration."""
     for order, most, what, unit in (
         (0, limits.angle_rad, "bends to", "rad"),
         (1, limits.speed_rad_s, "moves at", "rad/s"),

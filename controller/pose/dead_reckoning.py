@@ -1,9 +1,8 @@
-"""A pose from the joints, and the attitude of an IMU where the robot has one.
+"""A pose from the joints, and from an IMU if the robot has one.
 
-The way is what friction makes of the measured shape change, integrated. It drifts: it is too coarse
-to reach waypoints with. It is used where nothing measures the pose, so that a run on metal
-can be watched and its log compared. An IMU adds which way is up, which does not drift, and the
-heading, which drifts with the bias of its gyro instead of with the ground.
+It integrates the displacement that friction makes of the measured shape change. It drifts too much
+to reach waypoints, but a run without a measured pose can be watched and compared. An IMU adds the
+vertical without drift, and a heading that drifts with the gyro's bias.
 """
 
 import numpy as np

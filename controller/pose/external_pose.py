@@ -1,8 +1,7 @@
-"""The head's pose from an external source: checked, dated, and carried on by dead reckoning.
+"""The head's pose from an external source: checked, dated, and continued by dead reckoning.
 
-Every pose that arrives is judged. A pose that cannot be used is named and left out; dead reckoning
-bridges it with growing uncertainty. If no pose could be used for ``max_age_s``, ``fault`` says why,
-and the run holds.
+An unusable pose is named and left out; dead reckoning bridges it with growing uncertainty. After
+``max_age_s`` without a usable pose, ``fault`` has the reason and the run holds.
 """
 
 from collections import deque

@@ -1,7 +1,7 @@
-"""The constant delay of measured poses, from the motion that the joints report.
+"""Constant delay of measured poses, from the motion of the joints.
 
-Stamps do not show a delay that all messages share. The head's heading swings with the joints, so
-the delay is the shift at which measured and dead-reckoned headings differ least.
+Stamps do not show a common delay. The head's heading swings with the joints, so the delay is the
+shift at which measured and dead-reckoned headings differ least.
 """
 
 from typing import Final

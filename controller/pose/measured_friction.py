@@ -1,9 +1,9 @@
-"""Friction under a body whose pose another program measures: from the measured poses themselves.
+"""Friction under a body with a measured pose, from the measured poses themselves.
 
-The filtered pose of a run cannot show it: between two measurements it follows dead reckoning, which
-assumes the friction. The estimator compares the measured poses with the motion that the balance of
-friction and gravity predicts for the joints. This is valid where the ground under the body is a
-plane, because only there all links bear the body: other motion shows nothing.
+The filtered pose cannot show it: between measurements it follows dead reckoning, which assumes the
+friction. The estimator compares measured poses with the predicted motion of the joints under
+friction and gravity. This is valid only where the ground under the body is a plane, so that all
+links bear the body.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,15 +32,15 @@ WINDOW_S: Final = 4.0
 LATE_S: Final = 0.5
 """Poses that arrive later after the end of a window do not count (ours)."""
 PRIOR: Final = 0.56
-"""Standard deviation of the logarithms about the file's friction (ours): a third to three times
-the file's in 95 %. On a level floor only the ratio of both frictions can be measured; the rest of
-an interval comes from here."""
+"""Standard deviation of the logarithms about the file's friction (ours): 95 % are within a third to
+three times. A level floor shows only the ratio of the frictions; this gives the rest of an
+interval."""
 ROUGH_M: Final = 0.005
 """Root mean square distance of the ground under the links from a plane, above which the motion does
-not count (ours): a link is 7 cm long."""
+not count (ours)."""
 SPREAD: Final = 3.0
-"""On a slope, the largest factor between the ends of an interval with which the use of an estimate
-begins (ours). It goes on until the estimate agrees with the file again."""
+"""Largest ratio of an interval's ends at which the use of an estimate begins on a slope (ours). It
+ends when the estimate agrees with the file again."""
 
 
 class _Cycle(NamedTuple):

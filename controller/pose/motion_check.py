@@ -1,8 +1,8 @@
-"""Whether measured poses move as the joints say: unit, axes, handedness and frame.
+"""Whether measured poses move like the joints: unit, axes, handedness and frame.
 
-Dead reckoning gives how the head turned and moved between two measurements, in its own axes. A
-source with mirrored axes turns the other way; one in millimetres moves a thousand times as far; one
-whose frame is turned moves in another direction than its head points.
+Dead reckoning gives turn and displacement of the head between two measurements. Mirrored axes turn
+the other way, millimetres move a thousand times as far, and a turned frame moves in another
+direction than the head.
 """
 
 from collections import deque

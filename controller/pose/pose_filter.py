@@ -1,9 +1,8 @@
-"""Dead reckoning corrected by measured poses that arrive late: a Kalman filter for the head's pose.
+"""Kalman filter for the head's pose: dead reckoning corrected by delayed measurements.
 
-The joints show how the body moved since a pose was measured; that motion is added to the measured
-pose. The filter estimates the head's position and the attitude of the whole body, whose mean frame
-turns slowly while the head swings. Position and attitude have a covariance each; the coupling
-between them is neglected. Dead reckoning adds uncertainty with time and with the distance.
+The motion of the joints since a measurement is added to it. The state is the head's position and
+the attitude of the body, whose mean frame turns slowly while the head swings. Each has a
+covariance; their coupling is neglected. Dead reckoning adds uncertainty with time and distance.
 """
 
 from collections import deque
@@ -35,8 +34,8 @@ TILT_RAD2_S: Final = 5e-2
 JUMP_SD: Final = 5.0
 JUMP_M: Final = 0.10
 JUMP_RAD: Final = 0.45
-"""A measurement is a jump beyond this many standard deviations and beyond these errors of position
-and heading (ours). Roll and pitch are free: a body may roll over quickly."""
+"""Jump of a measurement: more standard deviations and larger errors of position and heading than
+these (ours). Roll and pitch are free: a body may roll over quickly."""
 LEAST_LEVEL: Final = 0.5
 """Least horizontal part of a direction that has a heading (ours)."""
 SLIDE_M_S: Final = 0.3

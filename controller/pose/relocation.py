@@ -1,8 +1,7 @@
-"""A body that truly moved without its joints: poses beyond a jump that may be used again.
+"""A body that moved without its joints: poses beyond a jump that become usable again.
 
-A body that slides down a slope, or that a person moves, is far from the pose that dead reckoning
-predicts, although its source is right. Two facts distinguish it from a wrong source: the measured
-poses lead to the new place without a gap, and afterwards they agree with the motion of the joints.
+A body that slid, or was moved, is far from its dead-reckoned pose although the source is right.
+Then the measured poses lead to the new place without a gap, and later agree with the joints.
 Swapped markers move a pose at once.
 """
 
@@ -16,8 +15,8 @@ from snakewalk.config.arrays import Floats
 
 SPEED_M_S: Final = 2.0
 RATE_RAD_S: Final = 3.0
-"""How fast a body may slide and turn without its joints, between two poses (ours): a slide of 1 m
-down 10 degrees with friction of 0.08 ends with 1.4 m/s."""
+"""Greatest speed and turn of a sliding body between two poses (ours): 1 m down 10 degrees with
+friction 0.08 ends at 1.4 m/s."""
 STEP_M: Final = 0.15
 STEP_RAD: Final = 0.3
 """How far at most between two poses, however long apart: a body that nobody saw slide did not."""

@@ -1,8 +1,7 @@
-"""The clock of a sender on the clock of the run: offset and drift from the quickest messages.
+"""Clock of a sender relative to the run's: offset and drift from the fastest messages.
 
-A message arrives after it was stamped, by a delay that varies. The smallest difference between
-arrival and stamp belongs to the quickest message, so the line under all differences is the offset
-of the clocks plus the smallest delay; its slope is the drift.
+Messages have a varying delay. The line under all differences of arrival and stamp is the offset
+plus the smallest delay; its slope is the drift.
 """
 
 from collections import deque

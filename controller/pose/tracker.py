@@ -86,7 +86,6 @@ class SimulatedTracker:
         return self._noise
 
     def _begins(self, every_s: float) -> bool:
-        """Whether something begins in this interval that happens every so often."""
         chance = self._rng.random()
         return bool(every_s > 0.0 and chance < 1.0 / (every_s * self.config.rate_hz))
 

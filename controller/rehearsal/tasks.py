@@ -1,7 +1,7 @@
-"""Twelve tasks on which controllers are compared, and the result of one controller on one task.
+"""Twelve tasks on which controllers are compared, and the result of one of them.
 
 A task is a world with its friction, a robot with its servos, and waypoints or a distance. The score
-is the share that the body truly came to, by the simulator, whatever the controller believes.
+is the share that the simulated body truly reached.
 """
 
 import math

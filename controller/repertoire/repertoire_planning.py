@@ -1,7 +1,6 @@
-"""From a run and a repertoire to a plan, the plan's file, and what the search costs.
+"""Plans from a run and a repertoire, their files, and the cost of the search.
 
-The cost is compared with that of the same search on the physics, of which a few candidates are run
-and the rest is extrapolated.
+The cost of the same search on the physics is extrapolated from a few candidates.
 """
 
 import json

@@ -50,9 +50,9 @@ ACTIONS = (
     Action("brake", "brake", 0.8),
     Action("rest", "rest", 0.8),
 )
-"""[YT] 3.3: three speeds, and gradual and sharp turns to either side. Slow turns, and turns of a
-body that goes backward, are ours. There braking and retreating are made of a forward action played
-slower and backwards; here they are recorded, too."""
+"""Actions of [YT] 3.3: three speeds, gradual and sharp turns to either side. Slow turns, and turns
+backward, are ours. Braking and retreating, which the paper derives from a forward action, are
+recorded."""
 REST_S = 0.5
 
 

@@ -138,7 +138,6 @@ class _Level:
     """(n,) that led here."""
 
     def only(self, which: Ints) -> "_Level":
-        """Return some of them."""
         return _Level(
             self.pose[which], self.passed[which], self.time_s[which],
             self.before, self.parent[which], self.action[which],
@@ -169,7 +168,6 @@ def _expanded(
 
 
 def _backtracked(level: _Level, at: int, candidates: int) -> Route:
-    """Follow a sequence back to its beginning."""
     reached, time_s = int(level.passed[at]), float(level.time_s[at])
     poses, actions = [level.pose[at]], []
     before: _Level | None = level

@@ -1,9 +1,8 @@
 """Bodies of a crowd that do not intersect: a body that would enter another one waits.
 
-A body is a chain of capsules along its links, seen from above. A frame is tried for all bodies.
-While two of them intersect, the one whose motion alone makes them meet returns to where it was.
-Bodies that all return are apart, as they were before, so a start without intersections keeps its
-property for ever.
+A body is a chain of capsules along its links, seen from above. In each frame, while two bodies
+intersect, the one whose motion makes them meet returns to its former place. Bodies that all return
+do not intersect, so a start without intersections keeps this property.
 """
 
 from typing import Final
@@ -141,7 +140,6 @@ def _boxes(points, scale, radius):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _apart(box, i, j):  # type: ignore[no-untyped-def]
-    """Whether two boxes have no common point."""
     across = box[i, 0] > box[j, 1] or box[j, 0] > box[i, 1]
     return across or box[i, 2] > box[j, 3] or box[j, 2] > box[i, 3]
 
@@ -174,7 +172,6 @@ def _stop(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _is_clear(points, scale, radius, i):  # type: ignore[no-untyped-def]
-    """Whether body i intersects no other one."""
     box = _boxes(points, scale, radius)
     for j in range(len(points)):
         if j == i or _apart(box, i, j):

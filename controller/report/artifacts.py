@@ -31,16 +31,22 @@ def make_artifacts(
     made: str = "",
     folders: bool = False,
 ) -> Artifacts:
-    """Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.
+    """Make ``summary.json``, ``report.html`` and ``film.mp4`` in ``folder`` from a record.
 
-    ``numbers`` is the record's summary as ``execute`` returns it; without it, it is computed. The
-    page is written before the film, which needs the most time, and again when the film is drawn; a
-    film that is there already is the same run's, and stays until then. Parts that this machine
-    cannot make (no simulator, no matplotlib, no OpenGL) are noted and left out: a run is not lost
-    for want of its pictures. Shows progress on standard error. ``look`` is the body in the film, as
-    ``film_look`` accepts it; ``made`` says at the page's foot what made it. Without ``folders`` the
-    page contains the names of the user's files, but no folders. Times in the page and in the film
-    count from the moment torque was switched on, as in the summary.
+    The page is written before the film and again after it; an older film of the run stays until
+    then. Parts that this machine cannot make (simulator, matplotlib or OpenGL is missing) are noted
+    and left out. Times count from torque on.
+
+    Args:
+        record: the run.
+        folder: of the files.
+        numbers: the summary of ``execute``; computed by default.
+        film: draw a film.
+        fine: better and slower.
+        look: body in the film, as for ``film_look``.
+        made: words at the foot of the page.
+        folders: show the folders of the user's files in the page.
+
     """
     record = record.from_torque_on()
     notes: list[str] = []
@@ -130,7 +136,6 @@ def _write_page(
 
 
 def _film(record: RunRecord, path: Path, fine: bool, look: str, notes: list[str]) -> bool:
-    """Draw the film; return whether it was drawn."""
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:

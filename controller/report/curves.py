@@ -192,7 +192,6 @@ def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
 def _traces(
     name: str, colour: str, row: int, time_s: Floats, values: Floats
 ) -> list[dict[str, Any]]:
-    """Return the trace of a curve; of one that jumps all the time, mean, least and largest."""
     known = values[np.isfinite(values)]
     if len(known) < _BLOCK or _crossings(known) < _BLOCK:
         return [_trace(name, colour, row, time_s, values)]

@@ -4,5 +4,5 @@
 # fmt: off
 PLUGINS = (
     ("command", "report", "Make report.html, summary.json and film.mp4 again from a log.", "snakewalk.controller.report.commands.report:report", "The job"),
-    ("results", "report", "Make ``folder/summary.json``, ``folder/report.html`` and ``folder/film.mp4`` from a record.", "snakewalk.controller.report.artifacts:make_artifacts", ""),
+    ("results", "report", "Make ``summary.json``, ``report.html`` and ``film.mp4`` in ``folder`` from a record.", "snakewalk.controller.report.artifacts:make_artifacts", ""),
 )

@@ -47,7 +47,6 @@ def trip_of(record: RunRecord) -> Trip | None:
 
 
 def _first_joint(reason: str, robot: RobotConfig) -> int | None:
-    """Joint whose label comes first in a reason; messages name a joint by its label only."""
     places = [reason.find(robot.joint_label(joint)) for joint in range(robot.joint_count)]
     named = [(place, joint) for joint, place in enumerate(places) if place >= 0]
     return min(named)[1] if named else None

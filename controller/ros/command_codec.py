@@ -1,7 +1,7 @@
-"""Commands between the ROS node's process and the run's: a line of JSON each.
+"""Commands between the process of the ROS node and the run: a line of JSON each.
 
-The points of a trajectory are thousands of numbers, so they are packed: the run, which has a
-cycle to keep, unpacks 500 points of sixteen joints in less than a millisecond.
+The thousands of points of a trajectory are packed: the run unpacks 500 points of sixteen joints in
+less than a millisecond.
 """
 
 import base64

@@ -218,7 +218,6 @@ class CommandTopics:
 
 
 def _replaces(command: Command, last: Command) -> bool:
-    """Whether a command makes the one before it void."""
     if isinstance(command, JointGoals) and isinstance(last, JointGoals):
         return command.joints == last.joints
     return isinstance(command, Velocity | GoTo) and type(command) is type(last)

@@ -1,7 +1,7 @@
-"""Poses of a ROS 2 topic as a pose source: PoseStamped, Odometry, a transform of /tf and others.
+"""Poses of a ROS 2 topic as a pose source: PoseStamped, Odometry, transforms of /tf and others.
 
-A process of its own subscribes to the topic and passes each pose on in the format of
-``controller/pose/datagram.py``, so that the run imports no ROS and checks the poses as usual.
+A separate process passes each pose on in the format of ``controller/pose/datagram.py``, so the run
+imports no ROS.
 """
 
 import os

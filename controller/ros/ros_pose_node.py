@@ -93,13 +93,11 @@ class _Sender:
         self._count += 1
 
     def transforms(self, message: Any, child: str) -> None:
-        """Pass on the poses of one frame."""
         for pose in poses_of(message, child):
             self(pose, has_covariance=False)
 
 
 def _subscribe(node: Any, topic: str, child: str, send: "_Sender") -> bool:
-    """Subscribe if the topic exists with a known type; returns whether it does."""
     on_message: Callable[[Any], None]
     for kind in dict(node.get_topic_names_and_types()).get(topic, []):
         if kind == TRANSFORMS and child:

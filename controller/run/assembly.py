@@ -1,4 +1,4 @@
-"""The steps that every preparation of a run shares."""
+"""Steps that all preparations of runs share."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A prepared run, carried out as the options of a command say."""
+"""Execution of a prepared run with the options of a command."""
 
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
@@ -15,7 +15,7 @@ from snakewalk.controller.run.watchers import Watchers, watched
 
 
 class Carried(NamedTuple):
-    """A run that has come to its end, and the folder of its results."""
+    """A finished run, and the folder of its results."""
 
     finished: Finished
     folder: Path
@@ -44,7 +44,7 @@ def carry_out(
     """Execute a run with a progress bar; a watched or operated simulation runs in real time.
 
     Raises:
-        InputError: as ``execute``, and if the folder cannot be made.
+        InputError: as ``execute``, or the folder cannot be made.
 
     """
     paced = (watchers is not None or is_operated) and not options.port

@@ -1,4 +1,4 @@
-"""In what a robot differs from its file and its world: ground, loads, servos, horns."""
+"""Differences of a robot from its file and world: ground, loads, servos, horns."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """Differences from the file; the defaults, and None, mean no difference."""
+    """Differences from the files; defaults and None mean no difference."""
 
     along: float = 1.0
-    """Friction along the body over the world's, forward and backward."""
+    """Factor on the friction along the body, forward and backward."""
     across: float = 1.0
     """Friction across the body over the world's."""
     load_kg: Floats | None = None
-    """(L,) mass that each link has more than the robot's file says."""
+    """(L,) additional mass of each link."""
     torque: Floats | None = None
-    """(J,) torque of each servo for a current, over its model's."""
+    """(J,) factor on each servo's torque for a current."""
     slip_rad: Floats | None = None
-    """(J,) angle by which each joint is bent more than its servo says: its horn has slipped."""
+    """(J,) angle by which each joint is bent more than its servo reports: a slipped horn."""
 
     @classmethod
     def of_run(cls, by: DeviationConfig, robot: RobotConfig) -> "Deviation":
-        """Return that of a whole robot from its file."""
+        """Return the deviation of a robot by the factors of a run."""
         more = by.mass - 1.0
         return cls(
             by.friction_along,
@@ -59,7 +59,7 @@ class Deviation:
         return world.model_copy(update={"friction": friction})
 
     def shaft_rad(self, joint_rad: Floats) -> Floats:
-        """Return the angles (J,) of joints whose servos say ``joint_rad``."""
+        """Return the angles (J,) of joints whose servos report ``joint_rad``."""
         return joint_rad if self.slip_rad is None else joint_rad + self.slip_rad
 
     def mounting(self, robot: RobotConfig) -> "Mounting":

@@ -1,4 +1,4 @@
-"""Carry out a prepared run: folder, log, link, loop, summary."""
+"""Execution of a prepared run: folder, log, link, loop, summary."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -68,7 +68,7 @@ from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
 
 class RunObserver(CycleObserver, Protocol):
-    """An observer of every cycle, which also says something at the end of the run."""
+    """An observer of every cycle that also reports at the end of the run."""
 
     def end(self, time_s: float) -> None:
         """Report; torque is off."""
@@ -82,16 +82,16 @@ class Finished:
     outcome: Outcome
     log: Path
     record: RunRecord
-    """The log, read back once: for the summary, the report and whoever asks more of it."""
+    """The log, read once for summary and report."""
     summary: RunSummary
     pose: PoseProvider
-    """Source of the pose, and its accuracy if this is known."""
+    """Pose source, and its accuracy if known."""
     map: MapProvider
-    """Source of the map, and its accuracy, for a run that maps its ground."""
+    """Map source and its accuracy, for a run that maps its ground."""
     source: MotionSource
     """The motion that ran, at its end."""
     travel: Travel
-    """Travel of the centre of mass, of which the summary has the speed."""
+    """Travel of the centre of mass, which gives the summary's speed."""
 
 
 def execute(
@@ -159,7 +159,6 @@ class _Execution:
     on_event: OnEvent
 
     def carry_out(self, *, stoppable: bool) -> Finished:
-        """Check the plan, open backend, stop button and log, and run."""
         prepared, port, view = self.prepared, self.port, self.view
         robot = prepared.robot if self.rehearsed else on_ports(prepared.robot, port)
         body_simulated = port is None or is_split(robot)
@@ -222,7 +221,6 @@ class _Execution:
         button: StopButton | None,
         initial_pose: InitialPose | None,
     ) -> tuple[Outcome, PoseProvider, MapProvider, MotionSource]:
-        """Open pose and map, and run the loop until torque is off."""
         prepared, view, safety = self.prepared, self.view, self.prepared.run.safety
         clock = backend.clock
 
@@ -309,7 +307,6 @@ class _Execution:
 def _stop_output(
     safety: SafetyConfig, backend: Backend
 ) -> AbstractContextManager[StopOutput | None]:
-    """The run's stop output; that of a simulated bench opens its supply."""
     if safety.stop_output is None:
         return nullcontext()
     if backend.open_supply is not None:
@@ -323,10 +320,10 @@ def _live(
     commands: Callable[[], Iterable[str | Refused]],
     on_event: OnEvent,
 ) -> LiveCourse:
-    """Put a person in charge of the waypoints.
+    """Let an operator command the waypoints.
 
     Raises:
-        InputError: the motion goes along no course.
+        InputError: the motion follows no course.
 
     """
     if not isinstance(prepared, PathRun) or not isinstance(source, OnCourse):
@@ -336,7 +333,7 @@ def _live(
 
 @contextmanager
 def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
-    """Note what became of torque and log when a signal, a full disk or a dead port ends a run."""
+    """Add the state of torque and log to the error that ends a run."""
     try:
         yield  # the link is closed when an error comes out of it, with a note about torque
     except DriverError as fault:  # says itself what it knows of torque
@@ -357,7 +354,6 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
 
 
 def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
-    """Read the log of a run that is over, and write its summary next to it."""
     try:
         record = read_log(log)
         moved = travel(record)
@@ -368,7 +364,7 @@ def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
 
 
 def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:
-    """Refuse what no plan shows: a pose that nothing measures, compliance, a shadow's ground."""
+    """Reject a run for reasons that no plan shows: pose, compliance, a shadow's ground."""
     if metal and prepared.run.deviation != DeviationConfig():
         raise InputError(
             f"run {prepared.run.name}: deviation: changes a simulated robot only; remove the "
@@ -397,7 +393,7 @@ def _shadow_plugin() -> Any:
 
 
 def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
-    """Refuse a compliance that safety would clamp, or that would chatter against a blocked shaft.
+    """Reject compliance that safety would clamp, or that would chatter at a blocked shaft.
 
     Raises:
         InputError: one line for each fault.
@@ -421,7 +417,7 @@ def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
 
 
 def _current_gain_a_rad(robot: RobotConfig) -> float:
-    """Current of the stiffest joint per radian of lead; 0 where no motor is known."""
+    """Current of the stiffest joint per radian of lead; 0 without a known motor."""
     gains_a_rad = [0.0]
     for motor, gain in zip(known_motors(robot), robot.position_p_gains, strict=True):
         if motor is not None:
@@ -433,7 +429,7 @@ def _current_gain_a_rad(robot: RobotConfig) -> float:
 def motor_constants(robot: RobotConfig) -> tuple[float, Winding | None]:
     """Torque constant (N m/A) and winding of the robot's servos.
 
-    NaN and None where the simulator has no such model, or the servos are of several.
+    NaN and None if the model has no motor, or there are several models.
     """
     motors = set(known_motors(robot))
     motor = motors.pop()

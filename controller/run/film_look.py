@@ -13,14 +13,14 @@ SERVOS: Final = "servos"
 ANIMAL: Final = "animal"
 """The animal of the run's recording."""
 _BODY: Final = "body"
-"""The plug-in for other looks: names and files of bodies."""
+"""Plug-in of all other looks: names and files of bodies."""
 
 
 class LookPlugin(Protocol):
-    """A look, as a plug-in of the kind ``look`` provides it."""
+    """A look, as a plug-in provides it."""
 
     def check(self, look: str) -> None:
-        """Reject a look that cannot be made, before a run."""
+        """Reject an impossible look before a run."""
         ...
 
     def make(self, look: str, header: Header) -> "SkinLook":
@@ -29,7 +29,7 @@ class LookPlugin(Protocol):
 
 
 def check_look(look: str) -> None:
-    """Reject a look that cannot be made, before a run.
+    """Reject an impossible look before a run.
 
     Raises:
         InputError: the look does not exist, or an extra is missing.

@@ -1,4 +1,4 @@
-"""The end of a command that ran something: report, film and printed result."""
+"""End of a command with a run: report, film and printed result."""
 
 import platform
 import shlex
@@ -21,7 +21,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Artifacts:
-    """Files of a run next to its log; None for missing ones, with the reason in ``notes``."""
+    """Files of a run next to its log; ``notes`` has the reasons for missing ones."""
 
     report: Path | None
     film: Path | None
@@ -37,7 +37,6 @@ class Artifacts:
 
 
 def _what_made_it(folders: bool) -> str:
-    """Return command, machine and time for the foot of a page, with folders or only file names."""
     given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
     words = shlex.join(["snakewalk", *given])
     when = datetime.now().astimezone().isoformat(" ", "seconds")
@@ -54,9 +53,9 @@ def write_artifacts(
     look: str = "servos",
     folders: bool = False,
 ) -> Artifacts:
-    """Make the report and the film of a run; print on standard error what could not be made.
+    """Make report and film of a run; print on standard error why a file is missing.
 
-    The report contains the folders of the user's files if ``folders`` is true.
+    ``folders`` shows the folders of the user's files in the report.
     """
     what = _what_made_it(folders)
     try:
@@ -76,7 +75,7 @@ def write_artifacts(
 def show_run(
     finished: Finished, folder: Path, facts: Mapping[str, object], as_json: bool, *, film: bool
 ) -> None:
-    """Make the report and the film, and show a run's facts and files; exit 1 if safety tripped."""
+    """Make report and film, and print facts and files; exit 1 if safety tripped."""
     artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
     evidence = finished.summary.evidence
@@ -92,7 +91,7 @@ NOT_MEASURED: Final = 3
 def by_evidence(finished: Finished, values: Mapping[str, object]) -> dict[str, object]:
     """Return values that need a measured pose, and its evidence.
 
-    Without a measured pose the values are None, each with its counterpart ``dead_reckoned_*``.
+    Otherwise they are None, each with a counterpart ``dead_reckoned_*``.
     """
     numbers = finished.summary
     if numbers.is_measured:
@@ -102,7 +101,7 @@ def by_evidence(finished: Finished, values: Mapping[str, object]) -> dict[str, o
 
 
 def summarized(numbers: RunSummary, *keys: str) -> dict[str, object]:
-    """Return numbers that need a measured pose; without one, their ``dead_reckoned_*``, too."""
+    """Return numbers that need a measured pose, or their ``dead_reckoned_*``."""
     believed = () if numbers.is_measured else tuple(f"dead_reckoned_{key}" for key in keys)
     return {key: getattr(numbers, key) for key in (*keys, *believed)}
 
@@ -111,8 +110,8 @@ def exit_code(finished: Finished, accept_dead_reckoning: bool) -> int:
     """Return the exit code of a run along waypoints.
 
     Returns:
-        0: every waypoint was reached; 1: one was not, or safety tripped; 3: the run ended as
-        planned, but its pose was dead-reckoned, so that the arrival is not measured.
+        0: every waypoint was reached; 1: one was missed, or safety tripped; 3: the run ended as
+            planned, but dead reckoning gave its pose.
 
     """
     outcome = finished.outcome

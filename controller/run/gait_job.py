@@ -1,4 +1,4 @@
-"""``snakewalk gait run``: the run that the command's options describe."""
+"""``snakewalk gait run``: execution of the options."""
 
 import math
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from snakewalk.controller.run.kinds.gait_run import GaitRun
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class GaitJob:
-    """A gait and where it runs, as the options of the command give them."""
+    """A gait with the options of the command."""
 
     name: str
     robot: str | None
@@ -93,7 +93,6 @@ class GaitJob:
 
 
 def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
-    """Return the figures of a run; displacements only of one gait that nobody changed."""
     result: dict[str, object] = {
         "gait": prepared.config.name,
         "robot": prepared.robot.name,
@@ -134,7 +133,6 @@ def _facts(prepared: GaitRun, finished: Finished) -> dict[str, object]:
 
 
 def _names(prepared: GaitRun, hands: Hands | None) -> Callable[[float], str]:
-    """Return the motion at a time of the run: gaits change by keys or as planned."""
     name = prepared.run.name
     if hands is not None:
         return lambda gone_s: hands.gait or name
@@ -145,7 +143,6 @@ def _names(prepared: GaitRun, hands: Hands | None) -> Callable[[float], str]:
 
 
 def _change(text: str) -> tuple[float, str, dict[str, Any]]:
-    """Read NAME@SECONDS[,PARAM=VALUE...]."""
     what, *values = text.split(",")
     name, at, seconds = what.rpartition("@")
     try:

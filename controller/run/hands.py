@@ -1,4 +1,4 @@
-"""The devices by which an operator changes a gait while it runs."""
+"""Devices by which an operator changes a gait during its run."""
 
 import sys
 from contextlib import ExitStack
@@ -36,18 +36,17 @@ class Hands:
 
     @property
     def gait(self) -> str | None:
-        """Name of the gait that they have chosen; None before the run."""
+        """Name of the chosen gait; None before the run."""
         return None if self._motion is None else self._motion.gait.name
 
     def torque_off(self) -> str | None:
-        """Why torque goes off, asked by the safe link in every read and write; it stays so."""
+        """Reason for torque off, requested in every read and write; it stays."""
         for device in self._devices:
             self._waiting += device.pressed()
         self._off = self._off or "t" in self._waiting
         return "the operator switched torque off" if self._off else self._lost_device()
 
     def _lost_device(self) -> str | None:
-        """Return which device with a torque-off key is gone; only warn if the run says so."""
         local = [
             cast("Keyboard | Gamepad", each) for each in self._devices if each is not self._page
         ]
@@ -62,7 +61,7 @@ class Hands:
         return None
 
     def operator(self, motion: GaitMotion, robot: RobotConfig, on_event: OnEvent) -> Operator:
-        """Put the keys that were pressed in charge of a motion."""
+        """Let the pressed keys command a motion."""
 
         def on_change(kind: str, text: str) -> None:
             on_event(kind, text)
@@ -81,8 +80,7 @@ class Hands:
         return taken
 
     def _held(self) -> bool:
-        """Whether nobody who has a dead man's button has let it go."""
-        return all(device.held for device in self._devices)
+        return all(device.is_enabled for device in self._devices)
 
 
 def open_hands(

@@ -1,4 +1,4 @@
-"""The job of ``snakewalk run``: from the values of its options to a log, a report and a film."""
+"""``snakewalk run``: from its options to log, report and film."""
 
 import sys
 from dataclasses import dataclass
@@ -38,10 +38,10 @@ class Job:
     options: RunOptions
 
     def carry_out(self, *, look: str, accept_dead_reckoning: bool) -> int:
-        """Run the job and show its result; returns the exit code.
+        """Run the job and show its result; return the exit code.
 
         Raises:
-            InputError: a value is unknown, or two of them contradict each other.
+            InputError: a value is unknown, or two contradict each other.
 
         """
         check_look(look)
@@ -83,7 +83,6 @@ class Job:
         return changed(prepared, run=run)
 
     def _name(self, prepared: PreparedRun) -> str:
-        """Return the name of the run: its file, and the values that replace those of the file."""
         run = prepared.run
         replaced = [
             Path(each).stem for each in (self.robot, self.world, self.track) if each is not None
@@ -113,12 +112,12 @@ class Job:
 
 
 def _confirm(found: str) -> bool:
-    """Ask whether an interrupted chain may go on; the servos hold meanwhile."""
+    """Ask whether an interrupted chain may continue; the servos hold meanwhile."""
     return typer.confirm(f"{found}; go on?", err=True)
 
 
 def progress_bar(prepared: PreparedRun) -> PathBar | TimeBar:
-    """Return the bar that fits a run: along its path, or over its time."""
+    """Return the progress bar of a run: along its path, or over its time."""
     if isinstance(prepared, PathRun):
         return PathBar(prepared.path.length_m)
     return TimeBar(prepared.run.name, prepared.run.time_limit_s)

@@ -14,7 +14,7 @@ PLUGINS = (
     ("command", "pose check", "Show position, axes, rate, delay and noise of an external pose; exit code 1 on a fault.", "snakewalk.controller.run.commands.pose_check:check", ""),
     ("command", "run", "Run a job on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.run:run", "The job"),
     ("command", "schema", "Print the JSON Schema of a TOML file; editors use it to complete and check the file.", "snakewalk.controller.run.commands.schema:schema", "The job"),
-    ("pose", "imu", "Dead reckoning from the joint angles and the heading of the robot's IMU.", "snakewalk.controller.run.pose_provider:ImuPose", ""),
+    ("pose", "imu", "Dead reckoning from the joints and the heading of the robot's IMU.", "snakewalk.controller.run.pose_provider:ImuPose", ""),
     ("pose", "joints", "Dead reckoning from the joint angles alone.", "snakewalk.controller.run.pose_provider:JointsPose", ""),
     ("pose", "simulator", "The true pose of the simulated body.", "snakewalk.controller.run.pose_provider:SimulatorPose", ""),
     ("pose", "udp", "Poses in UDP datagrams: udp:PORT, or udp:HOST:PORT.", "snakewalk.controller.run.external.external_source:UdpPose", ""),

@@ -1,4 +1,4 @@
-"""Faults of a run's observers: the run reports them, and stops if an E-STOP is lost."""
+"""Faults of observers: the run reports them, and stops if an E-STOP is lost."""
 
 import time
 from collections.abc import Callable
@@ -31,10 +31,10 @@ class Watcher(Protocol):
 
 @runtime_checkable
 class OffersStop(Protocol):
-    """An observer with an E-STOP, and with commands that may be damaged."""
+    """An observer with an E-STOP and possibly damaged commands."""
 
     def lost(self, now_s: float) -> str | None:
-        """Return why its E-STOP does not work any more, or None; called in every read and write."""
+        """Return why its E-STOP has failed, or None; called in every read and write."""
         ...
 
     def rejected(self) -> list[str]:
@@ -43,7 +43,7 @@ class OffersStop(Protocol):
 
 
 class ObserverWatch:
-    """Watches whoever looks on at a run; ``report`` and ``stop_requested`` never raise or wait."""
+    """Watches the observers of a run; ``report`` and ``stop_requested`` never raise or wait."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class ObserverWatch:
     def with_stop(
         self, stop_requested: Callable[[], str | None], button: StopButton | None
     ) -> Callable[[], str | None]:
-        """Return why torque goes off: a reason of an operator, the button or an observer."""
+        """Return the reason for torque off of an operator, the button or an observer."""
         return lambda: (
             stop_requested()
             or (None if button is None else button.pressed())
@@ -98,7 +98,7 @@ class ObserverWatch:
         return None
 
     def report(self, time_s: float) -> None:
-        """Report the commands that were rejected, at a time of the run."""
+        """Report rejected commands at a time of the run."""
         if self._view is None:
             return
         for why in self._view.rejected():

@@ -1,4 +1,4 @@
-"""The pose source of a run: a plug-in that provides the pose of the head link."""
+"""Pose source of a run: a plug-in that provides the pose of the head."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -35,7 +35,7 @@ class PoseContext:
     prepared: PreparedRun
     backend: Backend
     reckoning: DeadReckoning
-    """Dead reckoning from the joints, which a source may use as its prediction."""
+    """Dead reckoning from the joints, for a source's prediction."""
     argument: str
     """Text after the colon of ``--pose NAME:ARGUMENT``."""
     on_event: OnEvent
@@ -44,12 +44,12 @@ class PoseContext:
 
 
 class PosePlugin(Protocol):
-    """A pose source, as a plug-in of the kind ``pose`` provides it."""
+    """A pose source, as a plug-in provides it."""
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
-        """Return why the source cannot work in a run, one line per fault."""
+        """Return the faults of the source in a run, one per line."""
         ...
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
@@ -62,7 +62,7 @@ class PosePlugin(Protocol):
 
 
 def pose_plugin(pose: str) -> tuple[PosePlugin, str]:
-    """Return the pose source that ``pose`` or ``--pose`` names, and its argument.
+    """Return the source that ``pose`` or ``--pose`` names, and its argument.
 
     Raises:
         InputError: the source does not exist.
@@ -76,7 +76,7 @@ def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal
     """Reject a pose source that cannot work here.
 
     Raises:
-        InputError: one line per fault, or an extra that the source needs is missing.
+        InputError: one line per fault, or a missing extra.
 
     """
     if run.pose is None:
@@ -99,7 +99,7 @@ def pose_evidence(prepared: PreparedRun, backend: Backend) -> PoseEvidence:
 
 @dataclass(frozen=True, slots=True)
 class PoseError:
-    """How far an estimated pose was off from the simulator's."""
+    """Error of an estimated pose against the simulator's."""
 
     head_m: Floats
     """(T,) distance between the centres of the head link."""
@@ -110,11 +110,11 @@ class PoseError:
 
     @property
     def head_rms_m(self) -> float:
-        """Root of the mean square distance of the head link; NaN before a pose was measured."""
+        """Root mean square distance of the head; NaN before a pose was measured."""
         return _rms(self.head_m) if self.head_m.size else float("nan")
 
     def facts(self) -> dict[str, float | int]:
-        """Numbers for the log and for a command's answer."""
+        """Numbers for log and answer."""
         if not self.head_m.size:
             return {}
         return {
@@ -128,27 +128,27 @@ class PoseError:
 
 @dataclass
 class PoseProvider:
-    """Measures the pose of the head for a run; knows afterwards how well."""
+    """Measures the pose of the head for a run, and its accuracy."""
 
     measure: PoseSource
     source_facts: Callable[[], dict[str, float | int]] = dict
-    """Numbers of the source itself, for example the frames of a camera."""
+    """Numbers of the source, such as the frames of a camera."""
     health: PoseHealth | None = None
-    """Whether the pose can be trusted; None of a source that is always believed."""
+    """Whether the pose is credible; None for a source without this check."""
     measured_heads: Callable[[], MeasuredHeads] | None = None
-    """Returns the single measurements of an external source since the last call."""
+    """Returns the measurements of an external source since the last call."""
     error: PoseError | None = None
-    """Set at the end of a run whose pose was estimated while the simulator knew the true one."""
+    """Set after a run with an estimated pose and a known true one."""
 
     def facts(self) -> dict[str, float | int]:
-        """Frames of a camera, and errors where the true pose is known."""
+        """Frames of a camera, and errors if the true pose is known."""
         facts: dict[str, float | int] = {} if self.error is None else self.error.facts()
         return facts | self.source_facts()
 
 
 @dataclass
 class PoseComparison:
-    """An estimated pose with the simulator's, which is recorded but never used by the run."""
+    """An estimated pose with the simulator's, which the run never uses."""
 
     prepared: PreparedRun
     estimate: PoseSource
@@ -182,12 +182,12 @@ def pose_provider(
     on_event: OnEvent,
     on_picture: OnPicture = lambda picture, time_s: None,
 ) -> Iterator[PoseProvider]:
-    """Make the provider that the run asks for; at its end ``on_event`` receives its accuracy.
+    """Make the run's provider; at the end ``on_event`` receives its accuracy.
 
     ``on_picture`` receives each picture of a camera with its time.
 
     Raises:
-        InputError: the camera is not there, does not show the robot, or cannot work here.
+        InputError: the camera is missing, does not show the robot, or cannot work here.
 
     """
     run, robot = prepared.run, prepared.robot
@@ -222,23 +222,18 @@ def pose_provider(
 
 
 class _Reckoned:
-    """A pose source that integrates the pose from the joints."""
-
     source = "joints"
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
-        """Return that the pose is dead-reckoned."""
         return PoseEvidence(Kind.DEAD_RECKONED, self.source)
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
-        """Return why the source cannot work in a run, one line per fault."""
         return []
 
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:
-        """Open the source for the time of a run."""
         yield PoseProvider(context.reckoning)
 
 
@@ -249,14 +244,14 @@ class JointsPose(_Reckoned):
 
 @plugin("pose", "imu")
 class ImuPose(_Reckoned):
-    """Dead reckoning from the joint angles and the heading of the robot's IMU."""
+    """Dead reckoning from the joints and the heading of the robot's IMU."""
 
     source = "imu"
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
-        """Return a fault where the robot has no IMU."""
+        """Return a fault if the robot has no IMU."""
         if robot.imu is not None:
             return []
         return [f"pose: robot {robot.name} has no IMU: describe it in its file, table [imu]"]
@@ -273,7 +268,7 @@ class SimulatorPose(_Reckoned):
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
-        """Return a fault where servos are on a port."""
+        """Return a fault if servos are on a port."""
         if not on_port:
             return []
         return ["pose: servos on a port have no simulator; use udp, camera, imu or joints"]

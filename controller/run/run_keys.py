@@ -1,4 +1,4 @@
-"""Single values of a run's files, replaced by key: ``--set`` and the keyword ``keys``."""
+"""Single values of a run's files, replaced by key: ``--set`` and ``keys``."""
 
 import math
 from collections.abc import Mapping
@@ -38,10 +38,10 @@ OF_A_RECORDING: Final = _OWN_MOTION | {
 def checked_keys(
     keys: Mapping[str, object] | None, refused: Mapping[str, str] | None = None
 ) -> dict[str, object]:
-    """Return keys of the three files, angles in rad; ``refused`` keys or tables have options.
+    """Return keys of the three files, angles in rad; options set those in ``refused``.
 
     Raises:
-        InputError: a key is of none of the files, or is refused; one line each.
+        InputError: no file has a key, or it is refused; one line each.
 
     """
     faults: list[str] = []
@@ -58,7 +58,7 @@ def checked_keys(
 
 
 def _meant(first: str, rest: str) -> str:
-    """Say which key was meant where the first word is that of no file."""
+    """Hint on a key whose first word names no file."""
     files = get_close_matches(first, _FIELDS, 1, 0.7)
     if files and rest:
         return f"; did you mean {files[0]}.{rest}?"
@@ -69,7 +69,6 @@ def _meant(first: str, rest: str) -> str:
 
 
 def _in_rad(key: str, value: object) -> tuple[str, object]:
-    """Files have radians; people think of slopes in degrees."""
     if not key.endswith("_deg"):
         return key, value
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -78,7 +77,7 @@ def _in_rad(key: str, value: object) -> tuple[str, object]:
 
 
 def with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
-    """Replace values of the run's, the robot's or the world's file by their keys.
+    """Replace values of a run's, robot's or world's file by their keys.
 
     Raises:
         InputError: one line per fault.

@@ -1,4 +1,4 @@
-"""The servos of a run: gains for its motion, and checks of supply, current and cycle rate."""
+"""Servos of a run: gains for its motion; checks of supply, current and cycle rate."""
 
 from collections.abc import Sequence
 
@@ -10,8 +10,8 @@ from snakewalk.drivers.compiling import is_compiling
 from snakewalk.drivers.protocol.registers import CURRENT_POSITION_MODE
 
 GAIT_PITCH_SHARE = 0.75
-"""Goal current of the pitch joints in a motion that lifts, of the current at which safety stops
-(1.5 A of an XM430; ours): soft ones would not carry the links."""
+"""Goal current of pitch joints that lift, as a share of safety's limit (1.5 A of an XM430; ours):
+soft ones would not carry the links."""
 
 UNCOMPILED_HZ = 50.0
 """Highest rate of cycles without numba: it uses half of a core with 16 servos (ours;
@@ -19,10 +19,10 @@ docs/how-to/small-computer.md)."""
 
 
 def check_supply(robot: RobotConfig) -> None:
-    """Refuse a supply at which a servo would do nothing but raise its alarm.
+    """Reject a supply at which a servo would only raise its alarm.
 
     Raises:
-        InputError: with the model's range of voltages, and the one that its page recommends.
+        InputError: with the model's range of voltages, and the recommended one.
 
     """
     for facts in robot.models_by_id.values():
@@ -37,11 +37,11 @@ def check_supply(robot: RobotConfig) -> None:
 
 
 def check_servos(run: RunConfig, robot: RobotConfig) -> None:
-    """Reject a wrong supply, a cycle that the bus cannot carry, and a current out of reach.
+    """Reject a wrong supply, a cycle that does not fit the bus, and an unreachable current.
 
     Raises:
-        InputError: with the model's voltages; with the highest rate that fits, or the age of the
-            values; with the current at which the model stalls.
+        InputError: with the model's voltages; the highest rate, or the age of the values; the stall
+            current.
 
     """
     check_supply(robot)
@@ -64,7 +64,6 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
 
 
 def _check_uncompiled_rate(run: RunConfig) -> None:
-    """Reject a rate that the loops of a cycle do not sustain if nothing compiles them."""
     if run.cycle_hz > UNCOMPILED_HZ and not is_compiling():
         raise InputError(
             f"run {run.name}: cycle_hz = {run.cycle_hz:g}: without numba the loops of a cycle "
@@ -74,7 +73,6 @@ def _check_uncompiled_rate(run: RunConfig) -> None:
 
 
 def _check_hold(run: RunConfig, robot: RobotConfig) -> None:
-    """Reject a hold of servos whose current cannot be limited."""
     if run.safety.on_trip == "off":
         return
     for facts in robot.models_by_id.values():
@@ -87,7 +85,6 @@ def _check_hold(run: RunConfig, robot: RobotConfig) -> None:
 
 
 def _check_fuse(robot: RobotConfig) -> None:
-    """Reject a fuse if the current of the chain cannot be estimated."""
     if robot.power is None or robot.power.fuse_a is None:
         return
     for facts in robot.models_by_id.values():

@@ -1,4 +1,4 @@
-"""An observer of a run: a process of its own, which is fed with the rows of the log."""
+"""An observer in a process of its own, which receives the rows of the log."""
 
 import json
 import socket
@@ -13,15 +13,15 @@ from snakewalk.controller.console.child_process import start
 from snakewalk.controller.runlog.row_line import BUTTON, RunEnd
 
 _START_S: Final = 60.0
-"""Longest time until it starts: a busy machine imports slowly (ours)."""
+"""Longest time until it starts; a busy machine imports slowly (ours)."""
 _END_S: Final = 2.0
 
 
 class WatcherProcess:
-    """A watcher in a process of its own; use it in a ``with``.
+    """A watcher in a process of its own, as a context manager.
 
     Raises:
-        InputError: it did not start; says why.
+        InputError: it did not start; with the reason.
 
     """
 
@@ -68,7 +68,7 @@ class WatcherProcess:
             self._process.kill()
 
     def lost(self, now_s: float) -> str | None:
-        """Return why its E-STOP does not work any more, or None."""
+        """Return why its E-STOP has failed, or None."""
         if self._end.is_closed:
             return f"{self._what}: its process has ended, and its E-STOP with it"
         if self._end.is_silent(now_s):
@@ -87,5 +87,5 @@ class WatcherProcess:
         """Let a picture go by."""
 
     def on_button(self, path: Path) -> None:
-        """Store the run's stop button, which the watcher presses."""
+        """Store the run's stop button for the watcher."""
         self._end.add(BUTTON, json.dumps({"path": str(path)}).encode())

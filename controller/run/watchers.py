@@ -1,4 +1,4 @@
-"""The observers of a run: its page, its ROS node, and observers from plug-ins."""
+"""Observers of a run: page, ROS node, and plug-ins."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -14,19 +14,19 @@ from snakewalk.controller.run.observer_watch import OffersStop, Watcher
 PAGE, ROS, SHADOW = "page", "ros", "shadow"
 """Observers that have an option of their own."""
 GOALS = "goals"
-"""Argument of the ROS node of a live run: it accepts goal poses."""
+"""Argument of the ROS node of a live run, which accepts goal poses."""
 
 
 class PageControls(Watcher, OffersStop, Protocol):
-    """The page of a run, which may also command it."""
+    """The page of a run, which may command it."""
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether the dead man's button is held; True without one."""
         ...
 
     def pressed(self) -> list[str]:
-        """Return the settings that the page changed since the last call."""
+        """Return the settings changed since the last call."""
         ...
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
@@ -92,7 +92,7 @@ class Watchers:
 
 
 def open_observer(name: str, argument: str = "") -> AbstractContextManager[Any]:
-    """Return the observer that a plug-in opens.
+    """Return the observer of a plug-in.
 
     Raises:
         InputError: the observer does not exist.
@@ -111,7 +111,7 @@ def watched(
     *,
     live: bool = False,
 ) -> Iterator[Watchers | None]:
-    """Open the observers that are asked for; None without any.
+    """Open the requested observers; None without any.
 
     Args:
         view: open the page.

@@ -1,5 +1,5 @@
-"""The run's log: everything the loop knows, as one MCAP file that opens in Foxglove.
+"""The run's log: one MCAP file that opens in Foxglove.
 
-Rows go in through ``writer.RunLog`` while the robot moves, and come back as the arrays of
-``record.RunRecord`` through ``reader.read_log``, also from a file that a kill has cut short.
+``writer.RunLog`` writes rows during the run; ``reader.read_log`` returns the arrays of
+``record.RunRecord``, also from a truncated file.
 """

@@ -1,7 +1,7 @@
-"""Description of a log's fields: type, shape, digits, and the curve that shows a field.
+"""Fields of a log: type, shape, digits, and the curve of a field.
 
-``topics`` declares a table class for each topic; each of its fields is annotated with a ``Column``.
-Writer, reader, exports and curves read these descriptions.
+``topics`` annotates each field of a table class with a ``Column``, which writer, reader, exports
+and curves read.
 """
 
 import json

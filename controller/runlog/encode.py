@@ -1,8 +1,7 @@
 """Numbers to JSON: rounded below any sensor's resolution, NaN as null, valid JSON only.
 
-Goals keep every digit, so that a replay can use and compare them exactly. The rows of every cycle
-are printed with a fixed number of digits, ``%.6f`` by a compiled loop and ``%.17g`` by a template.
-The numbers are the same, and this is quicker than the shortest exact text.
+Goals keep every digit, so that a replay is exact. Rows of every cycle have a fixed number of
+digits: a compiled loop prints ``%.6f``, a template ``%.17g``, faster than the shortest exact text.
 """
 
 import json

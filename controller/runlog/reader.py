@@ -186,7 +186,6 @@ def _unpacked(chunk: Chunk) -> Chunk:
 
 
 def _said_bytes(chunk: bytes) -> int:
-    """Unpacked bytes that a chunk states; the lesser, if its frame states otherwise."""
     said, name_length = _CHUNK_HEAD.unpack_from(chunk)
     frame = _CHUNK_HEAD.size + name_length + _CHUNK_LENGTH
     try:

@@ -1,9 +1,9 @@
-"""The line between a run and an observer, e.g. its page: rows of the log out, commands back.
+"""Line between a run and an observer, such as its page: rows out, commands back.
 
-The run never waits: rows that do not fit the socket stay here, only the newest of each kind of
-measurement, and are sent when the observer asks for them. An observer that is slow, stopped or dead
-is not sent anything. A request is a line of text: an empty one asks for the newest rows, any other
-is a command of an operator at the page, such as ``frequency_hz=0.4``, or of a ROS graph.
+The run never waits: it keeps rows that do not fit the socket, only the newest of each measurement,
+and sends them on request. A slow, stopped or dead observer gets nothing. A request is a line of
+text: an empty one requests the newest rows, any other is an operator's command, such as
+``frequency_hz=0.4``.
 """
 
 import json
@@ -33,8 +33,8 @@ _COMMANDS_MAX: Final = 100
 _WAITING_BYTES: Final = 4 * LINE_BYTES
 """Commands that wait for the socket in the observer (ours); the oldest are dropped beyond it."""
 SILENT_S: Final = 3.0
-"""An observer that has not asked for rows for this time does not respond (ours): it asks 20 times a
-second, and a page on a busy machine may be late by a second."""
+"""An observer without a request for this time does not respond (ours): it requests rows 20 times a
+second, and on a busy machine late by a second."""
 _START_S: Final = 60.0
 """The same before it has shown a cycle (ours): building a scene needs seconds."""
 _STEP_MAX_S: Final = 0.1
@@ -125,7 +125,6 @@ class RunEnd:
         self._line.close()
 
     def _next(self) -> bool:
-        """Whether there is anything to send."""
         if len(self._out):
             return True
         if self._kept:
@@ -164,7 +163,6 @@ class RunEnd:
             self._in.clear()
 
     def _end_line(self) -> None:
-        """Accept or reject the line that is complete."""
         size, line = self._in_bytes, bytes(self._in)
         self._in_bytes = 0
         self._in.clear()

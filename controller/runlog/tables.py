@@ -86,7 +86,6 @@ def table_of(kind: type[T], rows: Sequence[Row], sizes: Mapping[str, int]) -> T:
 
 
 def _cells(name: str, column: Column, rows: Sequence[Row], sizes: Mapping[str, int]) -> Any:
-    """Values of a field in all rows."""
     if column.default is REQUIRED:
         values = [row[name] for row in rows]
     else:

@@ -1,10 +1,10 @@
-"""The topics of a log: a table class for each, which describes its rows.
+"""Topics of a log: a table class for each, which describes its rows.
 
-This is the only place that lists topics and fields. Writer, reader, tables, exports and curves
-follow from it. Unknown numbers are null in the log and NaN here. Times are those of the run's
-clock (simulated or monotonic), never the date.
+Writer, reader, tables, exports and curves follow from this list. Unknown numbers are null in the
+log and NaN here. Times are those of the run's clock (simulated or monotonic), never the date.
 
-A new field needs a default: older logs lack it. ``FORMAT`` rises when a field changes its meaning.
+A new field needs a default, because older logs lack it. ``FORMAT`` rises when a field changes its
+meaning.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,7 @@
-"""The truth of a served robot: one JSON object a line, written by the server alone.
+"""Truth of a served robot: one JSON object per line, written by the server alone.
 
-The first line describes the robot and its world. Every other line is a pose that was measured: its
-number, the time on the clock of the servos, when its datagram arrived (null: never), and where the
-body was.
+The first line describes robot and world. Each other line is a measured pose: its number, its time
+on the servos' clock, the arrival of its datagram (null: never), and the place of the body.
 """
 
 import json

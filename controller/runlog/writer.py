@@ -38,17 +38,17 @@ Level = Literal["info", "warning", "error"]
 _LOGGER: Final = logging.getLogger("snakewalk")
 _FLUSH_S: Final = 0.5
 _BATCH: Final = 32
-"""Rows that are printed together (ours): about ten cycles. Between two cycles of a run on servos
-the processor's caches forget the code that prints; in a batch a row costs a third of the time."""
+"""Rows printed together (ours): about ten cycles. A row in a batch costs a third of the time,
+because the processor's caches forget the printing code between two cycles."""
 _CHUNK_BYTES: Final = 1 << 20
 
 
 class RunLog:
-    """One run's log; a context manager. Writes ``<path>.part``, renamed to ``path`` on leaving.
+    """Log of one run, as a context manager: ``<path>.part``, renamed to ``path`` at the end.
 
-    Times must not be negative. Any method raises OSError when the disk does not accept the bytes.
-    ``on_row`` gets the topic and the JSON of every row as well, at once; without it the rows of
-    fast topics are printed in batches, within ``_FLUSH_S``.
+    Times must not be negative. Any method raises OSError if the disk does not accept the bytes.
+    ``on_row`` gets the topic and the JSON of every row at once; without it the rows of fast topics
+    are printed in batches, within ``_FLUSH_S``.
     """
 
     def __init__(self, path: Path, on_row: Callable[[str, bytes], None] | None = None) -> None:
@@ -227,7 +227,6 @@ class RunLog:
             self._write_batch()
 
     def _flush(self) -> None:
-        """Give all rows to the operating system."""
         self._write_batch()
         self._writer.flush()
 
@@ -272,7 +271,6 @@ class RunLog:
 
 
 def _kept(row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a row whose arrays nobody changes."""
     return {
         name: value.copy() if isinstance(value, np.ndarray) and value.flags.writeable else value
         for name, value in row.items()

@@ -1,8 +1,7 @@
-"""Slowing down before a servo trips: heat, current, supply and lag against the safety limits.
+"""Slows a motion before a servo trips: heat, current, supply and lag against the limits.
 
-The rate is 1 while everything is well and falls to ``LEAST`` where a limit would be reached, so a
-motion goes on slower, cooler and with less current instead of stopping. It falls quickly and comes
-back slowly. The safety layer is unchanged: a state that still gets worse trips.
+The rate is 1 normally and falls to ``LEAST`` near a limit, so a motion continues slower, cooler and
+with less current. It falls quickly and recovers slowly. The safety layer is unchanged.
 """
 
 import math
@@ -30,8 +29,8 @@ VOLTAGE_BAND, VOLTAGE_EDGE = 1 / 15, 1 / 60
 FALL_S, RISE_S = 0.4, 6.0
 """Time constants of the rate."""
 LAG_START, LAG_END = 0.6, 0.95
-"""Shares of the limit of the following error; a lag without a fault uses half of it at most. A
-joint whose current is limited is left out: the ground may hold it off its goal, at any rate."""
+"""Shares of the following error's limit; a healthy lag uses half of it at most. A current-limited
+joint does not count: the ground may hold it off at any rate."""
 AVERAGE_S = 0.2
 """Averaging time of current and lag: a peak is not a load."""
 WINDING_BAND_C, WINDING_EDGE_C = 25.0, 5.0

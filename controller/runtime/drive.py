@@ -68,11 +68,11 @@ _ended_runs = count(1)
 
 @contextmanager
 def _no_long_collections() -> Iterator[None]:
-    """Exclude the objects that exist now from Python's garbage collections.
+    """Exclude present objects from Python's garbage collections.
 
-    A collection of all imports and plans stops the program for 0.1 s and more, and the bus watchdog
-    of the servos trips at 0.2 s. Python does not collect the cycles of earlier runs by itself
-    afterwards: a process of many runs would grow by 1 MB or more with each.
+    A collection of all imports and plans needs 0.1 s and more, and the bus watchdog trips at 0.2 s.
+    Cycles of earlier runs then need an explicit collection; otherwise a process grows by 1 MB with
+    each run.
     """
     if gc.get_freeze_count() > 0:  # by the caller
         yield
@@ -223,7 +223,6 @@ class Drive:
 
     @property
     def _waypoints(self) -> int:
-        """How many are in force."""
         return len(self._run.waypoints_m if self._waypoints_m is None else self._waypoints_m)
 
     def run(self) -> Outcome:
@@ -323,7 +322,6 @@ class Drive:
                 )
 
     def _log_battery(self, time_s: float, state: JointState) -> None:
-        """Log supply and load once a second."""
         load = self._load
         if load is None or time_s < self._battery_s + BATTERY_S:
             return

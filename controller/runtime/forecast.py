@@ -1,9 +1,8 @@
-"""A run on paper: the pilot steers a quasi-static body, so that a plan is checked before torque.
+"""A run on paper: the pilot steers a quasi-static body, to check a plan before torque.
 
-Each step asks the pilot for joint goals, lets the shape change, and finds the rigid velocity that
-balances Coulomb friction and the pull of the slope under each link
-(``controller.mechanics.rigid_motion``). No servo lag; inertia only where nothing holds the body.
-Links lie flat in plan, bear equal weights.
+In each step the shape follows the pilot's goals, and the rigid velocity balances Coulomb friction
+and gravity under each link (``controller.mechanics.rigid_motion``). Servos do not lag, and inertia
+counts only where nothing holds the body. Links lie flat in plan with equal weights.
 """
 
 from dataclasses import dataclass
@@ -38,7 +37,7 @@ class Slide:
 
     slope_rad: float
     """Mean slope under the body, where it was held least."""
-    held_rad: float
+    holding_rad: float
     """Torque that it could have held there, in that shape."""
     lasted_s: float
     """All the time that nothing held it."""
@@ -165,7 +164,6 @@ class _PaperBody:
         self.joints = joints
 
     def view(self) -> BodyView:
-        """Return the body in the world."""
         pose = pose_at(self._head_m, self._head_rad)
         return body_in_world(self._robot, pose, self.joints)
 
@@ -242,11 +240,11 @@ def _worse(
     """Add a step that nothing holds; keep where the body falls short most."""
     factor = holding_factor(points_m, headings_rad, friction, tangential, normal)
     steepness = float(np.hypot(*(tangential / normal[:, None]).mean(axis=0)))
-    slope_rad, held_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))
+    slope_rad, holding_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))
     lasted_s = step_s + (slide.lasted_s if slide else 0.0)
-    if slide is not None and slide.held_rad - slide.slope_rad <= held_rad - slope_rad:
-        slope_rad, held_rad = slide.slope_rad, slide.held_rad
-    return Slide(slope_rad, held_rad, lasted_s)
+    if slide is not None and slide.holding_rad - slide.slope_rad <= holding_rad - slope_rad:
+        slope_rad, holding_rad = slide.slope_rad, slide.holding_rad
+    return Slide(slope_rad, holding_rad, lasted_s)
 
 
 _HEADROOM = 1.05

@@ -1,8 +1,8 @@
-"""Friction monitor: estimates the friction under the body while it moves.
+"""Estimates the friction under the body during its motion.
 
 Every second and a half, less often while the file's friction holds, a model replays the measured
-motion under three frictions, one a cycle. The one that brings the body to its measured place gives
-the ground's. The model is a twin, or the balance of forces on a level floor.
+motion under three frictions, one per cycle. The best one gives the estimate. The model is a twin,
+or the balance of forces on a level floor.
 """
 
 from abc import ABC, abstractmethod
@@ -24,9 +24,8 @@ SPAN_S = 1.5
 """Duration of motion that is replayed (ours): in a shorter span the initial speed counts too much,
 in a longer one bodies diverge."""
 _SETTLED, _RESTS = 4, 3
-"""After this number of spans in a row in which the file's friction held, this number is skipped
-behind each replayed one (ours). This is a quarter of the cost, and up to 4.5 s until a change is
-seen."""
+"""After ``_SETTLED`` spans in a row that confirm the file's friction, ``_RESTS`` are skipped behind
+each replayed one (ours): a quarter of the cost, and up to 4.5 s until a change is visible."""
 _STRIDE = 5
 """Cycles in a step on paper."""
 _NOTABLE = 0.25
@@ -74,8 +73,8 @@ class OnTwin:
     """A ``SlideModel``: physics moves a second body by the goals that were sent."""
 
     sigma: Final = (0.012, 0.012, 0.035)
-    """A little more than the median error with the true friction on rough slopes, 3 mm and 0.6
-    degrees in a second (ours): sometimes a link that gets stuck is far off."""
+    """Slightly more than the median error with the true friction on rough slopes, 3 mm and 0.6
+    degrees in a second (ours): a stuck link is sometimes far off."""
 
     def __init__(self, robot: RobotConfig, make_twin: Callable[[], Twin]) -> None:
         self._robot, self._make_twin = robot, make_twin
@@ -99,7 +98,7 @@ class OnPaper:
     """A ``SlideModel`` of a level floor: friction under the measured shapes is in balance."""
 
     sigma: Final = (0.02, 0.02, 0.05)
-    """Includes the error of a camera (ours). On hills it is not a valid model: few links bear the
+    """Includes the error of a camera (ours). The model is invalid on hills: few links bear the
     body, and the error would look like friction."""
 
     def __init__(self) -> None:
@@ -228,9 +227,9 @@ class FrictionMonitor(FrictionEstimator):
 
     def _judge(self, span: Span) -> Iterator[FoundFriction | None]:
         """Replay a span, a hypothesis a cycle; the result comes last."""
-        foretold = []
+        predicted = []
         for friction in self._filter.hypotheses():
-            foretold.append(self._model.slid(span, friction))
+            predicted.append(self._model.slid(span, friction))
             yield None
         since_s, self._since_s = self._since_s, 0.0
-        yield self._filter.update(span.slid, np.array(foretold), since_s)
+        yield self._filter.update(span.slid, np.array(predicted), since_s)

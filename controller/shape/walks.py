@@ -206,7 +206,6 @@ class _WalkState:
         return self.branches[-1]
 
     def free(self, near: list[int], rng: np.random.Generator) -> int:
-        """Any unvisited neighbour, else any."""
         pool = self._fresh(near) or near
         return pool[int(rng.random() * len(pool))]
 

@@ -1,4 +1,4 @@
-"""How fast a walk covers a graph, and how soon it comes back: rule x graph x repeats (Fig. 9)."""
+"""How fast a walk covers a graph, and how soon it returns: rule x graph x repeats (Fig. 9)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,19 +40,20 @@ class StudyResult:
     mean_degree: float
     """Measured, mean over the graphs."""
     cover: Floats
-    """(R,) steps until all states were seen, over |V|; NaN where V^2 steps were not enough."""
+    """(R,) steps until all states were visited, over |V|; NaN after V^2 steps."""
     short_returns: Floats
-    """(R,) share of returns to a state after less than 0.05 |V| steps, until cover."""
+    """(R,) share of returns after less than 0.05 |V| steps, until cover."""
     short_steps: Floats
     """(R,) such returns as a share of all steps."""
     short_per_state: Floats
     """(R,) such returns over |V|: comparable between walks of different length."""
     leaves: Floats
-    """(R,) share of states with one neighbour: each but the walk's ends forces a short return."""
+    """(R,) share of states with one neighbour; each except the walk's ends forces a short
+    return."""
     grid: Floats
     """(G,) steps over |V|."""
     visited: Floats
-    """(G,) share of states visited after each number of steps, mean over the repeats."""
+    """(G,) share of visited states after each number of steps, mean over the repeats."""
 
     def to_dict(self) -> dict[str, object]:
         """Plain numbers, for JSON."""
@@ -124,7 +125,7 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
 
 
 def return_gaps(done: Walk) -> NDArray[np.int64]:
-    """Steps between consecutive visits of the same state, over all states, (returns,)."""
+    """Steps between consecutive visits of the same state, (returns,)."""
     order = np.argsort(done.path, kind="stable")
     same = done.path[order][1:] == done.path[order][:-1]
     return np.asarray(np.diff(order)[same])

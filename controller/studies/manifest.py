@@ -3,7 +3,7 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("backend", "processes", "The compiled simulator with bus and servos, a point at a time in each process.", "snakewalk.controller.studies.sweep_backends:ProcessBackend", ""),
+    ("backend", "processes", "Compiled simulator with bus and servos, one point per process at a time.", "snakewalk.controller.studies.sweep_backends:ProcessBackend", ""),
     ("backend", "warp", "MuJoCo-Warp for many robots at once on a level floor; the argument is a Warp device.", "snakewalk.controller.studies.sweep_backends:WarpBackend", ""),
     ("command", "compare", "Compare runs: their numbers, and the differences of run, robot and world.", "snakewalk.controller.studies.commands.compare:compare", "The job"),
     ("command", "identify", "Find a servo's constants from its pendulum, or friction and mass from logs of runs.", "snakewalk.controller.studies.commands.identify:identify", "The bus"),

@@ -1,4 +1,4 @@
-"""Simulators of a sweep, as plug-ins: each yields the measurements of points as they finish."""
+"""Simulators of a sweep, as plug-ins; each yields finished measurements."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -50,10 +50,10 @@ class SweepBackend(Protocol):
 
 
 def open_backend(text: str, workers: int, dask: str | None) -> SweepBackend:
-    """Return the backend that ``--backend NAME[:ARGUMENT]`` means.
+    """Return the backend of ``--backend NAME[:ARGUMENT]``.
 
     Raises:
-        InputError: it does not exist, or refuses the options.
+        InputError: it does not exist, or rejects the options.
 
     """
     name, _, argument = text.partition(":")
@@ -63,7 +63,7 @@ def open_backend(text: str, workers: int, dask: str | None) -> SweepBackend:
 
 @plugin("backend", "processes")
 class ProcessBackend:
-    """The compiled simulator with bus and servos, a point at a time in each process."""
+    """Compiled simulator with bus and servos, one point per process at a time."""
 
     def __init__(self, options: SweepOptions) -> None:
         if options.argument:
@@ -91,5 +91,5 @@ class WarpBackend:
         self._device = options.argument or None
 
     def measure(self, points: Sequence[Point]) -> Iterator[Result]:
-        """Yield the points of each batch, then those that the compiled simulator has to run."""
+        """Yield the points of each batch, then those of the compiled simulator."""
         return self._sweep(points, self._device)

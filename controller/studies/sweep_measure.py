@@ -1,4 +1,4 @@
-"""One point of a sweep on the physics: through bus, safety layer and simulated servos."""
+"""One point of a sweep on the physics, with bus, safety layer and simulated servos."""
 
 import math
 from dataclasses import dataclass, replace
@@ -25,10 +25,10 @@ P = TypeVar("P", bound=GroundedRun)
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """A point's results, in five digits; None: not known. The fields are columns of a table."""
+    """Results of a point, in five digits; None if unknown. The fields are columns of a table."""
 
     ended: str
-    """``ran to its end``, the trip, or ``refused: ...``: then nothing else is known."""
+    """``ran to its end``, the trip, or ``refused: ...``, without further values."""
     cycles: int | None = None
     ran_hz: float | None = None
     """Cycles a second that the joints could follow."""
@@ -61,7 +61,7 @@ SUPPLY_SPREAD = 0.05
 def measure(point: Point, vary: int | None = None) -> Measurement:
     """Run a point and return its results.
 
-    ``vary`` draws other friction (up to 15 % off) and another supply (5 %), by its seed.
+    ``vary`` draws friction (up to 15 % off) and supply (5 %) by the point's seed.
     """
     try:
         prepared = prepared_point(point)
@@ -138,7 +138,7 @@ def measurement(
 
 
 def varied(prepared: P, rng: np.random.Generator) -> P:
-    """Return a run with other friction (up to 15 % off) and another supply (5 %)."""
+    """Return a run with another friction (up to 15 % off) and supply (5 %)."""
     world, robot = prepared.world, prepared.robot
     slick, volts = rng.uniform(-1.0, 1.0, 2)
     factor = 1.0 + FRICTION_SPREAD * slick
@@ -158,5 +158,4 @@ def varied(prepared: P, rng: np.random.Generator) -> P:
 
 
 def _digits(value: float | None) -> float | None:
-    """Five digits, and None for unknown values: a table is also read by people."""
     return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""Points of a sweep: a Sobol sequence over the parameters of gaits, as far as robots allow them."""
+"""Points of a sweep: a Sobol sequence over the parameters of gaits."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ SLOWEST_HZ = 0.2
 _BLOCK = 10
 """Points that are drawn at a time, as a power of two."""
 _TRIES = 64
-"""Most draws for each point: a robot may refuse most of a range."""
+"""Most draws per point: a robot may reject most of a range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +38,11 @@ class Point:
     seconds: float
     parameters: dict[str, Any] = field(default_factory=dict)
     keys: tuple[tuple[str, Any], ...] = ()
-    """Values of run, robot and world that are replaced, as of ``prepare_gait``."""
+    """Replaced values of run, robot and world, as in ``prepare_gait``."""
 
     @property
     def key(self) -> tuple[str, ...]:
-        """Key that separates it from other points of a table, as text."""
+        """Unique key in a table, as text."""
         place = (self.gait, self.robot, self.world)
         replaced = " ".join(f"{key}={value}" for key, value in self.keys)
         return (*place, replaced, str(self.number), str(self.seed), f"{self.seconds:g}")
@@ -57,7 +57,7 @@ class Space:
 
     @classmethod
     def of(cls, gait: type[Gait]) -> "Space":
-        """All numbers of the gait; mirroring does not make a new gait."""
+        """All numbers of the gait; a mirrored gait is not another one."""
         spans = {k: span for k, span in ranges(gait.model).items() if span.kind is not bool}
         return cls(gait, spans)
 
@@ -89,13 +89,13 @@ def points_of(
     file: str | None = None,
     keys: Mapping[str, Any] | None = None,
 ) -> tuple[list[Point], int]:
-    """Return up to ``count`` points that the robot's joints allow, and how many they did not.
+    """Return up to ``count`` points that the joints allow, and the number of rejected ones.
 
-    ``file`` is where the robot stands if it is not shipped: a worker loads it again, with ``keys``,
-    which ``robot`` has already.
+    ``file`` is the file of a robot that is not shipped; a worker loads it with ``keys``, which
+    ``robot`` already has.
 
     Raises:
-        InputError: the robot lacks joints that the gait needs.
+        InputError: the robot lacks joints of the gait.
 
     """
     gait().check(robot)
@@ -129,7 +129,7 @@ def _draws(sobol: qmc.Sobol, exponent: int) -> Iterator[Floats]:
 
 
 def robot_file(name_or_path: str) -> str | None:
-    """Return the whole path of a robot's own file; None of a shipped robot."""
+    """Return the absolute path of a user's robot; None for a shipped one."""
     return str(Path(name_or_path).resolve()) if name_or_path.endswith(".toml") else None
 
 
@@ -142,7 +142,7 @@ class Planned:
 
     points: list[Point]
     left_out: list[str]
-    """Gaits that a robot cannot make, and points that its joints do not allow."""
+    """Gaits that a robot cannot make, and points outside its joints' ranges."""
 
 
 def plan_sweep(
@@ -154,7 +154,7 @@ def plan_sweep(
     seconds: float,
     keys: Mapping[str, Any] | None = None,
 ) -> Planned:
-    """Draw the points, once where a name stands twice; ``keys`` as of ``prepare_gait``.
+    """Draw the points, once per name; ``keys`` as in ``prepare_gait``.
 
     Raises:
         InputError: unknown gaits, robots or keys, or nothing that fits.

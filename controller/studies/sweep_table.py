@@ -1,7 +1,7 @@
-"""The table of a sweep, one tidy CSV, and its digest.
+"""Table of a sweep, one tidy CSV, and its digest.
 
-The table has a row for each finished point, written when it finishes; the digest has one for each
-gait and robot, with the defaults and the best point of each kind.
+The table has a row per finished point; the digest one per gait and robot, with the defaults and the
+best points.
 """
 
 import math
@@ -20,9 +20,9 @@ _PLACE = ("gait", "robot", "world", "keys", "number", "seed", "seconds")
 _MEASURED = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
 COLUMNS = (*_PLACE, *_MEASURED, *_PARAMETERS)
-"""Empty where a gait has no such parameter, or nothing could be measured."""
+"""A cell is empty if the gait lacks the parameter, or the value is unknown."""
 _ADDED = ("backend",)
-"""Columns that a table of an earlier version may lack; its new rows lack them as well."""
+"""Columns that tables of earlier versions lack; their new rows lack them, too."""
 _TEXT = ("gait", "robot", "world", "keys", "ended", "pose_evidence", "pose_source", "backend")
 _INTEGER = ("number", "seed", "cycles")
 _TRUTH = tuple(
@@ -46,17 +46,17 @@ KINDS: dict[str, Kind] = {column: _kind(column) for column in COLUMNS}
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
-    """Read the whole rows of a table; a torn last line is dropped.
+    """Read the complete rows of a table; a torn last line is dropped.
 
     Raises:
-        InputError: no table of a sweep.
+        InputError: it is not the table of a sweep.
 
     """
     return list(table_rows(path))
 
 
 def table_rows(path: Path) -> Iterator[dict[str, str]]:
-    """Yield the whole rows of a table one by one; otherwise as ``read_table``."""
+    """Yield the complete rows of a table; otherwise as ``read_table``."""
     return read_csv_table(path, COLUMNS, "sweep", _ADDED)
 
 
@@ -101,7 +101,7 @@ UNITS: dict[Aim, str] = {"advance": "m/s", "climb": "m/s up", "turn": "rad/s"}
 
 @dataclass(frozen=True, slots=True)
 class GaitDigest:
-    """A gait on a robot in a sweep, rounded for a reader; None: not known."""
+    """A gait on a robot in a sweep, rounded; None if unknown."""
 
     gait: str
     robot: str
@@ -126,8 +126,6 @@ class GaitDigest:
 
 
 class _Running:
-    """Numbers of a gait, robot and set of replaced values, from rows that are seen once."""
-
     def __init__(self) -> None:
         self.points = self.ran = 0
         self.first: dict[str, str] | None = None
@@ -135,7 +133,6 @@ class _Running:
         self.torque_n_m = self.celsius = math.nan
 
     def add(self, row: dict[str, str]) -> None:
-        """Count a row."""
         self.points += 1
         if not row["cycles"] or row["ended"] != "ran to its end":
             return
@@ -150,7 +147,7 @@ class _Running:
 
 
 def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
-    """Return one row a gait, robot and set of replaced values, as they appear."""
+    """Return one row per gait, robot and set of replaced values, in their order."""
     found: dict[tuple[str, str, str], _Running] = {}
     for row in rows:
         found.setdefault((row["gait"], row["robot"], row["keys"]), _Running()).add(row)
@@ -177,7 +174,7 @@ def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
 
 
 def pace(row: dict[str, str]) -> float:
-    """Pace of the gait in its purpose: m/s over ground or upwards, or rad/s turned."""
+    """Pace in the gait's purpose: m/s over ground or upwards, or rad/s turned."""
     aim = GAITS[row["gait"]].aim
     if aim == "turn":
         return abs(number(row, "turn_rad_cycle")) * number(row, "ran_hz")

@@ -46,7 +46,7 @@ class Case:
     relief: float = 1.0
     """Factor on the heights of the ground."""
     keys: tuple[tuple[str, Value], ...] = ()
-    """Values of the run's, robot's and world's files that are replaced; ``_deg`` for ``_rad``."""
+    """Replaced values of run, robot and world; ``_deg`` for ``_rad``."""
     compliance: bool | None = None
     """Whether joints yield to measured current."""
     world: str | None = None
@@ -64,17 +64,17 @@ class Trial:
     case: Case
     seed: int
     start_m: tuple[float, float] | None = None
-    """Where the head started; None where the run could not be prepared."""
+    """Start of the head; None if the run could not be prepared."""
     waypoints: int = 0
     complete: bool = False
-    """Whether the body truly came to every waypoint, by the simulator, without a trip."""
+    """Whether the body truly reached every waypoint, without a trip."""
     reached: int = 0
     """Waypoints that the body truly came to, in order."""
     missed: int = 0
-    """How often another path was laid: a waypoint was passed by, the body off it, or stuck."""
+    """Number of new paths after a missed waypoint, or a body off the path or stuck."""
     duration_s: float = math.nan
     slope_median_deg: float = math.nan
-    """Slope of the surface in the strip along the path that the body lies on."""
+    """Median slope of the surface in the body's strip along the path."""
     path_error_m: float = math.nan
     """Mean."""
     path_error_max_m: float = math.nan
@@ -91,34 +91,34 @@ class Trial:
     in_air: float = math.nan
     """Share of links that do not touch the ground, mean."""
     truly_reached: float = math.nan
-    """Waypoints that the body came to, where its pose was estimated; NaN of a measured one."""
+    """Truly reached waypoints with an estimated pose; NaN with a measured one."""
     head_error_m: float = math.nan
-    """How far the estimated head is off, root of the mean square; NaN of a measured one."""
+    """Root mean square error of the estimated head; NaN with a measured pose."""
     pose_evidence: str = ""
-    """How the poses that the walk used are known; ``measured``, ``dead-reckoned``, ..."""
+    """Evidence of the poses: ``measured``, ``dead-reckoned``, ..."""
     pose_source: str = ""
     alarms: int = 0
     """For missing advance."""
     cause: str = ""
-    """Cause of an incomplete run: that of ``metrics.failure``, or ``refused`` or ``error``."""
+    """Cause of an incomplete run, of ``metrics.failure``, or ``refused`` or ``error``."""
     why: str = ""
     """The same in a sentence."""
 
     @property
     def first_pass(self) -> bool:
-        """Whether every waypoint was reached on the first path that was laid."""
+        """Whether every waypoint was reached on the first path."""
         return self.complete and self.missed == 0
 
 
 def prepare_case(
     case: Case, seed: int, spread_m: float, changes: Mapping[str, object]
 ) -> PreparedRun:
-    """Prepare one trial's run; its start is moved by a normal deviate, drawn from the seed.
+    """Prepare one trial's run; a normal deviate from the seed moves its start.
 
-    A walk's start on unsafe ground is drawn again, so that the moved start does not fail by itself.
+    A walk's start on unsafe ground is drawn again.
 
     Raises:
-        InputError: the run cannot be prepared, or the ground about its start is not safe.
+        InputError: the run cannot be prepared, or the ground about its start is unsafe.
 
     """
     found = _prepared(case, seed, changes)
@@ -180,7 +180,7 @@ def _value(word: str) -> Value:
 
 
 def config_digest(case: Case, changes: Mapping[str, object]) -> str:
-    """Tell the configuration of a case from every other: run, robot, world, but for seed and start.
+    """Digest of a case: run, robot and world without seed and start.
 
     Raises:
         InputError: the case cannot be prepared.
@@ -193,8 +193,7 @@ def config_digest(case: Case, changes: Mapping[str, object]) -> str:
 def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
     """Whether all seeds give the same run, so that it counts once.
 
-    The seed draws the start, the walk's shapes, a camera's noise and an IMU's bias and noise, and
-    nothing of a serpenoid or of a gait.
+    The seed draws the start, the walk's shapes, a camera's noise, and an IMU's bias and noise.
     """
     run = prepare_case(case, 0, 0.0, changes).run
     drawn = run.pose in {"camera", "imu"}
@@ -202,7 +201,7 @@ def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool
 
 
 def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, object]) -> Trial:
-    """Simulate one run; its log is not kept. A run that ends in an exception is a trial as well."""
+    """Simulate one run without its log; an exception is a result as well."""
     trial = Trial(case, seed)
     try:
         prepared = prepare_case(case, seed, spread_m, changes)
@@ -255,12 +254,12 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
 def plan_trials(
     cases: Sequence[Case], seeds: Sequence[int], spread_m: float, changes: Mapping[str, object]
 ) -> list[tuple[Case, int]]:
-    """List the runs to do, seed by seed: after an early stop each case has nearly as many runs.
+    """List the runs to do, seed by seed, so that an early stop leaves complete seeds.
 
-    A case of which all seeds give the same run stands once.
+    A case with equal runs for all seeds is listed once.
 
     Raises:
-        InputError: a case cannot be prepared, or the recording that its shapes come from not read.
+        InputError: a case cannot be prepared, or its recording cannot be read.
 
     """
     shaped = [case for case in cases if case.motion not in {"serpenoid", "gait"}]
@@ -293,7 +292,7 @@ def _run_seed(item: tuple[Case, int], *, spread_m: float, changes: Mapping[str, 
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
-    """The trials of one case, rounded for a reader; None: not known. The fields are columns."""
+    """Trials of one case, rounded; None if unknown. The fields are columns."""
 
     run: str
     robot: str
@@ -326,7 +325,7 @@ class CaseSummary:
     causes: dict[str, int]
     """Number of runs by cause of failure, most first."""
     why: str
-    """The same in a line; errors that the software did not foresee are in full."""
+    """The reasons in a line; unforeseen errors in full."""
     compliance: str = ""
     """``on`` or ``off`` where it was chosen."""
     speed_m_s: float | None = None
@@ -334,7 +333,7 @@ class CaseSummary:
     speed_sd_m_s: float | None = None
     """Standard deviation of that speed from run to run."""
     truly_complete: str = ""
-    """``n of m`` runs whose body came to every waypoint, where its pose was estimated."""
+    """``n of m`` runs that truly reached every waypoint, with an estimated pose."""
     head_error_m: float | None = None
     """Error of an estimated pose, mean over the runs."""
     world: str = ""
@@ -342,11 +341,11 @@ class CaseSummary:
     pose: str = ""
     """Evidence of the poses: ``measured (simulator)``."""
     rolled: int = 0
-    """Runs in which the head link was over 90 degrees on its side at some time."""
+    """Runs in which the head link was over 90 degrees on its side."""
 
 
 def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
-    """One row a case: runs complete, means and extremes over its runs, and why others failed."""
+    """One row per case: complete runs, means and extremes, and reasons of failures."""
     rows: list[CaseSummary] = []
     for case in cases:
         some = sorted((t for t in found if t.case == case), key=lambda t: t.seed)
@@ -418,13 +417,12 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
 
 
 def reasons(failed: Sequence[Trial]) -> str:
-    """Why runs failed and in a line: ``2 slip; 1 refused: ...``."""
+    """Reasons of failures in a line: ``2 slip; 1 refused: ...``."""
     words = [t.why if t.cause in {"safety", "refused", "error"} else t.cause for t in failed]
     return "; ".join(f"{count} {word}" for word, count in _counts(words).items())
 
 
 def _counts(words: Sequence[str]) -> dict[str, int]:
-    """Words by how often they occur."""
     return dict(sorted(sorted(Counter(words).items()), key=lambda item: -item[1]))
 
 

@@ -1,4 +1,4 @@
-"""The table of trials, one tidy CSV: a row for each finished run, written when it finishes."""
+"""Table of trials, one tidy CSV with a row per finished run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields

@@ -1,7 +1,7 @@
-"""The parameters of a gait that carry a robot fastest, or cheapest: differential evolution.
+"""Fastest or cheapest parameters of a gait, by differential evolution.
 
-R. Storn, K. Price, J. Global Optimization 11, 341-359, 1997, as scipy has it: it needs no gradient,
-keeps to the box of the parameters' ranges, and its generations run side by side.
+R. Storn, K. Price, J. Global Optimization 11, 341-359, 1997, in scipy: it needs no gradient, keeps
+the ranges, and runs a generation in parallel.
 """
 
 import math
@@ -26,7 +26,7 @@ from snakewalk.controller.studies.sweep_points import Point, Space, robot_file
 
 Aim = Literal["speed", "efficiency"]
 LAGGARD = 0.5
-"""For efficiency: share of the defaults' speed below which a gait does not count as moving."""
+"""For efficiency: share of the defaults' speed from which a gait counts as moving."""
 _WORST = 1e3
 
 
@@ -37,13 +37,13 @@ class Task:
     aim: Aim
     goal: Goal
     toward: tuple[float, float] = (1.0, 0.0)
-    """Unit vector, forward and left, along which the defaults go; another one is another gait."""
+    """Direction of the defaults, forward and left; another one is another gait."""
     least: float = 0.0
     """Pace of the defaults."""
 
 
 def pace(row: Measurement, task: Task) -> float:
-    """Pace of the gait in its purpose, m/s or rad/s; 0 if it did not run to its end."""
+    """Pace in the gait's purpose, m/s or rad/s; 0 for an incomplete run."""
     if row.ended != "ran to its end" or row.speed_m_s is None:
         return 0.0
     if task.goal == "turn":
@@ -56,7 +56,7 @@ def pace(row: Measurement, task: Task) -> float:
 
 
 def loss(row: Measurement, task: Task) -> float:
-    """Quantity that is minimised; a gait that trips, is derated, or hardly moves is rejected."""
+    """Minimised quantity; a gait that trips, is derated, or hardly moves is rejected."""
     speed = pace(row, task)
     if speed <= 0.0 or _value(row.least_rate) < 1.0:
         return _WORST
@@ -68,7 +68,7 @@ def loss(row: Measurement, task: Task) -> float:
 
 
 def task_of(row: Measurement, aim: Aim, goal: Goal) -> Task:
-    """Return a task that judges other parameters by the result of the defaults."""
+    """Return a task that judges parameters against the defaults' result."""
     forward, left = _value(row.forward_bl_cycle), _value(row.left_bl_cycle)
     size = math.hypot(forward, left)
     toward = (forward / size, left / size) if size > 1e-9 else (1.0, 0.0)
@@ -88,7 +88,7 @@ def _value(value: float | None) -> float:
 
 
 _GENERATION = 8
-"""Points a parameter and generation would be scipy's 15; runs of physics are dear."""
+"""Points per parameter and generation; scipy's 15 are too many for physics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +101,12 @@ class Tuned:
     parameters: dict[str, Any]
     tried: int
     default: tuple[float, ...]
-    """Speed in m/s (rad/s for a gait that turns on the spot), or cost of transport, a seed each."""
+    """Speed in m/s (rad/s for a turn in place), or cost of transport, per seed."""
     best: tuple[float, ...]
 
     @property
     def margin(self) -> float:
-        """How much better the mean is: 0.2 is a fifth faster, or a fifth cheaper."""
+        """Relative improvement of the mean: 0.2 is a fifth faster or cheaper."""
         before, after = float(np.mean(self.default)), float(np.mean(self.best))
         return after / before - 1.0 if self.aim == "speed" else 1.0 - after / before
 
@@ -130,9 +130,9 @@ def tune(
     keys: Mapping[str, Any] | None = None,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> Tuned:
-    """Search with about ``budget`` runs, then compare with the defaults on ``seeds`` other grounds.
+    """Search with about ``budget`` runs, then compare with the defaults on ``seeds`` grounds.
 
-    ``keys`` replace values of run, robot and world, as of ``prepare_gait``.
+    ``keys`` as in ``prepare_gait``.
 
     Raises:
         InputError: no such gait or robot, or they do not fit.

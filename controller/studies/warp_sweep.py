@@ -29,7 +29,7 @@ Result = tuple[Point, Measurement]
 
 
 def measure_together(points: Sequence[Point], device: str | None) -> Iterator[Result]:
-    """Yield the points of each batch, then those that the compiled simulator has to run."""
+    """Yield the points of each batch, then those of the compiled simulator."""
     groups: dict[tuple[object, ...], list[tuple[Point, GaitRun]]] = {}
     others: list[Point] = []
     reasons: dict[str, None] = {}

@@ -109,12 +109,10 @@ class _Knowledge:
 
     @cached_property
     def cautious(self) -> TerrainPlanner:
-        """Planner that treats unknown ground as unsafe."""
         return TerrainPlanner(self._ground, self._config, exact=False)
 
     @cached_property
     def open_relief(self) -> Relief:
-        """Relief that treats unknown ground as passable."""
         return Relief(self._ground, self._config, unknown_risk=0.0)
 
     @cached_property

@@ -110,7 +110,6 @@ class TerrainPlanner:
         return turns.onto(turn)
 
     def _base(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
-        """Path through points in any start direction."""
         yield 700
         if self.relief is None or self.graph is None:
             return SplinePath(points)
@@ -256,7 +255,6 @@ class TerrainPlanner:
         )
 
     def _unsafe(self, path: SplinePath, start: Floats, relief: Relief) -> Floats:
-        """Arc lengths where a path is unsafe, after it has left an unsafe start."""
         s = np.linspace(0.0, path.length_m, max(2, int(path.length_m / _CHECK_STEP_M) + 1))
         safe = relief.safe(*path.position(s).T)
         if not relief.safe(*start):
@@ -335,7 +333,6 @@ _CORNER_M = 1.0  # cost of a corner, as metres of path: few corners make wide be
 
 
 def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:
-    """Straighten corners until none can be dropped."""
     while len(shorter := at_once(straighten_in_steps(corners_m, graph))) < len(corners_m):
         corners_m = shorter
     return corners_m

@@ -88,6 +88,5 @@ def _is_joined(relief: Relief, risk: Floats, margin_m: float, points_m: Floats) 
 
 
 def _up(value: float) -> str:
-    """Round up to two digits."""
     unit = 10.0 ** (np.floor(np.log10(value)) - 1.0)
     return f"{np.ceil(value / unit - 1e-6) * unit:.2g}"

@@ -47,21 +47,21 @@ class Analysis:
         return float(self.pulse.typical * self.track.rate_hz / self.track.angles_rad.shape[1])
 
     @property
-    def pulse_not_told(self) -> str | None:
+    def pulse_unknown_reason(self) -> str | None:
         """Reason why pulse speed and all values divided by it are unknown, or None."""
         if self.wave.coarse:
-            return self.wave.not_told
+            return self.wave.unknown_reason
         if not np.isfinite(self.pulse.points_per_frame).any():
             return "no part of the body shows how far the pattern moved"
         return None
 
     @property
-    def travel_not_told(self) -> str | None:
+    def travel_unknown_reason(self) -> str | None:
         """Reason why travel and sliding are unknown, or None."""
         if self.advance is None:
             return "places are not recorded"
-        if self.pulse_not_told is not None:
-            return self.pulse_not_told
+        if self.pulse_unknown_reason is not None:
+            return self.pulse_unknown_reason
         travel = self._over_pulse(self.advance.along)
         if travel is None:
             return "the pattern does not move along the body"
@@ -79,7 +79,7 @@ class Analysis:
         1: every point follows the head's path. A much smaller value may be a current against the
         animal: the ground does not show how the body slides.
         """
-        if self.advance is None or self.travel_not_told is not None:
+        if self.advance is None or self.travel_unknown_reason is not None:
             return None
         return self._over_pulse(self.advance.along)
 
@@ -90,7 +90,7 @@ class Analysis:
         0: no sliding. Up to 1: the body glides in its shape. Below 0: the head advances less than
         the wave runs back.
         """
-        if self.advance is None or self.travel_not_told is not None:
+        if self.advance is None or self.travel_unknown_reason is not None:
             return None
         ratio = self._over_pulse(self.advance.head_speed(self.pulse.points_per_frame))
         return None if ratio is None or abs(ratio) < 1e-3 else 1.0 - 1.0 / ratio
@@ -130,7 +130,7 @@ class Analysis:
         spread = np.percentile(u[known], [25.0, 75.0]) * scale if known.any() else [np.nan] * 2
         angle, lateral = self.undulation.angle_rad, self.undulation.lateral
         at = [0, 25, 50, 75, 99]
-        no_wave, no_pulse = wave.not_told, self.pulse_not_told
+        no_wave, no_pulse = wave.unknown_reason, self.pulse_unknown_reason
         points, correlation = self.error_slope or (None, None)
         rms = np.sqrt(np.nanmean(pulse.body_error_rad**2)) if known.any() else np.nan
 
@@ -172,7 +172,7 @@ class Analysis:
             "one_pulse_error_correlation": of_pulse(correlation, 3),
             "travel": _number(self.travel, 3),
             "sliding_weight": _number(self.sliding, 3),
-            "travel_not_told": self.travel_not_told,
+            "travel_not_told": self.travel_unknown_reason,
             "angle_amplitude_rad": [round(float(angle[k]), 3) for k in at],
             "lateral_amplitude_body_lengths": [round(float(lateral[k]), 4) for k in [*at[:4], -1]],
             "bend_k_rad": round(float(np.median(track.bend_rad)), 3),

@@ -28,7 +28,7 @@ _STEPS = 6  # until frequency and smoothing are consistent
 
 @dataclass(frozen=True, slots=True)
 class Wave:
-    """The strongest travelling pattern of the curvature; ``not_told`` is None if it is a wave."""
+    """Strongest travelling pattern of the curvature; a wave has the ``unknown_reason`` None."""
 
     waves: float
     """Wavelengths on the body."""
@@ -53,7 +53,7 @@ class Wave:
         return self.frames_a_cycle < LEAST_FRAMES
 
     @property
-    def not_told(self) -> str | None:
+    def unknown_reason(self) -> str | None:
         """Reason why frequency, length and direction are unknown, or None."""
         if self.share < LEAST_SHARE:
             share = below(100.0 * self.share, 100.0 * LEAST_SHARE, digits=0)
@@ -122,7 +122,6 @@ def measure_wave(track: Track) -> Wave:
 
 
 def _of_runs(track: Track, number: Ints) -> Wave:
-    """Wave of a recording with gaps, from runs of frames."""
     curvature = smooth_curvature(track.angles_rad)
     found = gapped_wave(number, curvature)
     slope = _slope(found.mode)

@@ -1,8 +1,7 @@
-"""A gamepad at the computer of the page's user: the browser sends its state, this process reads it.
+"""A gamepad at the computer of the page's user.
 
-viser has no support for it, so a script of our own in the page sends the state of the gamepad to a
-socket of its own behind the gate. It sends when the state changes, and ten times a second while it
-does not. It sends no state before the last one was received, so that none waits on the way.
+viser does not support gamepads. A script in the page sends the state to a socket behind the gate,
+at changes and ten times a second, and only after the last state was received.
 """
 
 import math
@@ -91,7 +90,7 @@ class PadState:
     """State of each axis: -1, 0 or 1."""
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether a dead man's button is down."""
         return not self.pressed.isdisjoint(DEAD_MAN)
 
@@ -131,9 +130,9 @@ class _Source:
 
 
 class BrowserGamepad:
-    """The gamepad that steers, of all browsers that have the page open; any of them may stop.
+    """The steering gamepad among all browsers with the page; any of them may stop.
 
-    ``take`` and ``leave`` are called by the threads of the page's server.
+    The threads of the page's server call ``take`` and ``leave``.
     """
 
     path = PATH
@@ -159,7 +158,6 @@ class BrowserGamepad:
 
     @property
     def _is_free(self) -> bool:
-        """Whether another gamepad may steer."""
         return self._steers is None or self.is_stale
 
     def take(self, source: Hashable, message: str | bytes) -> bool:
@@ -200,7 +198,7 @@ class BrowserGamepad:
             self._keys.clear()
             if self._is_new:
                 self._is_new = False
-                held = self.state is not None and self.state.held
+                held = self.state is not None and self.state.is_enabled
                 found.append(hold_command(held, self._told_s))
         return found
 

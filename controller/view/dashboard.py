@@ -65,7 +65,6 @@ class Dashboard:
             self._events = gui.add_html("")
 
     def _add_joints(self, gui: viser.GuiApi, tabs: viser.GuiTabGroupHandle) -> None:
-        """Add the tabs of a run, whose joints are known."""
         with tabs.add_tab("servos"):
             self._bars = gui.add_html("")
         with tabs.add_tab("curves"):
@@ -232,7 +231,6 @@ def _apart_a(record: RunRecord, rows: np.ndarray) -> Floats:
 
 
 def _spread(first: int, last: int) -> np.ndarray:
-    """Rows from first to last, not too many, the last among them."""
     count = min(last - first + 1, _POINTS)
     return np.unique(np.linspace(first, last, max(count, 2)).astype(int))
 

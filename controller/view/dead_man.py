@@ -29,7 +29,7 @@ class DeadMan:
         self._until_s = math.inf
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether the body may move."""
         return self._now_s() < self._until_s
 

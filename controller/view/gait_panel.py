@@ -70,7 +70,6 @@ class GaitPanel:
         return [f"{name}={value}" if value else name for name, value in taken.items()]
 
     def _build(self) -> None:
-        """Make the inputs of another gait."""
         if self._folder is not None:
             self._folder.remove()
         with self._tab:

@@ -54,7 +54,7 @@ class GamepadPanel:
                 "It says nothing any more: the body stands in its shape."
                 if stale
                 else "Held: the body moves."
-                if state.held
+                if state.is_enabled
                 else "Let go: the body stands in its shape."
             )
             text = f"{state.name}: the body moves while LB or RB is held; {_STOP}. {now}"

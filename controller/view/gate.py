@@ -1,8 +1,8 @@
-"""Access to the page: checked at every request, before viser sees it.
+"""Access to the page, checked at every request before viser.
 
-viser serves every program that reaches its port, browsers let any web page send requests to this
-machine, and every user of this machine can reach 127.0.0.1. So a request has to name an expected
-host, a socket has to come from our own page, and both need the token, which a cookie keeps.
+viser serves every program that reaches its port, browsers let any web page send requests here, and
+every user of this machine reaches 127.0.0.1. So a request must name an expected host, a socket must
+come from our page, and both need the token, which a cookie keeps.
 """
 
 import hmac
@@ -156,7 +156,6 @@ def _is_address(name: str) -> bool:
 
 
 def _is_of(origin: str, host: str) -> bool:
-    """Whether an origin is the page that is served at a host."""
     try:
         place = urlsplit(origin)
     except ValueError:

@@ -114,7 +114,6 @@ class _LivePage:
                 self._stop.show(f"no news of the run for {now_s - self._told_s:.0f} s")
 
     def report(self, fault: Exception) -> None:
-        """Report once what could not be shown."""
         text = " ".join(
             f"page: it cannot show everything ({fault or type(fault).__name__})".split()
         )
@@ -177,7 +176,6 @@ class _LivePage:
                 self._waypoint_panel.show(row["kind"], row["text"])
 
     def _show_gait(self) -> None:
-        """Show what an operator runs, once the page knows the robot; a run without one has none."""
         if self._gait is None or self._header is None or self._dashboard is None:
             return
         if self._gait_panel is None:
@@ -213,7 +211,6 @@ class _LivePage:
                 scene.show_trail(past.pose.centre_m)
 
     def _record(self, rows: dict[str, list[dict[str, Any]]]) -> RunRecord:
-        """Known values, from rows by topic."""
         return record_of(rows, complete=False, note="", header=self._header)
 
     def _press(self, who: str) -> str:

@@ -41,9 +41,9 @@ class LiveView(WatcherProcess):
         self._dead_man = DeadMan()
 
     @property
-    def held(self) -> bool:
+    def is_enabled(self) -> bool:
         """Whether the dead man's button of a browser's gamepad is held; True without a gamepad."""
-        return self._dead_man.held
+        return self._dead_man.is_enabled
 
     def pressed(self) -> list[str]:
         """Inputs set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""

@@ -34,7 +34,6 @@ class _Shown:
     drawn: tuple[object, ...] = ()
 
     def draw(self, since_s: float, *, curves: bool, again: bool = False) -> None:
-        """Draw a time since the first cycle, if it is not drawn already."""
         record, board, scene = self.record, self.board, self.scene
         at_s = min(_begin_s(record) + since_s, float(record.cycle.time_s[-1]))
         state = (at_s, board.follow.value, board.goals.value, board.joint.value)
@@ -176,5 +175,4 @@ def play(page: LogPage, clock: Clock, stopped: Callable[[], bool] = lambda: Fals
 
 
 def _row(time_s: np.ndarray, at_s: float) -> int:
-    """Index of the newest row at a time."""
     return max(int(np.searchsorted(time_s, at_s, side="right")) - 1, 0)

@@ -206,7 +206,6 @@ class BodyScene:
         return self._cylinders(name, share * lengths_m, radii_m, colors)
 
     def _leg_links(self) -> viser.BatchedMeshHandle:
-        """The same for the segments of legs."""
         joints, limbs = self._robot.limb_joints, self._robot.limbs
         lengths_m = np.array([limbs[each.pair].segments_m[each.place] for each in joints])
         radii_m = np.array([limbs[each.pair].foot_radius_m for each in joints])
@@ -365,7 +364,6 @@ def _mesh_of(part: Solid) -> trimesh.Trimesh:
 
 
 def _ground_mesh(field: HeightField) -> trimesh.Trimesh:
-    """The ground's triangles, coloured by height."""
     corners_m, faces = surface(field)
     height = corners_m[:, 2]
     share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)

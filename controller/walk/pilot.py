@@ -407,7 +407,6 @@ class Pilot(OnCourse):
         return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
 
     def _path_table(self) -> TabulatedPath:
-        """Table of the path in force, made once per path and waypoint."""
         path, course = self.path, self.course
         made_of = path, course.reached
         if self._table is None or self._table_of != made_of:

@@ -251,7 +251,6 @@ class PredictiveWalker:
         return found
 
     def _ask_about(self, pose: PathPose) -> Iterator[bool]:
-        """Ask about the best piece and others; in trouble about the others first."""
         best = self._best()
         if self.ask is None or self._lost or self._walk.tries == 0 or not best.cost_m2 < np.inf:
             return
@@ -380,7 +379,6 @@ class PredictiveWalker:
         ]
 
     def _serpenoid(self, carrier: SerpenoidParameters) -> _Option:
-        """A plain serpenoid of a state's length that continues its carrier or joins the track."""
         points, at = self.track.points, self._phase(carrier)
         waves = carrier.wave_rad(at - 1 + np.arange(self._walked + points + 1), points)
         base = self.track.last_rad - waves[0]

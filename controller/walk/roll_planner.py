@@ -115,7 +115,6 @@ class RollPlanner:
     def _plans(
         self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, turn_rad: float = 0.0
     ) -> list[RollPlan]:
-        """Plans of arcs laid by the track, after a turn to the other side."""
         points, plans = walker.track.points, list[RollPlan]()
         ramp = np.arange(1, points + 1) / points
         arcs = walker.track.last_rad + ARCS_RAD[:, None] * ramp

@@ -207,7 +207,6 @@ class SideRolls(MotionWrapper, OnCourse):
         return max(found, key=lambda plan: plan.speed_m_s, default=None)
 
     def _tried(self, plan: RollPlan, view: BodyView, twin: TwinRollout) -> RollPlan:
-        """Return a plan with the best turns and speed on the twin."""
         roll = _RollOnTwin(
             self._pilot.coasting(plan.piece_rad),
             _cycle(plan, self._robot),
@@ -234,7 +233,6 @@ class SideRolls(MotionWrapper, OnCourse):
         return replace(plan, speed_m_s=best_m_s, turns=turns)
 
     def _roll(self, view: BodyView, plan: RollPlan) -> None:
-        """Begin to roll; continue the walk if the body does not lie as planned."""
         headings = view.headings_rad
         bent = plan.side * float(headings[0] - headings[-1]) > 0.5 * abs(plan.bend_rad)
         lies = bent or plan.at_once
@@ -280,7 +278,6 @@ class _RollOnTwin:
 
     @property
     def turns(self) -> float:
-        """Turns commanded so far."""
         return self._rolled_s * self._cycle.frequency_hz
 
     def move(self, dt_s: float, view: BodyView) -> Floats:

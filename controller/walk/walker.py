@@ -65,7 +65,6 @@ class Walker:
         return np.asarray(placed_rad[::-1][:keep] + bend)
 
     def _fits(self, piece_rad: Floats) -> bool:
-        """Whether the body is accepted with the piece as its front."""
         if self._accept is None:
             return True
         old = self.track.body_rad(self.track.end)[: self.track.points - len(piece_rad)]

@@ -174,7 +174,6 @@ def robot_budget(robot: RobotConfig, baud: int, *, fast: bool) -> WireBudget:
 
 
 def _feetech_budget(facts: ServoModel, servos: int, baud: int) -> WireBudget:
-    """Budget of the longest cycle of Feetech servos on one port."""
     state = [facts.registers["Present Position"], facts.registers["Present Load"]]
     if facts.measures_current:
         state.append(facts.registers["Present Current"])

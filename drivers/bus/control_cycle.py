@@ -241,7 +241,6 @@ class ControlCycle:
         )
 
     def _without_late(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
-        """The reply without results that may belong to an older request."""
         new = np.array(
             [
                 not self._pending.is_pending(i, request.length, fast=request.fast)
@@ -278,7 +277,6 @@ class ControlCycle:
         return request
 
     def _responding(self) -> list[int]:
-        """IDs of the servos that have replied recently."""
         return [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
 
     def _send(self, packet: bytes) -> None:
@@ -286,7 +284,6 @@ class ControlCycle:
         self._port.write(packet)
 
     def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
-        """Send a request; return the deadline of its reply."""
         packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
         if self._failed_in_a_row:  # these bytes answer an older request
             self.counters.late_bytes += self._port.getBytesAvailable()
@@ -305,7 +302,6 @@ class ControlCycle:
     def _receive(
         self, request: GroupReadRequest, raw: bytes, deadline_s: float
     ) -> tuple[bytes, GroupReadReply]:
-        """Receive and parse the reply, then the bytes added by stuffing."""
         port, expected = self._port, request.reply_bytes
         if len(raw) < expected:
             raw += port.read_until(expected - len(raw), deadline_s)
@@ -327,7 +323,6 @@ class ControlCycle:
         return raw, reply
 
     def _with_surplus(self, request: GroupReadRequest, raw: bytes, deadline_s: float) -> bytes:
-        """The bytes of a reply and of a second one after it."""
         port, expected = self._port, request.reply_bytes
         if not request.parse(raw[:expected]).whole:
             return raw

@@ -384,7 +384,6 @@ class DynamixelBus:
 
 
 def _blocks(registers: Iterable[Register]) -> list[list[Register]]:
-    """Registers by address, split at large gaps."""
     blocks: list[list[Register]] = []
     end = 0
     for register in sorted(set(registers), key=lambda each: each.address):

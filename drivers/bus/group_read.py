@@ -206,7 +206,6 @@ class GroupReadRequest:
 
 
 def _run_lengths(values: Sequence[int]) -> list[int]:
-    """Length of the longest rising run that ends with each value."""
     lengths: list[int] = []
     for k, value in enumerate(values):
         lower = [lengths[j] for j in range(k) if values[j] < value]

@@ -127,7 +127,6 @@ def _exchange(
 
 
 def _is_other(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:
-    """Whether a reply certainly belongs to another request."""
     length = len(reply.params)
     if length == data_bytes or reply.result:
         return False

@@ -181,7 +181,6 @@ class SegmentedBus:
 
     @contextmanager
     def _with_port_name(self, servo_id: int) -> Iterator[DynamixelBus]:
-        """Bus of one servo; its errors get the name of its port."""
         bus = self._bus_of[servo_id]
         try:
             yield bus

@@ -31,7 +31,7 @@ def fingerprint_path(robot_file: Path) -> Path:
     return robot_file.with_name(f"{robot_file.stem}.servos.toml")
 
 
-def own_file(name_or_path: str) -> Path | None:
+def user_file(name_or_path: str) -> Path | None:
     """File of a robot that is not shipped, if it exists."""
     path = Path(name_or_path)
     return path if name_or_path.endswith(".toml") and path.is_file() else None

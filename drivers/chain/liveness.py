@@ -146,7 +146,6 @@ class LivenessCheck:
         raise BusError(f"{names}: {self._difference(check, joint, value)}")
 
     def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
-        """Meaning of an unexpected register value."""
         name, expected = check.name, check.expected[joint]
         if check is self._torque:
             return "torque is off: has it rebooted?"

@@ -91,6 +91,5 @@ class TemperatureSensors:
         return lines
 
     def _others_warm_up(self, change_k: Floats) -> bool:
-        """Whether half of the changing readings show a warming or cooling chain."""
         others = change_k[~self._is_constant]
         return 0 < len(others) <= 2 * int(np.count_nonzero(others >= CHANGED_K))

@@ -84,7 +84,6 @@ class TorqueOff:
         return [self._robot.servo_ids[joint] for joint in joints]
 
     def _wait_to_send(self, part: DynamixelBus, joints: Sequence[int], give_up_s: float) -> None:
-        """Send torque off, unconfirmed, to a lost port that may come back soon."""
         while True:
             is_late = self._clock.now_s() >= give_up_s
             try:
@@ -98,7 +97,6 @@ class TorqueOff:
                 return
 
     def _unconfirmed(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
-        """Joints that do not confirm torque off; the others' watchdogs are off."""
         ids, joints = self._robot.servo_ids, list(on_it)
         for _ in range(_GROUP_ROUNDS):
             asked = self._ids_of(joints)
@@ -120,7 +118,6 @@ class TorqueOff:
         return silent
 
     def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
-        """Ask one servo to switch torque off; return whether it confirms in time."""
         if self._clock.now_s() >= give_up_s:
             return False
         try:

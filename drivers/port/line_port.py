@@ -156,7 +156,6 @@ class LinePort(ABC):
 
     @property
     def _refusals(self) -> tuple[type[Exception], ...]:
-        """Exceptions of a line that rejects its settings, or is gone."""
         return (ValueError, *self.line_errors)
 
     @property

@@ -218,7 +218,6 @@ def _program(process: str) -> str:
 
 
 def _script(words: list[str]) -> list[str]:
-    """Script or module in the words after an interpreter, or nothing."""
     rest = iter(words)
     for word in rest:
         if word == "-m":

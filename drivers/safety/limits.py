@@ -94,7 +94,6 @@ class SafetyLimits:
 
 
 def _fuse_a(robot: RobotConfig) -> float:
-    """Rating of the supply's fuse; infinite without one."""
     power = robot.power
     return math.inf if power is None or power.fuse_a is None else power.fuse_a
 

@@ -324,7 +324,6 @@ class SafeLink:
     def _recover(
         self, reason: str, fault: DriverError | None, overloaded: int | None = None
     ) -> JointState:
-        """Recover from an interruption, or a joint's overload; else latch and raise."""
         state = None
         if self._recovery is not None and self._memory is not None and self._state is not None:
             believed_rad = self._state.position_rad
@@ -351,7 +350,6 @@ class SafeLink:
         return state
 
     def _following_fault(self, state: JointState, memory: SafetyMemory) -> str | None:
-        """Fault of a joint that does not follow, with its servo's reason."""
         fault = self._following.update(state, memory.goal_rad)
         self._is_held_off = fault is not None and not self._following.is_idle
         if fault is None or not isinstance(self._link, ExplainingLink):
@@ -390,7 +388,6 @@ class SafeLink:
             self._off_tries = _OFF_TRIES
 
     def _activate_output(self, fault: DriverError) -> None:
-        """Activate the stop output once, and report it."""
         output = self._stop_output
         if output is None or self._output_is_active or not self._touched:
             return
@@ -460,7 +457,6 @@ class SafeLink:
         self.request_stop(INTERRUPTED, may_hold=True)
 
     def _switch_off_again(self) -> None:
-        """Repeat the unconfirmed torque off of a trip."""
         self._off_tries -= 1
         with suppress(DriverError):  # the trip has reported it
             self.disable()

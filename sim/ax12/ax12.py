@@ -156,7 +156,6 @@ class Ax12Servos(SimulatedServos):
         return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
 
     def _update_turns(self) -> None:
-        """Update the turn of each free shaft; the sensor does not count turns."""
         free = ~self._on() | self._wheel()
         turn_rad = TURN_RAD * np.rint(self.plant.position_rad / TURN_RAD)
         self._turn_rad = np.where(free, turn_rad, self._turn_rad)

@@ -102,7 +102,6 @@ class Decoder1:
         return int.from_bytes(data[: cell.size], "little")
 
     def _values(self, address: int, data: bytes) -> dict[str, object]:
-        """Registers in a block."""
         end = address + len(data)
         found: dict[str, object] = {
             name: self._decode(cell, data[cell.address - address :])

@@ -165,7 +165,6 @@ class Ax12Line(Wire):
         return int(self.servos["Status Return Level"][row]) >= REPLY_LEVELS.get(code, 2)
 
     def _obeying(self, servo_id: int) -> list[int]:
-        """Rows of the servos that obey a sync write to an ID."""
         return self._addressed(servo_id)
 
     def _respond(self, replies: list[Reply]) -> Reply:
@@ -175,7 +174,6 @@ class Ax12Line(Wire):
         return reply
 
     def _execute_one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
-        """Error bits and parameters of the reply."""
         servos = self.servos
         if code == Instruction1.PING and not params:
             return 0, b""

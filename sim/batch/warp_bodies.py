@@ -141,7 +141,6 @@ class _DeviceState:
         self.motor = warp.array(np.stack(motor), dtype=float)
 
     def upload(self, qpos: Floats, qvel: Floats, load: Floats, before: Floats) -> None:
-        """Set the state of all worlds."""
         self.data.qpos.assign(qpos)
         self.data.qvel.assign(qvel)
         self.load.assign(load)
@@ -156,7 +155,6 @@ class _DeviceState:
         self.data.qacc_warmstart.assign(start)
 
     def set_drive(self, bodies: WarpBodies) -> None:
-        """Copy drive and friction to the device."""
         for name, values in self.drive.items():
             values.assign(np.minimum(getattr(bodies, name), _NO_LIMIT_A))
         self.mu.assign(bodies.friction)
@@ -235,7 +233,6 @@ class _DeviceState:
         )
 
     def download(self, bodies: WarpBodies) -> None:
-        """Read states, motors and energies."""
         bodies.qpos[:], bodies.qvel[:] = self.data.qpos.numpy(), self.data.qvel.numpy()
         bodies.current_a[:], bodies.pwm[:] = self.current.numpy(), self.pwm.numpy()
         bodies.energies_j[:], bodies.totals[:] = self.energies.numpy(), self.totals.numpy()

@@ -259,7 +259,6 @@ class FaultPlayer:
         return act
 
     def _actions(self, fault: plan.ScheduledFault) -> _Actions:
-        """Actions at the start and the end of a fault."""
         line, protection = self._line, self._servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
         match fault:
@@ -315,7 +314,6 @@ class FaultPlayer:
         return partial(self._servos.cut_power, rows), partial(self._servos.restore_power, rows)
 
     def _write_again(self, fault: plan.WriteFault, rows: Indices, count: int = 0) -> None:
-        """Write a register, and schedule the next write."""
         self._line.write_register(rows, fault.register_name, fault.value)
         since_s = (count + 1) * (fault.every_s or math.inf)
         if since_s < (fault.for_s or math.inf):

@@ -67,7 +67,6 @@ class FeetechLine(Ax12Line):
         return self._rows(servo_id, "ID")
 
     def _rows(self, servo_id: int, name: str) -> list[int]:
-        """Rows of the servos that receive a packet for an ID."""
         servos, rate = self.servos, self.getBaudRate()
         if name not in servos.facts.registers:
             return []
@@ -110,7 +109,6 @@ class FeetechLine(Ax12Line):
         return int(servos["Return Delay Time"][row]) * RETURN_DELAY_UNIT_S
 
     def _execute_one(self, row: int, code: int, params: bytes) -> tuple[int, bytes]:
-        """Error bits and parameters of the reply."""
         servos = self.servos
         if code == Code.READ and len(params) == _READ_BYTES:
             address, length = params

@@ -67,8 +67,7 @@ class GroupRead(ABC):
         return int(answer(*replies, request.heads, request.id_bytes, data, error))
 
     @abstractmethod
-    def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
-        """Cut the reply into packets."""
+    def _cut(self, raw: bytes, whole: bool) -> list[Reply]: ...
 
     @abstractmethod
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:

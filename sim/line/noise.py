@@ -63,7 +63,6 @@ class Noise:
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
     def _one(self, fault: plan.NoiseFault, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
-        """Packets that replace one."""
         if not data:
             return []
         match fault.kind:

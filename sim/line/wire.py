@@ -68,16 +68,14 @@ class Wire(ABC):
     # the servos on it
 
     @abstractmethod
-    def _advance(self, until_s: float) -> None:
-        """Advance servos and physics."""
+    def _advance(self, until_s: float) -> None: ...
 
     @abstractmethod
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         """Execute the bytes sent by ``end_s``; return the servos' replies."""
 
     @abstractmethod
-    def _reset_parser(self) -> None:
-        """Drop a partial packet after a silence."""
+    def _reset_parser(self) -> None: ...
 
     @abstractmethod
     def _on_baud_change(self, baud: int) -> None:

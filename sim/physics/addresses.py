@@ -9,8 +9,6 @@ from numba.extending import intrinsic
 
 
 def _pointer(typing: Any, address: Any) -> Any:
-    """Turn an integer into a pointer."""
-
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], voidptr_t)
 
@@ -41,8 +39,6 @@ def _call_with(typing: Any, function: Any, model: Any, data: Any, third: Any) ->
 
 
 def _copy(typing: Any, to: Any, source: Any, words: Any) -> Any:
-    """Copy words of eight bytes from one address to another."""
-
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         to, source = (builder.inttoptr(each, voidptr_t) for each in args[:2])
         raw_memcpy(builder, to, source, args[2], 8, align=8)

@@ -115,7 +115,6 @@ def _described() -> tuple[StepLayout, dict[str, int]]:
 
 
 def _structure(name: str) -> Any:
-    """Return a structure of MuJoCo as a ctypes structure."""
     ast_nodes, structs = _introspection()
     fields = []
     for member in structs.STRUCTS[name].fields:
@@ -157,7 +156,6 @@ def _ball() -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
-    """Whether memory matches MuJoCo's Python objects."""
     model, data = _ball()
     mujoco.mj_step(model, data)
 

@@ -76,7 +76,6 @@ class PublicSteps:
         return Body(self._state, self._chain, self._links, self._geoms, law, m.totals)
 
     def _contacts(self) -> Contacts:
-        """Copy the present contacts, and allocate their friction."""
         found = self._mechanics.data.contact
         count = len(found.dist)
         reals = np.zeros((count, _AT.size))

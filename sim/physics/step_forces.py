@@ -135,7 +135,6 @@ def _line_up(body: Body, contacts: Contacts, still_n_s: float, lanes: Lanes) -> 
 
 
 def _add_friction(body: Body, contacts: Contacts, lanes: Lanes) -> None:
-    """Add ground friction and water to the generalised forces."""
     law, totals = body.law, body.totals
     v, w, wrench, _, _, _, _, water = body.links
     (table, of_link), step_s = lanes, law.step_s
@@ -294,7 +293,6 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
 
 
 def _weigh(body: Body, contacts: Contacts, force_n: Floats) -> None:
-    """Sum the ground's contact forces on each link."""
     load = body.links.load
     load[:] = 0.0
     _, integers, count, at = contacts

@@ -73,7 +73,6 @@ def _is_above(x: float, y: float, z: float, corners: Floats) -> bool:
 
 @compiled(f"boolean({_POINT}, float64[:, ::1], float64[::1])")
 def _nearest_point(x: float, y: float, z: float, corners: Floats, nearest: Floats) -> bool:
-    """Point of a triangle nearest to a point; whether it is inside, not on an edge."""
     a0, a1, a2 = corners[0, 0], corners[0, 1], corners[0, 2]
     b0, b1, b2 = corners[1, 0] - a0, corners[1, 1] - a1, corners[1, 2] - a2
     c0, c1, c2 = corners[2, 0] - a0, corners[2, 1] - a1, corners[2, 2] - a2
@@ -124,7 +123,6 @@ def _is_nearest(
     z_m: Floats,
     corner_m: tuple[float, float, float],
 ) -> bool:
-    """Whether an edge point is nearer than the surface around it."""
     reach = _PROBE * corner_m[2]
     for k in range(_RING):
         angle = 2.0 * math.pi * k / _RING  # the edges of the triangles are among these
@@ -139,7 +137,6 @@ def _is_nearest(
 
 @compiled(f"void(float64[::1], {_POINT}[:, ::1])")
 def _keep(point: Floats, distance: float, same_m: float, found: Floats) -> None:
-    """Replace a contact at the same point, or the shallowest, by a deeper one."""
     slot = 0
     for k in range(PLANES):
         apart = 0.0

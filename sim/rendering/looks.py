@@ -141,7 +141,6 @@ def dressed_model(
 
 
 def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:
-    """Replace the robot's links by floating bodies."""
     spec.delete(spec.body("link0"))
     for k in range(bones):
         bone = spec.worldbody.add_body(name=f"link{k}", mass=1.0, inertia=[1.0, 1.0, 1.0])

@@ -230,7 +230,6 @@ class PtyServer:
         _LOGGER.warning("%s: %s; the servos are at %s", link, text, self.path)
 
     def _follow_baud_rate(self) -> None:
-        """Follow the client's baud rate after a change."""
         speed = termios.tcgetattr(self._slave)[_OUTPUT_SPEED]
         if speed != self._speed:
             self._speed = speed

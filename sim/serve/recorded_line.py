@@ -69,14 +69,11 @@ class RecordedLine(Wire):
 
     # the wire
 
-    def _advance(self, until_s: float) -> None:
-        """Nothing moves."""
+    def _advance(self, until_s: float) -> None: ...
 
-    def _reset_parser(self) -> None:
-        """Packets are compared whole."""
+    def _reset_parser(self) -> None: ...
 
-    def _on_baud_change(self, baud: int) -> None:
-        """Every client gets replies, at any rate."""
+    def _on_baud_change(self, baud: int) -> None: ...
 
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         for alike in (_same, _same_write):
@@ -99,7 +96,6 @@ def _same(recorded: bytes, data: bytes) -> bool:
 
 
 def _same_write(recorded: bytes, data: bytes) -> bool:
-    """Whether both write to one place of one servo."""
     return _place(recorded) == _place(data) is not None
 
 

@@ -128,7 +128,6 @@ class ServoBus:
         return rows_of(self.line, ids)
 
     def _do(self, change: Callable[[], None]) -> None:
-        """Execute a change between two steps of the server, or at once without one."""
         if self._thread is None:
             self.line.settle()
             change()

@@ -374,5 +374,4 @@ def _in_one_place(kinds: Sequence[ModelRegisters]) -> dict[str, Register]:
 
 
 def _different(models: Sequence[Model]) -> list[Model]:
-    """Models without repetitions; records are not hashable."""
     return [model for k, model in enumerate(models) if model not in models[:k]]

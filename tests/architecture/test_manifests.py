@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from snakewalk.controller.console.plugins import own_plugins
+from snakewalk.controller.console.plugins import builtin_plugins
 from tests.architecture.manifests import packages, text
 
 
@@ -16,9 +16,9 @@ def test_a_manifest_is_as_generated(package: Path) -> None:
 
 
 def test_no_plug_in_is_listed_twice() -> None:
-    listed = [(each.kind, each.name) for each in own_plugins()]
+    listed = [(each.kind, each.name) for each in builtin_plugins()]
     assert len(listed) == len(set(listed))
 
 
 def test_every_plug_in_says_what_it_is() -> None:
-    assert [each.name for each in own_plugins() if not each.help.endswith(".")] == []
+    assert [each.name for each in builtin_plugins() if not each.help.endswith(".")] == []

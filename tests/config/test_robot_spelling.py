@@ -114,7 +114,7 @@ def test_values_of_the_links_survive_the_spelling() -> None:
     assert robot.link_lengths_m == lengths_m
     assert robot.link_shapes == UNEVEN.link_shapes
     assert robot.link_masses_kg == UNEVEN.link_masses_kg
-    assert robot.middles_apart_m == pytest.approx(sum(lengths_m) - 0.06 - 0.075)
+    assert robot.centre_distance_m == pytest.approx(sum(lengths_m) - 0.06 - 0.075)
 
 
 def test_rails_of_single_links_are_those_of_the_belly() -> None:

@@ -148,5 +148,5 @@ def test_the_pages_print_many_commands_and_a_wrong_one_is_found() -> None:
         take("snakewalk plan --nosuch")
     with pytest.raises(UsageError, match="No such command"):
         take("snakewalk nosuch")
-    with pytest.raises(UsageError, match="greater than or equal to 0"):
+    with pytest.raises(UsageError, match="must be at least 0"):
         take("snakewalk plan --physics -1")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 from snakewalk.controller.cli.main import main
-from snakewalk.controller.console.plugins import own_plugins
+from snakewalk.controller.console.plugins import builtin_plugins
 
 
 class Ended(NamedTuple):
@@ -36,6 +36,6 @@ def snakewalk(*words: str) -> Ended:
 
 def command_words() -> list[tuple[str, ...]]:
     """Return the words of the program itself, of each family, and of each command."""
-    commands = [tuple(each.name.split()) for each in own_plugins() if each.kind == "command"]
+    commands = [tuple(each.name.split()) for each in builtin_plugins() if each.kind == "command"]
     families = dict.fromkeys(words[:end] for words in commands for end in range(len(words)))
     return [*families, *commands]

@@ -183,7 +183,6 @@ class _Made:
         return [] if self.picture is None else [self.picture]
 
     def refuse(self, *, textured: bool) -> None:
-        """Check the files before any work."""
         refuse_to_overwrite([*mesh_files(self.output, textured), *self.drawn], self.force)
 
     def solid(self, body: _Measured, skeleton: Floats | None, image: Path | None) -> None:
@@ -209,7 +208,6 @@ class _Made:
         )
 
     def skin(self, body: BodySkin, animate: str | None, fps: float | None) -> None:
-        """Write a skin, at rest or moving."""
         facts: dict[str, object] = {}
         skin, motion = body.skin, None
         if animate is None:
@@ -266,7 +264,6 @@ def _check_options(
     of_skins: dict[str, object],
     of_meshes: dict[str, object],
 ) -> None:
-    """Refuse options that would do nothing."""
     mesh = given and body.lower().endswith(MESH_ENDINGS)
     faults = [
         f"{name}: is for recordings with widths, and {body} has none; leave it out"
@@ -308,7 +305,6 @@ def _measure(
 
 
 def _skeleton(track: str, points: Floats, frame: int) -> Floats:
-    """Skeleton of one frame, in body lengths."""
     _check_frame(track, points, frame)
     return pose(points[frame])
 
@@ -329,7 +325,6 @@ def _texture(image: Path, shown: tuple[Image, Floats, Floats], pixels: bool) -> 
 
 
 def _read_picture(image: Path) -> Image:
-    """Grey or colour, whatever the file holds."""
     try:
         with Pillow.open(image) as picture:
             return np.asarray(picture.convert("RGB"))

@@ -190,7 +190,6 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
 
 
 def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment]:
-    """Cut the motion at the basic posture that the options name."""
     within = float(np.radians(options.within_deg))
     reference = None
     if options.reference == "commonest":

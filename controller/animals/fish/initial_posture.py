@@ -61,7 +61,6 @@ def midline_starts(model: FishModel, midline: Floats) -> list[Floats]:
 
 
 def _beyond(points: Floats, reach: float) -> Floats:
-    """Where the body ends before the first point."""
     step = points[0] - points[min(4, len(points) - 1)]
     return np.asarray(points[0] + step / max(float(np.hypot(*step)), 1e-9) * reach)
 
@@ -88,7 +87,6 @@ def _longest_path(bones: Bools) -> Ints | None:
 def _walk(
     start: tuple[int, int], pixels: set[tuple[int, int]]
 ) -> list[tuple[tuple[int, int], tuple[int, int] | None]]:
-    """Pixels in the order in which they are reached, each with the one before it."""
     before: dict[tuple[int, int], tuple[int, int] | None] = {start: None}
     ring = [start]
     while ring:

@@ -97,7 +97,6 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
 
 
 def _belly_m(skin: Skin, length_m: float) -> float:
-    """Height of the axis of a skin of that length that lies on the ground."""
     sized = skin.sized(length_m)
     return sized.axis_m - float(sized.mesh.vertices[:, 2].min())
 
@@ -137,7 +136,6 @@ def from_poses(robot: RobotConfig, time_s: Floats, qpos: Floats) -> BoneMotion:
 
 
 def _thinned(time_s: Floats, fps: float) -> Ints:
-    """Rows nearest to even times."""
     even = np.arange(time_s[0], time_s[-1] + 0.5 / fps, 1.0 / fps)
     middle = 0.5 * (time_s[1:] + time_s[:-1])
     return np.unique(np.searchsorted(middle, even)).astype(np.int64)

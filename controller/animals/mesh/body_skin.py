@@ -137,7 +137,6 @@ def fish_skin(file: Path) -> SkinConfig:
 
 
 def _fin(plain: FinConfig, higher: float, pectoral: float) -> FinConfig:
-    """A fin of a build on a fish that is higher, or as long as the pectoral fins that were seen."""
     if not (plain.paired and pectoral > 0.0 and PECTORAL[0] <= plain.at <= PECTORAL[1]):
         return plain.model_copy(update={"span": higher * plain.span})
     beside = plain.span * float(np.cos(np.radians(plain.around_deg)))
@@ -185,7 +184,6 @@ def _covered(sections: CrossSections, order: int) -> tuple[Tube, Skin]:
 
 
 def _distance(corners_m: Floats, surface: Skin) -> float:
-    """Mean distance of a mesh's corners from the nearest corner of the surface, body lengths."""
     off = cKDTree(surface.mesh.vertices).query(corners_m)[0]
     return float(np.mean(off)) / surface.length_m
 

@@ -163,7 +163,6 @@ def _reach(found: list[list[Floats]], start: Floats) -> int:
 
 
 def _around(found: list[Floats], body: Floats) -> Floats:
-    """The loop around the body's middle, or the largest."""
     inside = [loop for loop in found if _inside(loop, body.mean(axis=0))]
     return max(inside or found, key=_area)
 

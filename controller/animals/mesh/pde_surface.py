@@ -163,7 +163,6 @@ class PdeSurface:
 
     @property
     def _order(self) -> int:
-        """N."""
         return len(self.at) // 2
 
     def _remainder(self, us: Floats, vs: Floats, along: int, around: int) -> Floats:

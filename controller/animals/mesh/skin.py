@@ -123,7 +123,6 @@ def rest_fronts_m(bone_m: Floats, axis_m: float) -> Floats:
 
 
 def _fin_faces(points: Floats, tip: Floats) -> Ints:
-    """Triangles of a fin's rows and its tip, seen from outside counter-clockwise."""
     rows, around = points.shape[:2]
     # without the fan at the root, which is inside the body
     faces = tube_faces(rows, around)[: -2 * around]

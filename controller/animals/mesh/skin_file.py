@@ -227,7 +227,6 @@ class _Builder:
         return len(self.accessors) - 1
 
     def picture(self, texture: Image) -> int:
-        """Append a picture, and return its view."""
         png = io.BytesIO()
         Pillow.fromarray(texture).save(png, "PNG")
         return self._view(png.getvalue(), None)

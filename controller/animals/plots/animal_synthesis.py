@@ -49,7 +49,6 @@ def draw_animal(made: SynthesisedAnimal, file: Path, title: str) -> None:
 
 
 def _map(axes: Axes, made: SynthesisedAnimal, title: str) -> None:
-    """Path, bodies, and where each foot came down."""
     if made.ground is not None:
         draw_ground(axes, made.ground)
     axes.set_aspect("equal")
@@ -120,7 +119,6 @@ def _feet(axes: Axes, animal: AnimalConfig) -> None:
 
 
 def _heights(axes: Axes, made: SynthesisedAnimal) -> None:
-    """Ground and body along the way."""
     motion = made.motion
     middle = made.middle_m
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))])

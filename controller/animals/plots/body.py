@@ -62,7 +62,6 @@ def draw_body(
 
 
 def _place(axes: Axes, image: Image, points: Floats, radius: Floats) -> None:
-    """Draw skeleton and widths over the image."""
     axes.imshow(image, cmap="gray")
     axes.plot(*points.T, color=AMBER, linewidth=1.2)
     along = np.gradient(points, axis=0)

@@ -169,7 +169,6 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
 
 
 def _states(axes: Axes, made: SynthesisedWalk) -> None:
-    """Draw the states over time."""
     time = made.time_s
     at, state = np.array(made.states).T
     shown = np.append(state, state[-1])

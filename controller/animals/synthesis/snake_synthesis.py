@@ -127,7 +127,6 @@ class SynthesisedWalk:
         }
 
     def _stretch(self, length_m: float) -> float:
-        """Return the largest stretch of a segment on the ground, as a share of its length."""
         points = self.skeleton.points_m
         segment_m = length_m / (points.shape[-2] - 1)
         return float(np.linalg.norm(np.diff(points, axis=-2), axis=-1).max() / segment_m - 1.0)
@@ -320,7 +319,6 @@ class SnakeSynthesis:
 
     @property
     def _with_share(self) -> WalkRun:
-        """The run with the share of a state that the synthesis walks."""
         share = self.how.state_share
         if share is None:
             return self.prepared

@@ -57,7 +57,6 @@ class SynthesisSkin:
             write_skin(part, rig, bones, texture, worn.name, both_sides=worn.both_sides)
 
     def _rig(self, made: SynthesisedWalk, segments: int) -> tuple[Rig, BoneMotion, Image | None]:
-        """Rig and bones of that many segments each; a snake has a tongue."""
         bones, texture = made.bones(segments), self.dressed.texture
         rig = spine_rig(self.skin, bones.bone_m)
         if not self.tongue:

@@ -1,9 +1,8 @@
-"""Calibration: the joint of each servo, its direction, its zero and its range.
+"""Calibration: the joint of each servo, its direction, zero and range.
 
-Only the IDs and models of the servos are known. Every motion passes a ``SafeLink`` around a chain
-of all servos in current-based position mode with a small goal current: one joint moves, slowly, the
-others hold where they are. A person who sees the robot says which joint has moved; the range ends
-where a servo pushes with all the current that it may use and does not turn.
+Initially only IDs and models are known. One joint at a time moves slowly, with a small goal
+current, through a ``SafeLink``; the others hold. An observer names the joint that moved. A range
+ends where a servo pushes with its full permitted current and does not turn.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -47,8 +46,8 @@ LEAST_LIMIT_RAD = 0.1
 _SCANS = 3
 """Scans until the bus has as many servos as the robot has joints (ours)."""
 _PROBES = 6
-"""Probes of a servo until its replies come once each and whole: two servos with one ID never do
-that, and a busy line does it soon (ours)."""
+"""Probes until a servo's replies are single and complete. Two servos with one ID never reach it, a
+busy line soon (ours)."""
 
 
 class Observer(Protocol):
@@ -57,9 +56,9 @@ class Observer(Protocol):
     def which(
         self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
     ) -> SeenBend:
-        """Say which joint a servo moves; ``wiggle`` moves it, as often as it is called.
+        """Name the joint that a servo moves; ``wiggle`` moves it, as often as needed.
 
-        ``known`` are the joints that have been found already, with their servos' IDs.
+        ``known`` has the IDs of the joints found before.
         """
         ...
 
@@ -171,7 +170,7 @@ def calibrate(
     on_progress: Callable[[str], None] = lambda step: None,
     journal: Journal | None = None,
 ) -> ChainCalibration:
-    """Find out everything about the chain on ``port``.
+    """Calibrate the chain on ``port``.
 
     Args:
         port: the line.
@@ -183,8 +182,7 @@ def calibrate(
         sweep: whether the ends of the ranges are looked for.
         stop_requested: returns why the safe link has to latch, or None.
         on_progress: gets a line for each step.
-        journal: of an interrupted calibration, whose answers are not asked again; it is saved
-            after each answer and each range.
+        journal: of an interrupted calibration, which continues; saved after each answer and range.
 
     Raises:
         InputError: the servos are not the robot's, a joint does not move, two servos seem to move
@@ -226,11 +224,9 @@ class _Steps:
 
     @property
     def known(self) -> CalibrationProgress:
-        """The progress so far."""
         return self.journal.known
 
     def label(self, servo_id: int) -> str:
-        """Label of the joint that a servo moves."""
         return joint_label(self.like.joint_names[self.known.bends[servo_id].joint], servo_id)
 
     def ask(self, observer: Observer, servo_id: int, wiggle: Callable[[], None]) -> None:

@@ -1,7 +1,7 @@
 """Slow motions of one servo of an unknown chain; torque is off between them.
 
-A line of a busy machine loses replies and delays them. Each cycle reads again if replies are
-missing, the state may be older than in a run, and a motion that was ended by the line is repeated.
+A busy machine loses and delays replies. So a cycle repeats its read, the state may be older than in
+a run, and a motion that the line ended is repeated.
 """
 
 import math
@@ -43,8 +43,8 @@ MOVED_SHARE = 0.5
 SWEEP_RAD_S = 1.0
 """Speed of the sweep (ours)."""
 _WEAK_SHARE = 0.3
-"""Speed of the sweep of a servo whose output is limited instead of its current, as a share of the
-speed that it has without load (ours)."""
+"""Speed of the sweep of a servo with limited output, as a share of its speed without load
+(ours)."""
 STOP_LAG_RAD = 0.1
 """A joint that is so far behind its goal, and pushes ... (ours)."""
 STOP_EFFORT = 0.8
@@ -107,7 +107,7 @@ class CalibrationBench:
         self._limits = replace(self._limits, joint_names=tuple(labels))
 
     def retried(self, motion: Callable[[], None], progress: Callable[[], int] = lambda: 0) -> None:
-        """Run a motion, and again if the line ended it; progress gives it all tries again.
+        """Run a motion, and again if the line ended it; progress restores the number of tries.
 
         Raises:
             LineLostError: the line ended it too often.
@@ -193,7 +193,7 @@ class CalibrationBench:
     ) -> None:
         """Bend one joint one way and back.
 
-        A stop is where the servo pushes with all that it may and does not follow any more.
+        At a stop the servo pushes with its full permitted current and does not follow.
 
         Args:
             link: holds the others.
@@ -233,14 +233,6 @@ class CalibrationBench:
 
     @contextmanager
     def _link(self) -> Iterator[tuple[SafeLink, Floats]]:
-        """A safe link with torque on, and the pose that it holds; torque is off behind it.
-
-        Raises:
-            ChainError: a servo has an alarm, or is not as described.
-            LineLostError: servos did not reply.
-            DriverError: as ``SafeLink``.
-
-        """
         stop = self._stop_requested
         with SafeLink(self._chain, self._limits, self._clock, stop_requested=stop) as link:
             try:
@@ -288,7 +280,6 @@ class CalibrationBench:
             raise
 
     def _tripped(self, reason: str, state: JointState) -> Exception:
-        """Error for a latch with this state."""
         overloaded = np.flatnonzero(state.hardware_error & Alarm.OVERLOAD)
         if len(overloaded):
             ids = ", ".join(str(self._robot.servo_ids[row]) for row in overloaded)

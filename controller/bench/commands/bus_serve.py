@@ -320,7 +320,6 @@ def _console(line: "Wire", player: FaultPlayer | None, as_json: bool) -> Console
 
 
 def _converse(server: "PtyServer", console: Console, stopped: Callable[[], bool]) -> None:
-    """Serve, and execute the lines of standard input; its end leaves the servos served."""
     console.set_pace, heard, unread = server.set_pace, sys.stdin.fileno(), ""
     listening = True
     while not stopped():

@@ -216,7 +216,6 @@ class _Person:
                 return SeenBend(joint=joint, direction=direction)
 
     def straighten(self) -> None:
-        """Wait until the body is straight."""
         _ask("torque is off: lay the body straight and level, then press Enter: ")
 
     def _joint(self, servo_id: int, known: Mapping[int, int]) -> int | None:

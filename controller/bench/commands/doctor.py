@@ -28,7 +28,7 @@ from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot
 from snakewalk.controller.run.backend import FILE_PORTS, on_ports, real_ports
-from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, user_file
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.port_map import is_port_map, port_map_text
 
@@ -128,7 +128,7 @@ def doctor(
 
 
 def _fingerprints(robot_file: str, robot: RobotConfig, lines: PortLines) -> list[Finding]:
-    path = own_file(robot_file)
+    path = user_file(robot_file)
     if path is None:
         return []
     finding = fingerprint_finding(FingerprintFile(path), robot, read_all(lines, robot))

@@ -281,13 +281,11 @@ def _carried(
 
 
 def _without(name: int, matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
-    """Residual of the other markers without one, px."""
     rest = [other for other in names if other != name]
     return _residual_px(_turned(matrix, one, two, rest), one, two, rest)
 
 
 def _residual_px(move: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
-    """Largest residual of a marker."""
     return max(
         float(np.hypot(*(projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
     )

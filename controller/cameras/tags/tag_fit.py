@@ -65,7 +65,6 @@ class _Seen:
     """(4 k, 2) without distortion."""
 
     def only(self, keep: Bools) -> "_Seen":
-        """Return the tags of a mask."""
         tags = tuple(tag for tag, is_kept in zip(self.tags, keep, strict=True) if is_kept)
         corners = np.repeat(keep, 4)
         return _Seen(tags, self.points_m[corners], self.pixels[corners])
@@ -181,7 +180,6 @@ class TagFit:
         return turn, at
 
     def _per_tag_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
-        """Root mean square error of each tag's corners."""
         off = self._off_px(seen, turn, at).reshape(len(seen.tags), 8)
         return np.asarray(np.sqrt((off**2).mean(axis=1)))
 

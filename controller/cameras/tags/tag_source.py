@@ -161,7 +161,6 @@ class _NotedJoints:
         self._feed, self._pose = feed, pose
 
     def __call__(self, state: JointState) -> BodyPose:
-        """Return the pose at a joint state."""
         self._feed.note(state)
         return self._pose(state)
 

@@ -31,7 +31,7 @@ def draw_analysis(found: Analysis, file: Path) -> None:
 
     """
     check_picture(file)
-    track, pulse, unknown = found.track, found.pulse, found.pulse_not_told
+    track, pulse, unknown = found.track, found.pulse, found.pulse_unknown_reason
     scale = track.rate_hz / track.angles_rad.shape[1]
     with style():
         figure = Figure(figsize=(WIDTH_IN, 8.4), layout="constrained", dpi=110)

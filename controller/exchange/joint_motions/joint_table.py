@@ -30,7 +30,6 @@ _MISSING: Final = {"", "na", "nan", "null", "none"}
 
 
 def _cells(line: str) -> tuple[str, list[str]]:
-    """Separator and cells of the first line."""
     separator = max(_SEPARATORS, key=line.count)
     return separator, [cell.strip().strip('"') for cell in line.split(separator)]
 

@@ -54,7 +54,6 @@ class RosJoints:
 
 
 def _topic(path: Path, bag: Any, request: JointRequest) -> tuple[str, str]:
-    """Topic and type of the messages to be played."""
     kinds = {each.topic: each.msgtype for each in bag.connections}
     fit = {topic: kind for topic, kind in kinds.items() if kind in (_STATE, _TRAJECTORY)}
     if request.topic is not None:
@@ -101,7 +100,6 @@ def _points(path: Path, messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
 
 
 def _motion(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
-    """Bring rows into the order of the joints of the first one."""
     names: tuple[str, ...] = ()
     times, angles, others, unlike, cells = [], [], 0, set[str](), 0
     for time_s, row_names, positions in rows:

@@ -115,7 +115,6 @@ def _kinds(hinges: list[Hinge], notes: list[str]) -> list[bool]:
 
 
 def _off(axis: Floats, across: Floats, steps: int) -> float:
-    """How far an axis is off the first one of its kind, over the steps between them."""
     return math.acos(min(abs(float(axis @ across)), 1.0)) / max(steps, 1)
 
 
@@ -127,7 +126,6 @@ def _mean_axis(axes: list[Floats]) -> Floats:
 def _up(
     first: Floats, across: Floats | None, forward: Floats, name: str, notes: list[str]
 ) -> Floats:
-    """Which of the axes is upright."""
     axes = [first] if across is None else [first, across]
     upright = [abs(float(axis[2])) for axis in axes]
     if max(upright) > math.sqrt(0.5) or len(axes) == 2:

@@ -163,7 +163,6 @@ def _check_straight(
 def _foot(
     model: mujoco.MjModel, data: mujoco.MjData, branch: Branch, outward: Floats
 ) -> tuple[float, float, float]:
-    """Middle of the foot outward, its radius and friction."""
     last = branch.groups[-1]
     geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] in last]
     balls = [g for g in geoms if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE

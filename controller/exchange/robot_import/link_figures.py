@@ -343,7 +343,6 @@ def data_centre(data: mujoco.MjData, group: list[int]) -> Floats:
 
 
 def _support(model: mujoco.MjModel, data: mujoco.MjData, geom: int, ahead: Floats) -> float:
-    """How far a geom reaches in a direction."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     centre, turned = float(data.geom_xpos[geom] @ ahead), ahead @ data.geom_xmat[geom].reshape(3, 3)
     along = abs(float(turned[2]))

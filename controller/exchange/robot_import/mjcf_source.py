@@ -125,7 +125,6 @@ class _Defaults:
         return found
 
     def value(self, geom: LineElement, name: str, childclass: str) -> str | None:
-        """Attribute of a geom, or that of its class."""
         chosen = self.geom.get(geom.get("class", childclass), {})
         return geom.get(name, chosen.get(name))
 
@@ -147,7 +146,6 @@ def _geoms(root: LineElement) -> Iterator[tuple[LineElement, LineElement, str]]:
 def _resolve_meshes(
     source: ModelSource, path: Path, defaults: _Defaults, assumed: Assumptions
 ) -> None:
-    """Give meshes their whole path; of a missing one only the mass remains."""
     root, missing = source.root, {}
     compiler = root.find("compiler")
     settings = {} if compiler is None else compiler.attrib
@@ -194,7 +192,6 @@ def _resolve_meshes(
 def _replace(
     parent: LineElement, geom: LineElement, mass: str | None, mesh: str, assumed: Assumptions
 ) -> None:
-    """Replace a geom of a missing mesh by a ball of next to no size with its mass."""
     is_static, has_inertia = parent.tag == "worldbody", parent.find("inertial") is not None
     if is_static or has_inertia:
         mass = "0"

@@ -189,7 +189,6 @@ def counted(things: Iterable[str]) -> str:
 
 
 def _tags(root: LineElement) -> Iterator[tuple[str, LineElement]]:
-    """Start and end tags in order, without recursion."""
     stack: list[tuple[LineElement, bool]] = [(root, False)]
     while stack:
         element, closes = stack.pop()

@@ -1,9 +1,9 @@
 """Robot models of other programs as robot files: ``snakewalk robot import``.
 
-MuJoCo reads the model. The joints' axes, order and ranges, and the links' lengths, masses and radii
-are taken from it. Links here are straight, have their joints on one line and their mass spread
-evenly about it. Other properties of a model are rejected, or reported in a note. An anchor may lie
-anywhere along its own axis, which changes no motion: anchors are moved there to the line.
+MuJoCo reads axes, order and ranges of the joints, and lengths, masses and radii of the links. Links
+here are straight, with their joints on one line and their mass spread evenly about it. Other
+properties are rejected, or reported in a note. An anchor is moved along its axis to the line, which
+changes no motion.
 """
 
 import math
@@ -196,7 +196,6 @@ def _keys(
     joints: list[dict[str, object]],
     legs: list[LegPair],
 ) -> dict[str, object]:
-    """Keys of a robot's file."""
     radius_m = max(link.radius_m for link in links)
     keys: dict[str, object] = {
         "name": name,
@@ -247,7 +246,6 @@ def _limb_keys(pair: LegPair, scale: float) -> dict[str, object]:
 def _plan_limits(
     source: ModelSource, joints: set[str], servo_model: str, notes: list[str]
 ) -> dict[str, object]:
-    """Torque and speed that a plan may use, from the limits of the model's joints."""
     keys: dict[str, object] = {}
     efforts = [value for name, value in source.effort_n_m.items() if name in joints]
     speeds = [value for name, value in source.speed_rad_s.items() if name in joints]

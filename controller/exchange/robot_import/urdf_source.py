@@ -263,7 +263,6 @@ def _friction(root: LineElement) -> dict[str, float]:
 
 
 def _stated_masses_kg(root: LineElement) -> tuple[dict[str, float], dict[str, str]]:
-    """Mass that each moving link states with the links fixed to it, and the heaviest of them."""
     parent = {
         str(_end(joint, "child")): str(_end(joint, "parent"))
         for joint in root.findall("joint")

@@ -142,7 +142,6 @@ def _head(
     file: Path, read: "FileMap", options: "MapOptions", crop: str | None, spacing_m: float,
     fill: float, notes: list[str],
 ) -> list[str]:  # fmt: skip
-    """Comment at the head of the world's file."""
     wide, deep = read.size_m
     return [
         f"From {file.name}, {read.kind}: {wide:.5g} m by {deep:.5g} m,",

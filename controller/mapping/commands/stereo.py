@@ -141,7 +141,6 @@ def stereo(
 
 
 def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list[str]:
-    """Faults of the options of the camera's stand."""
     faults = [
         f"{option} {angle:g}: must be within 90 degrees"
         for option, angle in (("--tilt", tilt or 0.0), ("--roll", roll))
@@ -174,6 +173,6 @@ def _facts(made: "StereoGround") -> dict[str, object]:
         "camera_height_m": round(stand.height_m, 4),
         "camera_tilt_deg": round(math.degrees(stand.tilt_rad), 2),
         "camera_roll_deg": round(math.degrees(stand.roll_rad), 2),
-        "matched_share": round(made.told_share, 4),
+        "matched_share": round(made.known_share, 4),
         "mapped_share": round(made.used_share, 4),
     }

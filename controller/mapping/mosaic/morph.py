@@ -101,7 +101,6 @@ def morphable(
 
 
 def _without_islands(mask: Bools) -> Bools:
-    """Mask without its small islands."""
     _, label, facts, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     large = facts[:, cv2.CC_STAT_AREA] >= _LEAST_ISLAND_PX
     return np.asarray(mask & large[label])

@@ -111,7 +111,6 @@ def _rays(camera: Floats, places_px: Floats) -> Floats:
 
 
 def _common_plane(views: Sequence[LocalModel], turns: Floats) -> tuple[Floats, tuple[int, int]]:
-    """Camera matrix, width and height of the first view's plane, extended to all views."""
     first = views[0].camera
     corners = []
     for view, turn in zip(views, turns, strict=True):
@@ -136,7 +135,6 @@ def _common_plane(views: Sequence[LocalModel], turns: Floats) -> tuple[Floats, t
 
 
 def _on_plane(view: LocalModel, turn: Floats, camera: Floats, size: tuple[int, int]) -> LocalModel:
-    """Turn a view's points into the first view's axes, and warp its maps to the common plane."""
     to_view = view.camera @ turn.T @ np.linalg.inv(camera)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     points = cv2.warpPerspective(

@@ -89,7 +89,6 @@ def draw(
 
 @compiled(f"float64({_PICTURE}, float64, float64, int64)")
 def _texel(picture: Image, u: float, v: float, channel: int) -> float:
-    """Bilinear sample."""
     u = min(max(u, 0.0), picture.shape[1] - 1.001)
     v = min(max(v, 0.0), picture.shape[0] - 1.001)
     i, j = int(v), int(u)
@@ -101,7 +100,6 @@ def _texel(picture: Image, u: float, v: float, channel: int) -> float:
 
 @compiled(f"boolean({_FLOATS}, {_MATRIX}, int64[:, ::1], float64[:, ::1], float64[::1])")
 def _place(points: Floats, camera: Floats, corner: Ints, screen: Floats, inverse: Floats) -> bool:
-    """Write pixels and inverse depths of a triangle's corners; False if one is behind."""
     for k in range(3):
         i, j = corner[k, 0], corner[k, 1]
         z = points[i, j, 2]
@@ -148,7 +146,6 @@ def _draw(
     points: Floats, camera: Floats, drawn: Bools, own: Image, other: Image, counterpart: Floats,
     share: float, colour: Image, depth: Floats,
 ) -> None:  # fmt: skip
-    """Draw both triangles of each cell."""
     tall, wide = depth.shape
     corner = np.empty((3, 2), np.int64)
     screen, inverse, parts = np.empty((3, 2)), np.empty(3), np.empty(3)

@@ -105,7 +105,6 @@ def render(
 def _draw_model(
     canvas: Canvas, walk: StereoWalk, number: int, view: RouteView, camera: Floats
 ) -> None:
-    """Draw the model of a position from the camera of a view, without a morph."""
     model, pose, base = walk.models[number], walk.poses[number], walk.poses[view.step]
     points = (model.points_m @ pose[:, :3].T + pose[:, 3] - base[:, 3]) @ base[:, :3]
     points = (points - view.place_m) @ view.rotation.T

@@ -105,7 +105,6 @@ def _table(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def _worst_errors(metrics: Sequence[dict[str, Any]]) -> tuple[str, ...]:
-    """Return the largest relative error of each metric, in percent, and the false alarms."""
     cells = []
     for key in _METRICS.values():
         pairs = [(each[key], each[f"true_{key}"]) for each in metrics]

@@ -1,5 +1,5 @@
-"""One module for each figure; it draws a ``RunRecord`` as a matplotlib ``Figure``, or None.
+"""Figures of a run: a module for each draws a ``RunRecord`` as a matplotlib ``Figure``, or None.
 
-None means that the log holds nothing to draw. Only the object interface of matplotlib is used: no
-window, no global state.
+None means that the log has nothing to draw. They use matplotlib's object interface only: no window,
+no global state.
 """

@@ -86,12 +86,6 @@ def fit_gait(
 
 
 def _read(path: Path) -> list[list[float]]:
-    """Points (N, 3) of a table; other columns are left alone.
-
-    Raises:
-        InputError: no such file, a column is missing, or a value is not a number.
-
-    """
     if not path.is_file():
         raise InputError(why_no_file(path))
     try:

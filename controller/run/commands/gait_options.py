@@ -1,4 +1,4 @@
-"""Options that several ``snakewalk gait`` commands have, and what they show of a gait."""
+"""Options and facts that several ``snakewalk gait`` commands share."""
 
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,7 +24,7 @@ Param = Annotated[
 
 
 def parameters(given: list[str] | None) -> dict[str, Any]:
-    """Read NAME=VALUE pairs; the gait's model says what a value must be."""
+    """Read NAME=VALUE pairs; the gait's schema checks the values."""
     return key_values("--param", given, "NAME=VALUE")
 
 

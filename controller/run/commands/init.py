@@ -1,4 +1,4 @@
-"""``snakewalk init``: a run, a robot and a world of one's own to begin with."""
+"""``snakewalk init``: files of a run, a robot and a world to edit."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,7 @@ from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
 _USED_FIRST = ("flat-square", "jacksboro-traverse")
-"""Runs that are the start where several would do."""
+"""Runs that come first among several possible starts."""
 
 _RUN = """A run: what is to be done, by which robot, where.
   snakewalk plan run.toml     judges it on paper

@@ -105,7 +105,6 @@ def plan(
 
 
 def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
-    """Return the figures of a run on paper, and its warnings."""
     ahead = prepared.forecast()
     found: dict[str, object] = {
         "run": prepared.run.name,
@@ -136,7 +135,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
     if ahead.slide is not None:
         found["steeper_than_held"] = (
             f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "
-            f"{math.degrees(ahead.slide.held_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
+            f"{math.degrees(ahead.slide.holding_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
         )
     if prepared.run.motion != "serpenoid":
         found["states"] = prepared.library.counts
@@ -154,7 +153,6 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
 
 
 def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
-    """Return slopes of the ground along the path, and warnings about them."""
     relief = path_relief(prepared.planner, prepared.path)
     facts: dict[str, object] = {
         "slope_median_deg": _deg(relief.median_slope_rad),

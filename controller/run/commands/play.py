@@ -1,4 +1,4 @@
-"""``snakewalk play``: a recording in time on the robot."""
+"""``snakewalk play``: a recording on the robot."""
 
 from typing import Annotated
 

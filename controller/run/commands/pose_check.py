@@ -88,10 +88,10 @@ def watch(
     page: PoseCheckPage | None = None,
     judge: Judge = lambda sample: None,
 ) -> FeedStatistics:
-    """Receive poses for some seconds; ``on_line`` and ``page`` report in each second.
+    """Receive poses for some seconds; ``on_line`` and ``page`` report each second.
 
-    The seconds begin with the first message. Without one the check ends after ``WAIT_S`` at least,
-    because ROS 2 needs some seconds to find a publisher.
+    The time begins with the first message. Without one the check lasts at least ``WAIT_S``, because
+    ROS 2 needs seconds to find a publisher.
     """
     found, start_s = FeedStatistics(config), clock.now_s()
     due_s, end_s = start_s + LINE_S, start_s + max(seconds, WAIT_S)
@@ -145,7 +145,6 @@ def _print(line: str) -> None:
 
 
 def _expected(robot: str | None, prepared: PreparedRun | None) -> tuple[PoseConfig, Judge]:
-    """Return the tracked body, and a judge of a pose at the start of a run."""
     if prepared is None:
         body = None if robot is None else load_robot(robot)
         config = PoseConfig() if body is None or body.pose is None else body.pose

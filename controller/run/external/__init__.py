@@ -1,1 +1,1 @@
-"""Parts outside of the control loop: pose sources, served robots, and the second body."""
+"""Parts outside the control loop: pose sources, served robots, the second body."""

@@ -1,4 +1,4 @@
-"""External pose sources of a run: poses that arrive from another program."""
+"""External pose sources: another program sends the poses."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -33,14 +33,14 @@ class ClosingFeed(PoseFeed, Protocol):
 
 
 class ExternalSource(ABC):
-    """Base of pose sources whose poses another program measures; a subclass opens the feed."""
+    """Base of external pose sources; a subclass opens the feed."""
 
     name: str
     """As ``--pose`` names it."""
 
     @abstractmethod
     def open_feed(self, argument: str, clock: Clock) -> ClosingFeed:
-        """Open the feed that the text after the colon means.
+        """Open the feed that the text after the colon names.
 
         Raises:
             InputError: it cannot be opened.
@@ -49,19 +49,19 @@ class ExternalSource(ABC):
 
     @abstractmethod
     def check_argument(self, argument: str) -> None:
-        """Check the text after the colon; nothing is opened.
+        """Check the text after the colon without opening a feed.
 
         Raises:
-            InputError: it does not mean a feed.
+            InputError: it names no feed.
 
         """
 
     def faults(
         self, run: RunConfig, robot: RobotConfig, world: WorldConfig, *, on_port: bool
     ) -> list[str]:
-        """Return why the source cannot work in a run, one line per fault.
+        """Return the faults of the source in a run, one per line.
 
-        No tracker sees servos that are simulated in this process.
+        No tracker sees simulated servos of this process.
         """
         faults = []
         if not on_port:
@@ -75,17 +75,17 @@ class ExternalSource(ABC):
         return faults
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
-        """Return that the source measures the pose, with the noise of the robot's [pose]."""
+        """Return that the source measures, with the noise of the robot's [pose]."""
         config = robot.pose or PoseConfig()
         noise_rad = float(np.radians(config.noise_deg))
         return PoseEvidence(Kind.MEASURED, self.name, config.noise_m, noise_rad)
 
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:
-        """Open the source for the time of a run; the first pose is awaited before torque.
+        """Open the source for a run, and wait for the first pose before torque.
 
         Raises:
-            InputError: no pose arrives, or the first one cannot be that of the robot.
+            InputError: no pose arrives, or the first cannot be the robot's.
 
         """
         prepared, clock = context.prepared, context.backend.clock
@@ -119,7 +119,7 @@ class _Feed:
 
 
 def ground_height(ground: HeightField | None) -> Callable[[float, float], float]:
-    """Return the height of the ground at a place; 0 of a floor and outside of a height field."""
+    """Return the height of the ground at a place; 0 on a floor and outside a height field."""
 
     def height_m(x_m: float, y_m: float) -> float:
         if ground is None or not bool(ground.contains(x_m, y_m)):

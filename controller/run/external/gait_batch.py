@@ -51,7 +51,7 @@ def run_together(
         prepared: runs of one robot on one level floor; gains and friction may differ.
         logs: files of the logs.
         make_bodies: makes the bodies of a robot, a world, a number of them, and a step (s).
-        on_cycle: is called at the end of each control cycle, with its time.
+        on_cycle: called after each control cycle, with its time.
 
     Raises:
         InputError: robot or world are not supported, or a plan breaks a limit.
@@ -77,8 +77,6 @@ def run_together(
 
 
 class _Row:
-    """One run: safety, motion and log of a robot."""
-
     def __init__(self, batch: RobotBatch, number: int, prepared: GaitRun, log: RunLog) -> None:
         run, robot = prepared.run, prepared.robot
         plan, pose = prepared.check_plan(), prepared.initial_pose()
@@ -120,7 +118,6 @@ class _Row:
         self.log.event(self.body.now_s(), kind, text)
 
     def step(self, time_s: float) -> None:
-        """Read, move on, write and log the cycle of ``time_s``."""
         state = self.link.read()
         pose = self.body.head_pose()
         view = self._spine.in_world(pose, state.position_rad)

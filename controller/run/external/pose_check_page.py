@@ -1,4 +1,4 @@
-"""The live page of ``pose check``: the measured body on its ground, and facts of the feed."""
+"""Page of ``pose check``: the measured body on its ground, and facts of the feed."""
 
 from typing import Any, Final
 
@@ -23,22 +23,22 @@ FACTS: Final = (
     ("noise_deg", "noise {} deg"),
     ("frame", "frame {}"),
 )
-"""Facts of the feed that the page and the terminal show, and their words."""
+"""Facts of the feed with their words."""
 
 
 def feed_words(facts: dict[str, Any]) -> list[str]:
-    """Return the facts of a feed that are known, in words."""
+    """Return the known facts of a feed in words."""
     return [text.format(facts[key]) for key, text in FACTS if facts.get(key) is not None]
 
 
 class PoseCheckPage:
-    """Shows poses in a page that accepts the rows of a log.
+    """Shows poses in a page that accepts rows of a log.
 
-    The joint angles are unknown before torque, so the body is drawn straight.
+    Joint angles are unknown before torque, so the body is straight.
     """
 
     def __init__(self, log: RunLog, prepared: PreparedRun, config: PoseConfig, source: str) -> None:
-        """Show the poses of ``source`` in the page to which ``log`` passes its rows on."""
+        """Show the poses of ``source`` in the page behind ``log``."""
         self._log, self._config = log, config
         self._robot = prepared.robot
         self._tracked = TrackedBody(prepared.robot, config)

@@ -1,7 +1,7 @@
-"""Robots whose bodies are advanced together; safety and motions act on each one.
+"""Robots whose bodies advance together; safety and motion act on each one.
 
-A robot of a batch has the simulated servos of a run: registers, protections, supply. It has no bus:
-a state is read, and goals are written, without time on a wire and without lost packets.
+A robot of a batch has the simulated servos of a run (registers, protections, supply), but no bus:
+reads and writes need no time and lose nothing.
 """
 
 import math
@@ -41,9 +41,9 @@ def batch_fault(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> str |
 
 
 class RobotBatch:
-    """W robots of one body on a level floor; the W ``bodies`` are made for them alone.
+    """W robots of one body on a level floor, with W ``bodies`` of their own.
 
-    ``run`` has the cycle and the limits. Robots may differ in gains, worlds in friction.
+    ``run`` has cycle and limits. Gains of robots and frictions of worlds may differ.
     """
 
     def __init__(self, run: RunConfig, bodies: BatchBodies) -> None:
@@ -63,7 +63,7 @@ class RobotBatch:
     def start(
         self, row: int, robot: RobotConfig, world: WorldConfig, pose: InitialPose
     ) -> "BatchRow":
-        """Put another robot into a row, at rest; its servos are set up as at the start of a run.
+        """Put another robot into a row, at rest, with servos as at the start of a run.
 
         Raises:
             InputError: a batch does not simulate its servos.
@@ -98,7 +98,6 @@ class RobotBatch:
                 row.take_output(is_slice=stop % self._slice == 0)
 
     def _table(self, robot: RobotConfig, pose: InitialPose) -> Bytes:
-        """Registers of a robot's servos after the start of a run, which the real chain writes."""
         for known, table in self._tables:
             if known == robot:
                 return table
@@ -166,7 +165,7 @@ class BatchRow:
         return self._batch.bodies.qvel[self._row, 6:]
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
-        """Do nothing: the batch advances the shafts of all robots."""
+        """Do nothing: the batch advances all shafts."""
 
     # the clock
 
@@ -185,7 +184,7 @@ class BatchRow:
         return self.robot.joint_count
 
     def set_up(self, table: Bytes) -> None:
-        """Give the servos their registers (J, bytes), and their present positions as goals."""
+        """Give the servos their registers (J, bytes) and their positions as goals."""
         self._firmware.bank.table[:] = table
         self._firmware.power_up(self._servos)
         self._firmware.bank.table[:] = table
@@ -202,7 +201,7 @@ class BatchRow:
         self._firmware.apply_registers()
 
     def read(self) -> JointState:
-        """Return the present state, with angles in whole positions."""
+        """Return the present state; angles are whole positions."""
         firmware, drive = self._firmware, self.drive
         unit_rad = np.abs(self._units.rad_per_position)
         return JointState(
@@ -250,12 +249,12 @@ class BatchRow:
     # the batch
 
     def give_drive(self) -> None:
-        """Copy what the servos give to the motors to the batch."""
+        """Copy the drive of the motors to the batch."""
         for name in _INPUTS:
             getattr(self._batch.bodies, name)[self._row] = getattr(self.drive, name)
 
     def take_output(self, *, is_slice: bool) -> None:
-        """Copy the motors' output to the servos; at the end of a slice they check themselves."""
+        """Copy the motors' output to the servos, which check themselves after a slice."""
         bodies, row, drive = self._batch.bodies, self._row, self.drive
         drive.current_a[:], drive.pwm[:] = bodies.current_a[row], bodies.pwm[row]
         for name, values in zip(_ENERGIES, bodies.energies_j[:, row], strict=True):

@@ -1,4 +1,4 @@
-"""The second body of a run: in this process next to a simulated robot, in a worker for a port."""
+"""Second body of a run: in this process for a simulated robot, in a worker for a port."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -32,14 +32,14 @@ def use_worker(
     now_s: Callable[[], float] | None,
     until: ExitStack,
 ) -> None:
-    """Let a walk over known hills ask a second body in another process.
+    """Let a walk over known hills use a second body in another process.
 
-    Without MuJoCo the walk decides on paper.
+    Without MuJoCo the walk has only its prediction.
 
     Args:
         prepared: run on a port, with a measured pose.
         source: its motion.
-        now_s: simulated time of a rehearsal; None: a worker process answers when it can.
+        now_s: simulated time of a rehearsal; None: the worker replies in real time.
         until: ends the worker.
 
     """
@@ -60,12 +60,12 @@ def use_worker(
 def second_body(
     prepared: PreparedRun, source: MotionSource, backend: Backend, pose: PoseProvider
 ) -> FrictionEstimator | None:
-    """Let a bare snake that walks ground that is known use a second body, where there is one.
+    """Give a walk over known ground a second body, if available.
 
     Returns:
-        The estimator of the friction under a walk. From an external pose it is on paper, where the
-            ground under the body is a plane; else on a level floor on paper, elsewhere on that
-            body. None if the pose assumes the friction (the joints, an IMU).
+        The friction estimator. From an external pose it uses the traction model where the ground
+            under the body is a plane; otherwise it uses the model on a level floor and the second
+            body elsewhere. None if the pose assumes the friction (joints, IMU).
 
     """
     run, world, robot = prepared.run, prepared.world, prepared.robot
@@ -96,7 +96,6 @@ def second_body(
 
 
 def _tries_pieces(prepared: PreparedRun) -> bool:
-    """Whether a walk tries its pieces of track: on hills that are known, and if it may."""
     may_try = prepared.run.walk.tries > 0 and prepared.ground is not None
     return may_try and _is_bare_on_known_ground(prepared)
 

@@ -1,4 +1,4 @@
-"""A simulated robot on its ground, served as if it were real, with a tracker and its truth."""
+"""A simulated robot on its ground, served like a real one, with a tracker and its truth."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,14 +40,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where and how a served robot lies when serving begins."""
+    """Initial place and shape of a served robot."""
 
     start_m: tuple[float, float] = (0.0, 0.0)
     """Centre of the head link."""
     heading_rad: float = 0.0
     """Mean heading of the body."""
     joint_rad: tuple[float, ...] | None = None
-    """Angles that the servos report; None: straight. A straight round body rolls down a slope."""
+    """Angles of the servos; None: straight. A straight round body rolls down a slope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +64,13 @@ class Serving:
 
 
 def place_of(prepared: PreparedRun) -> Place:
-    """Return where a run begins, in its first shape."""
+    """Return the place and first shape of a run."""
     joint_rad = tuple(float(angle) for angle in prepared.initial_pose().joint_rad)
     return Place(prepared.run.start_m, prepared.start_heading_rad, joint_rad)
 
 
 def physics_modules() -> tuple[Any, Any]:
-    """Return the modules with the body in MuJoCo and with a second body.
+    """Return the modules of the MuJoCo body and of the second body.
 
     Raises:
         InputError: MuJoCo is not installed.
@@ -141,7 +141,7 @@ def simulated_line(
 
 
 class ServedRobot:
-    """A simulated robot on its ground; use it in a ``with``, which closes the truth."""
+    """A simulated robot on its ground; as a context manager it closes the truth."""
 
     def __init__(
         self,

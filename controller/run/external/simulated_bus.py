@@ -1,4 +1,4 @@
-"""The simulated bus of a robot: one line, or a line per port if the ports have different series."""
+"""Simulated bus of a robot: one line, or one per port for ports of different series."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,9 +30,9 @@ class SimulatedBus:
     """Simulated servos on the shafts of one body."""
 
     robot: RobotConfig
-    """Robot of the chain: without ports if all servos are on one line."""
+    """Robot of the chain; it has no ports if all servos are on one line."""
     lines: tuple[SimLine | FeetechLine, ...]
-    """One per port, in the order of ``robot.ports``; or the only one."""
+    """Lines in the order of ``robot.ports``, or the only one."""
 
     @classmethod
     def of(
@@ -67,7 +67,7 @@ class SimulatedBus:
 
     @property
     def busy_s(self) -> float:
-        """Time that bytes have spent on the wire so far; of several lines, on the busiest."""
+        """Time for which bytes have occupied the wire; of several lines, the busiest."""
         return max(line.busy_s for line in self.lines)
 
     def bus(self) -> ChainBus:
@@ -88,7 +88,7 @@ class SimulatedBus:
             line.settle()
 
     def hold_position(self) -> None:
-        """Set every goal to the present position, after the body was moved."""
+        """Set every goal to the present position after the body was moved."""
         for line in self.lines:
             line.firmware.hold_position()
 
@@ -98,7 +98,7 @@ class SimulatedBus:
             line.firmware.cut_power(np.arange(len(line.ids())))
 
     def energy(self) -> MotorEnergy:
-        """Energy that the motors have consumed, and their work, so far."""
+        """Energy that the motors have consumed, and their work."""
         drives = [line.firmware.drive for line in self.lines]
         return MotorEnergy(
             sum(float(drive.drawn_j.sum()) for drive in drives),

@@ -1,4 +1,4 @@
-"""A twin for a robot on a port: in another process, or for a rehearsal in simulated time."""
+"""Second body for a robot on a port: in another process, or in simulated time for a rehearsal."""
 
 import pickle
 from collections.abc import Callable, Iterator, Sequence
@@ -19,21 +19,20 @@ from snakewalk.controller.walk.twin_answers import TwinAnswer, TwinQuestion
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
 PIECE_S: Final = 0.22
-"""Time that a twin needs for a piece in a rehearsal: median CPU time of 807 pieces on a busy
-machine; one in ten needed less than 0.16 s (docs/benchmarks/steep-rehearsal.md)."""
+"""Time of a piece in a rehearsal: median CPU time of 807 pieces on a busy machine; a tenth needed
+less than 0.16 s (docs/benchmarks/steep-rehearsal.md)."""
 LARGEST_BYTES: Final = 60_000
-"""Size of a question that a pipe accepts at once; a larger one is not asked."""
+"""Largest question that a pipe accepts at once."""
 
 
 class TwinTrial:
-    """Tries the pieces of a question, one after the other."""
+    """Tries the pieces of a question one after the other."""
 
     def __init__(self, run: RunConfig, robot: RobotConfig, world: WorldConfig) -> None:
         self._prepared = WalkRun(run, robot, world)
 
     @cached_property
     def _pilot(self) -> Pilot:
-        """A pilot that follows what it is sent, with a twin."""
         prepared = self._prepared
         pilot = prepared.pilot()
         _, twins = physics_modules()
@@ -64,7 +63,7 @@ class TwinTrial:
 
 
 class RehearsedTwin:
-    """A ``TwinAnswers`` in simulated time: an answer needs ``PIECE_S``."""
+    """A ``TwinAnswers`` in simulated time: a reply needs ``PIECE_S``."""
 
     def __init__(self, trial: TwinTrial, now_s: Callable[[], float]) -> None:
         self._trial, self._now_s = trial, now_s
@@ -72,7 +71,7 @@ class RehearsedTwin:
         self._due_s = 0.0
 
     def ask(self, question: TwinQuestion) -> None:
-        """Ask; a piece that is being tried is tried to its end first."""
+        """Ask; the present piece is completed first."""
         now_s = self._now_s()
         begin_s = max(now_s, min(self._due_s, now_s + PIECE_S))
         self._pieces, self._due_s = self._trial.answers(question), begin_s + PIECE_S
@@ -103,7 +102,7 @@ class ProcessTwin:
         self._kept = list[TwinAnswer]()
 
     def ask(self, question: TwinQuestion) -> None:
-        """Ask if the worker has begun with the question before."""
+        """Ask if the worker has begun the previous question."""
         self._kept = self._receive()
         data = pickle.dumps(question)
         if self._listens and len(data) <= LARGEST_BYTES:
@@ -139,7 +138,7 @@ class ProcessTwin:
 
 
 def _serve(line: Connection, run: RunConfig, robot: RobotConfig, world: WorldConfig) -> None:
-    """Answer questions until the line is closed; None says that the worker listens."""
+    """Reply to questions until the line is closed; None reports readiness."""
     trial = TwinTrial(run, robot, world)
     trial.prepare()
     try:

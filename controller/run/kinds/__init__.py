@@ -1,1 +1,1 @@
-"""Kinds of runs: one module per kind of motion, each a prepared run."""
+"""Kinds of runs: one prepared run per kind of motion."""

@@ -1,4 +1,4 @@
-"""A run whose joints another program commands while it lasts."""
+"""A run whose joints another program commands."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ MakeCommanded = Callable[[RobotConfig, OnEvent], MotionSource]
 
 @dataclass(frozen=True)
 class CommandedRun(PathlessRun):
-    """A ``PreparedRun`` of commands that nobody knows beforehand: each is checked as it comes."""
+    """A ``PreparedRun`` of unknown commands: each is checked on arrival."""
 
     make: MakeCommanded
 

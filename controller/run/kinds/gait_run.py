@@ -1,4 +1,4 @@
-"""A run of a gait: its checks, its changes of gait, the live operator and the head steering."""
+"""A run of a gait: checks, changes of gait, live operator and head steering."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,8 @@ from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 
 _LEAST_GRIP = 1.2
-"""Friction across over along (ours): at 1 an undulation goes backward, at 1.25 slowly forward."""
+"""Least friction across over along (ours): an undulation goes backward at 1, slowly forward at
+1.25."""
 MakeOperator = Callable[[GaitMotion, RobotConfig, OnEvent], MotionSource]
 """Puts a live operator between a gait and the servos."""
 
@@ -44,22 +45,22 @@ class GaitRun(PathlessRun):
 
     @cached_property
     def changes(self) -> list[tuple[float, Gait]]:
-        """Times at which the gait changes, and the gaits that it changes to."""
+        """Times and gaits of the changes."""
         return [(c.at_s, make_gait(c.name, c.parameters)) for c in self.config.then]
 
     def initial_pose(self) -> InitialPose:
-        """Return the shape that the gait begins with; the first joint angles are held meanwhile."""
+        """Return the gait's first shape; its first joint angles are held meanwhile."""
         first_rad = GaitCycle(self.gait, self.robot).goal_rad()
         return pose_with(self.robot, self.start_heading_rad, first_rad)
 
     def check_plan(self) -> PlanSummary:
-        """Check the gaits against the joints' ranges; their speed is limited while they run."""
+        """Check the gaits against the joints' ranges; the run limits their speed."""
         for gait in (self.gait, *(gait for _, gait in self.changes)):
             gait.check(self.robot)
         return plan_without_path(self.run)
 
     def remark(self) -> str | None:
-        """Return a warning if a gait may go the other way on this ground."""
+        """Return a warning if a gait may go backward on this ground."""
         if self.world.ground.kind == "water":
             return None
         friction = self.world.friction
@@ -75,7 +76,7 @@ class GaitRun(PathlessRun):
         return None
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
-        """Return a fresh motion: gait, live operator and head steering, as configured."""
+        """Return a fresh motion: gait, operator and head steering."""
         gait = GaitMotion(self.gait, self.robot, duration_s=self.config.duration_s)
         asked_hz = self.gait.params.frequency_hz
         if gait.frequency_hz < asked_hz - 1e-9:

@@ -1,4 +1,4 @@
-"""Joint angles of another program's file as a recording: the readers are plug-ins."""
+"""Joint angles of another program's file as a recording; the readers are plug-ins."""
 
 from pathlib import Path
 
@@ -15,10 +15,10 @@ _HEAD_BYTES = 4096
 def foreign_joints(
     track: str, robot: RobotConfig, asked: PlaybackConfig
 ) -> tuple[Floats, Floats, tuple[str, ...]] | None:
-    """Times (T,), joint angles (T, J) and lines about the mapping; None: the file has midlines.
+    """Times (T,), joint angles (T, J) and lines about the mapping; None for midlines.
 
     Raises:
-        InputError: a fault of the file, or a choice that it needs.
+        InputError: a fault of the file, or it needs a choice.
 
     """
     path = Path(track)
@@ -37,7 +37,6 @@ def foreign_joints(
 
 
 def _reader(path: Path) -> JointReader | None:
-    """Return the reader that accepts a path."""
     if not path.exists():
         return None
     head = b""

@@ -20,16 +20,16 @@ from snakewalk.controller.track.recorded_joints import recorded_joints
 
 _LINEAR = 0.9  # of the limit: angles up to it are played as they are
 _NO_THRUST_1_S = 0.02
-"""Predicted speed, body lengths per second, below which a motion counts as one without thrust
-(ours): shipped recordings of crawling animals have 0.1 and more."""
+"""Predicted speed, body lengths per second, below which a motion has no thrust (ours): shipped
+recordings of crawling animals have 0.1 and more."""
 _MOST = 0.995  # of the limit: the spline between frames goes a little beyond them
 
 
 def clip_softly(joints: Floats, limit_rad: Floats) -> Floats:
-    """Joint angles (T, J) within their limits (J,), without the corner of a hard clip.
+    """Joint angles (T, J) within their limits (J,), without a corner.
 
-    Up to 0.9 of the limit they are unchanged. A corner would ask for any acceleration, and slow the
-    whole recording.
+    Up to 0.9 of the limit they are unchanged. A corner would need any acceleration, and slow the
+    complete recording.
     """
     start, room = _LINEAR * limit_rad, (_MOST - _LINEAR) * limit_rad
     size = np.abs(joints)
@@ -43,7 +43,7 @@ class PlaybackRun(PathlessRun):
 
     @cached_property
     def joint_track(self) -> tuple[Floats, Floats]:
-        """Times (T,) in the animal's own time from 0 on, and joint angles (T, J) to be played."""
+        """Times (T,) in the animal's time from 0, and joint angles (T, J) to play."""
         time_s, joints = self._as_recorded
         if self._asked.clip:
             joints = clip_softly(joints, np.array(self.robot.limit_rad))
@@ -51,7 +51,6 @@ class PlaybackRun(PathlessRun):
 
     @cached_property
     def _as_recorded(self) -> tuple[Floats, Floats]:
-        """The same before joints are clipped."""
         if self._foreign is not None:
             time_s, joints, _ = self._foreign
         else:
@@ -60,12 +59,11 @@ class PlaybackRun(PathlessRun):
 
     @cached_property
     def _foreign(self) -> tuple[Floats, Floats, tuple[str, ...]] | None:
-        """Joint angles of another program's file; None where the recording has midlines."""
         return foreign_joints(self.run.track, self.robot, self._asked)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Lines about the mapping of joints, and parts that the reader left out or changed."""
+        """Lines about the mapping of joints, and about omitted or changed parts."""
         return () if self._foreign is None else self._foreign[2]
 
     @property
@@ -87,7 +85,7 @@ class PlaybackRun(PathlessRun):
 
     @property
     def clipped(self) -> str | None:
-        """Result of clipping, in words; None if nothing was clipped."""
+        """Words about clipping; None if nothing was clipped."""
         past = np.abs(self._as_recorded[1]) - np.array(self.robot.limit_rad)
         if not (past > 0.0).any():
             return None
@@ -100,7 +98,7 @@ class PlaybackRun(PathlessRun):
 
     @cached_property
     def no_thrust(self) -> str | None:
-        """Warning that the motion does not move this robot, at the recording's own speed."""
+        """Warning that the motion does not move this robot at the recorded speed."""
         time_s, joints = self.joint_track
         if isinstance(self.world.ground, WaterGround) or not np.ptp(joints, axis=0).any():
             return None
@@ -122,7 +120,7 @@ class PlaybackRun(PathlessRun):
         return pose_with(self.robot, self.start_heading_rad, self.joint_track[1][0])
 
     def check_plan(self) -> PlanSummary:
-        """Check range, speed and acceleration of every joint over the whole recording."""
+        """Check range, speed and acceleration of every joint."""
         self._recorded(self.speed)
         return plan_without_path(self.run)
 

@@ -1,4 +1,4 @@
-"""A run of a user's own motion source, checked on paper before torque is on."""
+"""A run of a user's motion source, checked on paper before torque."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.drivers.types import BodyPose
 
 MakeSource = Callable[[RobotConfig], MotionSource]
-"""Makes a fresh motion for a robot; the class of a source may be one."""
+"""Makes a fresh motion for a robot, for example the class of a source."""
 _SLACK = 1.0 + 1e-6
-"""Rounding of a source that goes just to a limit."""
+"""Allowed rounding at a limit."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class SourceRun(PathlessRun):
         """Check range, speed and acceleration of every joint over the whole run.
 
         The source is stepped at the run's rate with the head at rest and the joints on their goals.
-        A source that reacts to the measured body may move otherwise in the run, where the safety
-        link still vets every command.
+        If it reacts to the body it may move otherwise in the run, where the safety link vets every
+        command.
 
         Raises:
             InputError: one line for each fault.
@@ -93,7 +93,6 @@ class SourceRun(PathlessRun):
         return self.make(self.robot)
 
     def _goal_rad(self, goal_rad: Floats, time_s: float, call: str) -> Floats:
-        """(J,) a copy of goals, if they are J finite numbers."""
         goal_rad = _array(goal_rad, call).copy()
         if goal_rad.shape != (self.robot.joint_count,) or not np.isfinite(goal_rad).all():
             raise InputError(

@@ -1,4 +1,4 @@
-"""A run of a gait along waypoints: its path, its checks and its motion."""
+"""A run of a gait along waypoints: path, checks and motion."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,19 +20,19 @@ from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, SteeredGait,
 
 @dataclass(frozen=True)
 class SteeredRun(PathRun, GaitRun):
-    """A ``PreparedRun`` of a gait that is steered along a path."""
+    """A ``PreparedRun`` of a gait steered along a path."""
 
     @cached_property
     def ashore(self) -> Gait | None:
-        """The gait on land, of a run that comes out of the water."""
+        """Gait on land of a run that leaves the water."""
         table = self.config.ashore
         return None if table is None else make_gait(table.name, table.parameters)
 
     def check_plan(self) -> PlanSummary:
-        """Check that the gait can be steered, and within the joints' ranges; lay the path.
+        """Check steering and the joints' ranges; plan the path.
 
         Raises:
-            InputError: it cannot, or the run has keys of a gait without waypoints.
+            InputError: the gait cannot be steered, or the run has keys of a gait without waypoints.
 
         """
         if self.ground is not None and not self.robot.limbs:

@@ -41,11 +41,11 @@ from snakewalk.controller.walk.walker import Walker
 
 POINTS = 100
 _BRIDGED_LINKS = 4.0
-"""Radius of the ball that bridges the ground, over a link's length (ours). Steps of 4 cm are passed
-in 41 s with 4, and in 49 s with 1; with 0 one of eight bodies fails."""
+"""Radius of the ball that bridges the ground, over a link's length (ours). Bodies pass steps of 4
+cm in 41 s with 4, in 49 s with 1; with 0 one of eight fails."""
 
 _ROLLING_A = 0.3
-"""Goal current of pitch joints that roll a body up a slope of 18 degrees (ours, decision 37)."""
+"""Goal current of pitch joints that roll a body up 18 degrees (ours, decision 37)."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class WalkRun(PathRun):
 
     @cached_property
     def bridged(self) -> HeightField | None:
-        """The ground as far as a chain of stiff links can follow it."""
+        """The ground as far as stiff links can follow it."""
         return None if self.ground_ahead is None else self._bridged(self.ground_ahead)
 
     def _bridged(self, ground: HeightField) -> HeightField:
@@ -62,7 +62,7 @@ class WalkRun(PathRun):
 
     @cached_property
     def ground_map(self) -> GrowingMap | None:
-        """The map that a run over unknown ground makes; each run begins with an empty one."""
+        """Map of a run over unknown ground, initially empty."""
         if self.run.mapping is None or self.ground is None:
             return None
         return GrowingMap.over(self.ground, self.run.mapping.spacing_m)
@@ -74,12 +74,12 @@ class WalkRun(PathRun):
 
     @cached_property
     def shape_filters(self) -> dict[str, ShapeFilter]:
-        """Tests of a shape: turn, joints in range, no self-contact, traction."""
+        """Tests of a shape: turn, joint ranges, no self-contact, traction."""
         return shape_filters(self.robot, self.world.friction, self.run.states, POINTS)
 
     @cached_property
     def library(self) -> StateLibrary:
-        """Shapes that this robot can make, that do not touch themselves, and that push."""
+        """Shapes that this robot can make without self-contact, and that push."""
         states = self.run.states
         return build_library(
             load_track(self.run.track).angles_rad,
@@ -92,15 +92,15 @@ class WalkRun(PathRun):
 
     @cached_property
     def pitch_fitter(self) -> PitchFitter:
-        """Fits the pitch joints to the ground; on a level floor they stay at 0."""
+        """Fits the pitch joints to the ground; 0 on a level floor."""
         return PitchFitter(self.robot, self.bridged, self.run.walk.pitch.fit_gain)
 
     @cached_property
     def gain(self) -> float:
-        """Predicted speed over pulse speed: the quasi-static gain, mean over the shapes used.
+        """Predicted speed over pulse speed: mean quasi-static gain of the shapes.
 
-        On level ground the simulated body makes 0.91 to 0.99 of it, on hills 0.67 to 0.77 (measured
-        over the shipped runs, docs/method.md).
+        The simulated body makes 0.91 to 0.99 of it on level ground, 0.67 to 0.77 on hills (shipped
+        runs, docs/method.md).
         """
         if self.run.motion == "serpenoid":
             shape = self._chooser().track.body_rad(float(POINTS))
@@ -110,24 +110,24 @@ class WalkRun(PathRun):
 
     @property
     def pulse_segments_s(self) -> float:
-        """How fast the shape shall travel along the body."""
+        """Speed of the shape along the body."""
         behaviour = self.run.behaviour
         return behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * POINTS
 
     def initial_pose(self) -> InitialPose:
-        """Return the pose in which a simulated robot is put on the ground.
+        """Return the initial pose of a simulated robot.
 
-        It is straight on a flat floor. On a slope a straight body, round below, rolls like a log,
-        so there it has its first shape.
+        It is straight on a flat floor. On a slope a straight round body rolls, so it has its first
+        shape.
         """
         if self.ground is None:
             return InitialPose(self.start_heading_rad, np.zeros(self.robot.joint_count))
         return pose_with(self.robot, self.start_heading_rad, self.pilot(level=True).goal_rad())
 
     def pilot(self, *, level: bool = False) -> Pilot:
-        """Make a fresh pilot; the same configuration and seed give the same one.
+        """Make a fresh pilot, equal for the same configuration and seed.
 
-        ``level`` leaves the pitch joints at 0, whatever the ground.
+        ``level`` keeps the pitch joints at 0.
         """
         return self._pilot(self._chooser(), level=level)
 
@@ -175,10 +175,10 @@ class WalkRun(PathRun):
         )
 
     def forecast(self) -> Forecast:
-        """Run the plan on paper, and refuse it if a joint would be driven beyond its limits.
+        """Predict the run on paper.
 
         Raises:
-            InputError: one line per joint and limit.
+            InputError: one line per joint and limit that the plan breaks.
 
         """
         plan = forecast(
@@ -196,10 +196,10 @@ class WalkRun(PathRun):
         return plan
 
     def check_plan(self) -> PlanSummary:
-        """Forecast the run and summarise it for the log.
+        """Predict the run and summarise it for the log.
 
         Raises:
-            InputError: the plan drives a joint beyond its limits, one line per joint and limit.
+            InputError: one line per joint and limit that the plan breaks.
 
         """
         ahead = self.forecast()
@@ -212,7 +212,7 @@ class WalkRun(PathRun):
         )
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
-        """Return a fresh pilot; it warns where the recording has no part in the walk."""
+        """Return a fresh pilot; it warns if the recording has no part in the walk."""
         for line in self.warnings:
             on_event("shapes", line)
         for line in self.climb_warnings:
@@ -239,7 +239,6 @@ class WalkRun(PathRun):
         )
 
     def _map_walk(self, ground_map: GrowingMap) -> MapWalk:
-        """A walk on the map as it is, and as it grows."""
         planner = MapPlanner(self.world.planner)
         ground = ground_map.height_field()
         rollout = self._rollout()
@@ -269,10 +268,7 @@ class WalkRun(PathRun):
 
     @property
     def _rolls(self) -> bool:
-        """Whether the body may roll sideways: it has to be round, on joints that carry it.
-
-        A mast would lie under it.
-        """
+        """Whether the body may roll sideways: round, without a mast, on joints that carry it."""
         robot = self.robot
         if not robot.pitch_joints or robot.belly.shape == "rails" or robot.stereo_head is not None:
             return False
@@ -307,7 +303,7 @@ class WalkRun(PathRun):
 
     @cached_property
     def steep_sections(self) -> list[SteepSection]:
-        """Sections of the path that the body cannot climb, as far as the ground is known."""
+        """Sections of the path that are too steep for the body, on known ground."""
         if self.ground_ahead is None:
             return []
         return steep_sections(self.path, self.ground_ahead, self.robot.length_m, self._climbed_rad)
@@ -319,7 +315,7 @@ class WalkRun(PathRun):
 
     @property
     def _climbed_rad(self) -> float:
-        """Steepest slope that a body climbs; where friction along it holds more, that."""
+        """Steepest slope that a body climbs, or that friction along it holds."""
         return max(CLIMBED_RAD, float(np.arctan(self.world.friction.along)))
 
     def _too_steep(self, section: SteepSection) -> str:
@@ -333,7 +329,6 @@ class WalkRun(PathRun):
 
     @property
     def _no_recorded(self) -> str:
-        """Why no shape is the animal's."""
         return (
             f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
             f"walk is made of {len(self.library.shapes_rad)} random ones "
@@ -341,14 +336,14 @@ class WalkRun(PathRun):
         )
 
     def walker(self, library: StateLibrary, filters: Mapping[str, ShapeFilter]) -> Walker:
-        """Make a fresh walk by the graph alone over a library, as this run sets it."""
+        """Make a fresh walk by the graph alone over a library."""
         walk = self.run.walk
         if self.run.motion == "walk-printed":
             walk = walk.model_copy(update={"decision_fraction": 1.0, "ramp_limit_rad": 0.0})
         return Walker(self._shuffled(library), walk, passes_all(filters))
 
     def _shuffled(self, library: StateLibrary) -> Floats:
-        """Shapes (S, N) in an order that is the seed's: W settles ties by the order."""
+        """Shapes (S, N) in an order by the seed: W settles ties by the order."""
         order = np.random.default_rng(self.run.seed).permutation(len(library.shapes_rad))
         return np.asarray(library.shapes_rad[order])
 

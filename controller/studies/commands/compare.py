@@ -64,7 +64,6 @@ def compare(
 
 
 def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> None:
-    """Print the differences of the configurations, then the numbers that at least one run has."""
     settings = Table(
         "setting", *_columns(runs), box=None, title="What differs", title_justify="left"
     )
@@ -86,12 +85,10 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
 
 
 def _columns(runs: "list[ComparedRun]") -> list[Column]:
-    """Columns of the runs, whose names are not cut: they differ at their ends."""
     return [Column(run.name, overflow="fold") for run in runs]
 
 
 def _text(value: Any) -> str:
-    """A value for a reader; numbers to five digits, a long list cut."""
     if value is None:
         return "-"
     if isinstance(value, bool):

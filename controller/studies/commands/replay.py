@@ -1,4 +1,4 @@
-"""``snakewalk replay``: a log run again on the simulator, and where it differs."""
+"""``snakewalk replay``: a log run again on the simulator."""
 
 import json
 from pathlib import Path

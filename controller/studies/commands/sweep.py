@@ -34,7 +34,7 @@ _HEADS = {
     "peak_torque_n_m": "N m",
     "default_slip": "slip",
 }
-"""Columns of the printed table, units under the names; the JSON has them all."""
+"""Columns of the printed table; the JSON has all."""
 
 
 @command(

@@ -58,7 +58,7 @@ _HEADS = {
     "pose": "pose",
     "why": "why",
 }
-"""Columns of the table: the units stand under the names, so that the table stays narrow."""
+"""Columns of the table, with units below the names."""
 _TEXT = {"run", "robot", "world", "motion", "compliance", "pose", "why"}
 
 
@@ -100,7 +100,7 @@ TrialsOut = Annotated[
 
 
 class _Where(NamedTuple):
-    """Where the runs are simulated: processes, or a Dask cluster by its address."""
+    """Place of the simulation: processes, or a Dask cluster."""
 
     workers: int
     dask: str | None
@@ -204,7 +204,6 @@ def _check_results(picture: Path | None, parquet: Path | None, out: Path | None)
 def _check_used(
     cases: Sequence[study.Case], track: Path | str | None, seconds: float | None
 ) -> None:
-    """Refuse options that no case uses."""
     if track is not None and all(case.motion in {"gait", "serpenoid"} for case in cases):
         raise InputError(f"--track {track}: is of walks, and none is tried")
     if seconds is not None and not any(case.is_gait for case in cases):
@@ -253,7 +252,7 @@ def _run(
     where: _Where,
     out: Path | None,
 ) -> list[study.Trial]:
-    """Run the trials that the table ``out`` does not hold, and return all."""
+    """Run the trials that the table ``out`` lacks, and return all."""
     table = None
     if out is not None:
         configs = {case: study.config_digest(case, changes) for case in cases}
@@ -276,10 +275,10 @@ def _run(
 
 
 def _check_keys(keys: list[str]) -> None:
-    """Refuse a key that stands twice: its last value would replace the others.
+    """Reject a repeated key: its last value would replace the others.
 
     Raises:
-        InputError: one does.
+        InputError: a key is repeated.
 
     """
     for place, key in enumerate(keys):

@@ -1,1 +1,1 @@
-"""The constants of a servo found from recordings of it, each with an interval."""
+"""Constants of a servo from recordings, each with an interval."""

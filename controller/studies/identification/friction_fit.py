@@ -40,42 +40,42 @@ from snakewalk.controller.studies.shadow.diagnosis import (
 RATIO: Final = "across_over_along"
 MASS: Final = "mass"
 _LIFTED_RAD: Final = 0.1
-"""Pitch joints that turn by less than this in a log lift nothing (ours)."""
+"""Pitch joints that turn less in a log lift nothing (ours)."""
 WINDOW_S: Final = 1.0
-"""The body's motion is compared over this, from the place where each window begins (ours)."""
+"""Length of a window in which motions are compared (ours)."""
 MOVED_M: Final = 0.02
-"""A body that moves less than this in all windows does not allow a friction estimate (ours)."""
+"""A body that moves less in all windows gives no friction estimate (ours)."""
 _FLOORS: Final = (1.0, 1.0, 1e-3**2, 2e-3**2)
-"""Least variance of the model error: of currents and angles (in steps of registers), of a window's
-displacement (m) and turn (rad) (ours)."""
+"""Least variance of the model error: currents and angles (register steps), displacement (m) and
+turn (rad) of a window (ours)."""
 _PER_SAMPLE: Final = (40.0, 40.0, 4.0, 4.0)
-"""Values of each kind that count as one: those of 4 s, as what the model misses comes again with
-each cycle of a gait (ours)."""
+"""Values of each kind that count as one, those of 4 s: model errors repeat with each cycle of a
+gait (ours)."""
 _PRIOR: Final = 1.5
-"""Standard deviation of a friction's logarithm before anything is known: a factor of 4.5 (ours)."""
+"""Prior standard deviation of a friction's logarithm: a factor of 4.5 (ours)."""
 _COMMON: Final = 0.05
-"""The same of the torque for a current of all servos alike: their data sheet's tolerance (ours)."""
+"""Prior of the common torque for a current: the data sheet's tolerance (ours)."""
 _STEP: Final = 0.1
 """Change of the logarithms for a numerical derivative (ours)."""
 _MOST: Final = 0.7
 """Longest step of a logarithm: a factor of two (ours)."""
 _ALONE, _TOGETHER = 4, 2
-"""Steps with friction alone, then with all that robots differ in (ours)."""
+"""Steps with friction alone, then with all differences of robots (ours)."""
 _DETERMINED: Final = 0.35
-"""Standard deviation of a logarithm from which a friction counts as undetermined: 95 % would reach
-from half to twice the value (ours)."""
+"""Standard deviation of a logarithm from which a friction is undetermined: 95 % reach from half to
+twice the value (ours)."""
 _NORMAL_95: Final = 1.96
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionLog:
-    """Data of a log for the friction fit: goals, replies, and displacements of the body."""
+    """Data of a log for the fit: goals, replies, and displacements of the body."""
 
     goals: Goals
     answers: Floats
     """(2, T, J) currents in A, angles in rad."""
     motion: Floats
-    """(W, 3) of each window: m ahead and to the left, rad turned."""
+    """(W, 3) motion of each window: m ahead and to the left, rad turned."""
 
     @staticmethod
     def of(record: RunRecord, world: WorldConfig | None = None) -> "FrictionLog":
@@ -126,12 +126,12 @@ class FrictionLog:
         deviation: Deviation,
         seen: Callable[[Floats], Floats] = lambda links_m: links_m,
     ) -> "FrictionLog":
-        """Return what a simulated robot would have logged.
+        """Return the log of a simulated robot.
 
         Args:
-            goals: the goals that are sent.
+            goals: the sent goals.
             deviation: differences of the robot from its file and its world.
-            seen: makes of its links (T, L, 3) what is measured of them.
+            seen: measurement of its links (T, L, 3).
 
         """
         answers, links_m = answers_and_links(goals, deviation)
@@ -145,7 +145,7 @@ class FrictionLog:
         """Reject a log that does not allow a mass estimate.
 
         Raises:
-            InputError: nothing is lifted in it; says what to run instead.
+            InputError: it lifts nothing; names a suitable run.
 
         """
         robot = self.goals.robot
@@ -168,7 +168,7 @@ class FrictionLog:
         return replace(self.goals, world=world)
 
     def errors(self, friction: FrictionConfig) -> tuple[float, float]:
-        """Root mean square error of a window's way (m) and turn (rad) of a body with a friction."""
+        """Root mean square error of displacement (m) and turn (rad) of a window with a friction."""
         again = FrictionLog.simulated(self.with_friction(friction), NO_DEVIATION)
         off = self.motion - again.motion
         way_m = math.sqrt(float((off[:, :2] ** 2).sum(axis=1).mean()))
@@ -195,7 +195,7 @@ class Found:
 
     @property
     def determined(self) -> bool:
-        """Whether the logs say it: the interval is narrower than from half to twice the value."""
+        """Whether the interval is narrower than from half to twice the value."""
         return self.high < self.value * math.exp(_NORMAL_95 * _DETERMINED)
 
 
@@ -229,7 +229,7 @@ class FrictionFit:
 
 
 def with_mass(robot: RobotConfig, share: float) -> RobotConfig:
-    """Return the robot with the mass of each link of its spine times ``share``."""
+    """Return the robot with the link masses of its spine times ``share``."""
     scaled_kg = [float(f"{share * mass_kg:.6g}") for mass_kg in robot.bare_link_masses_kg]
     return robot.with_link_masses(scaled_kg)
 
@@ -260,7 +260,7 @@ def fit_friction(
 
 
 class _Fit:
-    """Steps of Gauss and Newton; the vector is friction's logarithms, then what else differs."""
+    """Gauss-Newton steps; the vector has the friction's logarithms, then other differences."""
 
     def __init__(
         self,
@@ -294,7 +294,6 @@ class _Fit:
         self._total = (_ALONE + _TOGETHER) * (k + 1) + 1 + len(covariance)
 
     def run(self) -> FrictionFit:
-        """Return the most probable friction, with intervals."""
         k = len(self._names)
         values = np.concatenate([self._start, np.zeros(len(self._steps))])
         now = self._simulated(values)
@@ -362,7 +361,6 @@ class _Fit:
         return curvature, np.asarray(weighed.T @ rest)
 
     def _set_noise(self, rest: Floats, effects: Floats) -> None:
-        """Set the noise of each kind from the residual, less the share of the fit."""
         curvature, _ = self._normal(effects, rest)
         taken = np.einsum("ni,ij,nj->n", effects, np.linalg.inv(curvature), effects)
         taken = taken * self._weights()
@@ -395,7 +393,6 @@ def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats
 def _changed(
     logs: Sequence[FrictionLog], names: Sequence[str], values: Floats, steps: Floats, which: int
 ) -> Floats:
-    """Simulate with one value changed by its step; a function of its own for a process."""
     changed = values.copy()
     changed[which] += steps[which]
     return _simulated(logs, names, changed)
@@ -410,7 +407,7 @@ def _kinds(log: FrictionLog) -> Ints:
 
 
 def _places(links_m: Floats) -> Floats:
-    """Where a body is in plan (T, 3): its middle, m, and the heading from its rear to its front."""
+    """Place of a body in plan (T, 3): its centre, m, and its heading."""
     half = links_m.shape[1] // 2
     front, rear = links_m[:, :half, :2].mean(axis=1), links_m[:, half:, :2].mean(axis=1)
     ahead = front - rear
@@ -419,7 +416,7 @@ def _places(links_m: Floats) -> Floats:
 
 
 def _motion(goals: Goals, places: Floats) -> Floats:
-    """Way and turn (W, 3) of each window, in the body's frame at its start; places are (T, 3)."""
+    """Displacement and turn (W, 3) of each window, in the body's frame at its start."""
     hz = goals.run.cycle_hz
     edges = np.arange(round(SETTLED_S * hz), len(places), round(WINDOW_S * hz))
     first, last = places[edges[:-1]], places[edges[1:]]

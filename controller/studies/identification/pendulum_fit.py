@@ -1,8 +1,7 @@
 """Constants of a servo fitted to recordings of a pendulum, each with an interval.
 
-The whole recording is computed from its first angle, without further measured angles: so a fit
-reproduces the servo's motion, not only its next sample. Many starts find the basin, steps from the
-best ones its ground; all chance comes from one seed.
+The recording is computed from its first angle alone, so a fit reproduces the motion, not only the
+next sample. Many starts find the basin of the minimum, steps from the best ones the minimum.
 """
 
 import math
@@ -31,7 +30,7 @@ from snakewalk.controller.studies.identification.servo_constants import (
 )
 
 BACKLASHES_RAD: Final = (0.003, 0.008, 0.017, 0.035)
-"""Where the search for a backlash starts: 0.2 to 2 degrees (ours)."""
+"""First backlashes of the search: 0.2 to 2 degrees (ours)."""
 STARTS: Final = 24
 HOPS: Final = 60
 _COARSE_S: Final = 2e-3
@@ -46,15 +45,15 @@ _OUTLIER_RAD: Final = 0.02
 _TURN: Final = 1e-3
 """Share of a constant's range: step of the search's derivatives."""
 _BACKLASH_TURN: Final = 0.02
-"""Share of the backlash: a smaller step is lost in the moments at which teeth touch (ours)."""
+"""Step as a share of the backlash; a smaller one is lost at the contacts of the teeth (ours)."""
 _FINE_TURN: Final = 1e-4
-"""Share of a constant, or of a hundredth of its range: step of the intervals' derivatives. Where
-constants trade against each other exactly, a long step's error would pass for knowledge."""
+"""Step of the intervals' derivatives, as a share of a constant or of a hundredth of its range. For
+constants that compensate each other, a long step's error would look like knowledge."""
 _BLOCK_S: Final = 0.5
-"""Errors within this are not independent: they count as one in the intervals (ours)."""
+"""Errors within this time count as one in the intervals (ours)."""
 _COVERAGE: Final = 0.95
 _LEAST_SHARE: Final = 0.01
-"""No constant is known better than mass, arm and supply, which are given to a per cent (ours)."""
+"""Least relative error of a constant: mass, arm and supply are known to a per cent (ours)."""
 _FACTOR: Final = 1.05
 """Step along constants that move a servo alike (ours)."""
 _CHI_SQUARE: Final = 3.84
@@ -72,7 +71,7 @@ def error_deg(constants: ServoConstants, log: PendulumLog) -> float:
 
 
 def robot_error_deg(robot: RobotConfig, log: PendulumLog, bench: ServoConstants) -> float:
-    """Mean absolute error of the angle of a robot's simulated servo over a log, in degrees."""
+    """Mean absolute angle error of a robot's simulated servo over a log, in degrees."""
     return float(np.degrees(np.abs(robot_swing_rad(robot, log, bench) - log.position_rad).mean()))
 
 
@@ -174,7 +173,6 @@ def _with_backlash(
 
 
 def _blocks(logs: Sequence[PendulumLog]) -> int:
-    """Number of errors that count as independent."""
     return sum(math.ceil(log.time_s[-1] / _BLOCK_S) for log in logs)
 
 

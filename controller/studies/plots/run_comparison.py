@@ -54,7 +54,6 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
 
 
 def _draw_tracks(axes: Axes, runs: Sequence[ComparedRun]) -> None:
-    """Tracks from above, and the waypoints where all runs have the same."""
     for number, run in enumerate(runs):
         axes.plot(
             *run.centre_m.T,

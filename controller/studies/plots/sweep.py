@@ -40,7 +40,6 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
 
 
 def _panel(axes: Axes, gait: str, rows: list[dict[str, str]], colours: dict[str, str]) -> None:
-    """Draw the runs of one gait."""
     is_measured = False
     for robot, colour in colours.items():
         some = [r for r in rows if r["robot"] == robot and r["cycles"]]

@@ -110,11 +110,11 @@ class NamedCause:
 
     cause: Cause
     at: int | None
-    """Index of the joint, or of the link that carries a load; None of the ground."""
+    """Index of the joint, or of the loaded link; None for the ground."""
     evidence: float
     """Log of its evidence over that of a healthy robot."""
     values: tuple[float, ...]
-    """Friction along and across over the world's; kg; torque over the model's; rad."""
+    """Factors on friction along and across; kg; factor on torque; rad."""
 
     def text(self, robot: RobotConfig) -> str:
         """Say it to a person."""
@@ -135,7 +135,7 @@ class NamedCause:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """Causes of the differences, the best first; one of each kind, and the next joints."""
+    """Causes of the differences, the best first, one of each kind; and the next joints."""
 
     causes: tuple[NamedCause, ...]
     residual_a: Floats
@@ -145,7 +145,7 @@ class Diagnosis:
 
     @property
     def named(self) -> NamedCause | None:
-        """The cause that explains the difference; None where the robot is as well as any."""
+        """Cause that explains the difference; None if a healthy robot does as well."""
         best = self.causes[0] if self.causes else None
         return best if best is not None and best.evidence >= NAMED_FROM else None
 
@@ -187,13 +187,13 @@ class Diagnosis:
 
     @property
     def probability(self) -> float:
-        """Probability of the best cause among all that were considered, equally likely before."""
+        """Probability of the best cause among all, with equal priors."""
         logs = np.array([each.evidence for each in self.causes])
         return float(1.0 / np.exp(logs - logs[0]).sum())
 
 
 class Constants:
-    """All that may differ, as one vector: friction (2), loads (L), servos (J), slips (J)."""
+    """All possible differences as one vector: friction (2), loads (L), servos (J), slips (J)."""
 
     def __init__(self, robot: RobotConfig) -> None:
         links, joints = robot.link_count, robot.joint_count
@@ -233,7 +233,7 @@ class Constants:
             slip_rad=slip_rad if slip_rad.any() else None,
         )
 
-    def spoken(self, cause: Cause, values: Floats) -> tuple[float, ...]:
+    def reported(self, cause: Cause, values: Floats) -> tuple[float, ...]:
         """Return the numbers of a cause as people say them."""
         if cause == "friction":
             return tuple(float(1.0 + value) for value in values)
@@ -243,7 +243,7 @@ class Constants:
 
 
 def check_level(world: WorldConfig) -> None:
-    """Refuse ground on which a shadow means nothing.
+    """Reject ground on which a shadow is meaningless.
 
     Raises:
         InputError: it is not a level, open floor.
@@ -256,11 +256,11 @@ def check_level(world: WorldConfig) -> None:
 
 
 def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals, Floats]:
-    """Return what a log's shadow needs, and what was measured (2, T, J), up to a veto.
+    """Return a shadow's input and the measurements (2, T, J) of a log, up to a veto.
 
     Args:
         record: the log.
-        world: the ground that the chain is believed to be on; the log's where it is None.
+        world: the chain's assumed ground; by default the log's.
 
     Raises:
         InputError: the log is too short, or the ground is not level.
@@ -292,7 +292,7 @@ def answers(goals: Goals, deviation: Deviation, delay_s: float = 0.0) -> Floats:
 def answers_and_links(
     goals: Goals, deviation: Deviation, delay_s: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """Return the answers of a shadow, as ``answers``, and where its links (T, L, 3) are then, m."""
+    """Return the answers of a shadow, and its links (T, L, 3), m."""
     ground = build_ground(goals.world)
     shadow = Shadow(goals.run, goals.robot, goals.world, ground, goals.initial_pose, deviation)
     rows, joints = goals.sent_rad.shape
@@ -312,7 +312,7 @@ def diagnose(
     workers: int = 1,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Diagnosis:
-    """Say what differs between a chain that answered ``measured`` (2, T, J) and its shadow."""
+    """Find the cause of differences between ``measured`` (2, T, J) and the shadow."""
     apart = features(goals, measured) - features(goals, answers(goals, NO_DEVIATION))
     if np.abs(apart).max() < 1.0:  # a step of the registers: there is nothing to explain
         return Diagnosis((), *_residuals(goals, apart))
@@ -374,7 +374,7 @@ class Signatures:
         for k, (values, rest, slopes) in refined.items():
             cause, at, parts = constants.causes[k]
             evidence = likely.cause(rest, slopes, values, constants.faulty[parts]) - well
-            named.append(NamedCause(cause, at, evidence, constants.spoken(cause, values)))
+            named.append(NamedCause(cause, at, evidence, constants.reported(cause, values)))
         named.sort(key=lambda one: -one.evidence)
         return Diagnosis(tuple(named), *_residuals(self._goals, apart))
 
@@ -389,7 +389,7 @@ class Signatures:
     def _linear(
         self, likely: "_Likelihood", apart: Floats, parts: list[int]
     ) -> tuple[float, tuple[Floats, Floats, Floats]]:
-        """Log evidence of a cause whose effects are taken as proportional; values, rest, slopes."""
+        """Log evidence of a cause with proportional effects; values, residuals, slopes."""
         constants = self._constants
         slopes = self._effects[:, parts]
         values = self._allowed(likely.best(apart, slopes, constants.faulty[parts]), parts)
@@ -399,9 +399,9 @@ class Signatures:
     def _refined(
         self, likely: "_Likelihood", apart: Floats, parts: list[int]
     ) -> tuple[Floats, Floats, Floats]:
-        """Values of a cause, their residuals, and the slopes there, found on the simulator.
+        """Values of a cause, their residuals and slopes, found on the simulator.
 
-        Gauss-Newton's steps; the slopes follow by Broyden's update.
+        Gauss-Newton steps; the slopes follow by Broyden's update.
         """
         constants = self._constants
         slopes, faulty = self._effects[:, parts], constants.faulty[parts]
@@ -435,7 +435,7 @@ class Signatures:
 
 
 def features(goals: Goals, values: Floats) -> Floats:
-    """Means over bins (B * 2 * J,) of currents and angles (2, T, J), in steps of the registers."""
+    """Means over bins (B * 2 * J,) of currents and angles (2, T, J), in register steps."""
     hz = goals.run.cycle_hz
     each_bin = max(round(_BIN_S * hz), 1)
     rows = values[:, round(SETTLED_S * hz) :]
@@ -472,7 +472,7 @@ class _Likelihood:
         return weighed
 
     def of(self, x: Floats) -> float:
-        """Return the log likelihood, up to a constant that only the noise changes."""
+        """Return the log likelihood, up to a constant of the noise."""
         return -0.5 * float(x @ self.weigh(x)) - 0.5 * self._log_det
 
     def best(self, x: Floats, slopes: Floats, faulty: Floats) -> Floats:
@@ -483,14 +483,12 @@ class _Likelihood:
         )
 
     def cause(self, rest: Floats, slopes: Floats, values: Floats, faulty: Floats) -> float:
-        """Return the log evidence of a cause at its values, by Laplace's approximation."""
         bend = slopes.T @ self.weigh(slopes) * np.outer(faulty, faulty) + np.eye(len(faulty))
         prior = -0.5 * float(((values / faulty) ** 2).sum())
         return self.of(rest) + prior - 0.5 * float(np.linalg.slogdet(bend)[1])
 
 
 def _answer(goals: Goals, constant: int) -> Floats:
-    """Answers with one constant, or the delay, changed by its step; for a process of its own."""
     constants = Constants(goals.robot)
     vector = np.zeros(len(constants.step))
     if constant == len(vector):

@@ -1,4 +1,4 @@
-"""The shadow of a run: a row for each cycle, an alarm while it lasts, and the cause at its end."""
+"""Shadow of a run: a row for each cycle, an alarm, and the cause at the end."""
 
 from collections import deque
 from collections.abc import Callable
@@ -29,17 +29,17 @@ from snakewalk.controller.studies.shadow.shadow import Shadow, measured_s
 from snakewalk.drivers.types import JointState
 
 ALARM_A: Final = 0.03
-"""Difference of a current over the last seconds at which the alarm names a joint (ours)."""
+"""Mean difference of a current from which the alarm names a joint (ours)."""
 ALARM_RAD: Final = 0.02
 """The same of an angle (ours)."""
 _MEMORY_S: Final = 2.0
 """Time constant of the alarm's average (ours)."""
 _SMOOTH_S: Final = 0.1
-"""Time constant that smooths the encoder's and the current's steps in a difference (ours)."""
+"""Time constant that smooths steps of encoder and current (ours)."""
 _LONGEST_DELAY: Final = 0.5
-"""Greatest time between the shadow's reading and its goals, over that of its watchdog (ours)."""
+"""Greatest time between the shadow's reading and its goals, over its watchdog's (ours)."""
 _CLOCK_DIGITS: Final = 9
-"""Digits of a time in seconds beyond which differences of clocks have rounding errors."""
+"""Digits of a time in seconds without rounding errors of clocks."""
 
 
 @dataclass
@@ -154,7 +154,7 @@ class RunShadow:
 
     @staticmethod
     def check(world: WorldConfig) -> None:
-        """Reject ground on which a shadow means nothing.
+        """Reject ground on which a shadow is meaningless.
 
         Raises:
             InputError: the ground is not a level, open floor.
@@ -163,14 +163,14 @@ class RunShadow:
         check_level(world)
 
     def begin(self, state: JointState) -> None:
-        """Put the shadow where the joints are; quick, as torque is on."""
+        """Put the shadow at the joints' angles; quick, because torque is on."""
         if self._measured_start:
             self._shadow.restart(self._pose(state.position_rad))
 
     def step(self, deadline_s: float, sent_s: float, sent_rad: Floats, state: JointState) -> None:
-        """Follow one cycle: its goals as sent, and the state that was read before.
+        """Follow one cycle: its sent goals, and the previous state.
 
-        The shadow is read, and gets its goals, when the robot was and did: a busy computer is late.
+        The shadow is read and gets its goals at the robot's times, late on a busy computer.
         """
         read_s = measured_s(state)
         if self._first_s is None:
@@ -196,7 +196,7 @@ class RunShadow:
             self._on_event("shadow", text)
 
     def end(self, time_s: float) -> None:
-        """Report the explanation of the difference; torque is off, as this needs many seconds."""
+        """Report the explanation of the difference, after torque off: it needs many seconds."""
         run, robot, world = self._of
         if not self._rows:
             return

@@ -1,4 +1,4 @@
-"""A simulated chain that gets the goals of another one, at the same times."""
+"""A simulated chain that receives another chain's goals at the same times."""
 
 from collections.abc import Callable
 from typing import cast
@@ -15,14 +15,14 @@ from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 
 
 class Shadow:
-    """A chain in the simulator; it is ready for the first step when it has been made.
+    """A simulated chain, ready for its first step.
 
     Args:
         run: start, rate and physics step.
         robot: the chain's.
-        world: the ground that it is believed to be on.
-        ground: the world's height field, where it has one.
-        initial_pose: heading of the head link, and the joint angles to begin with.
+        world: its assumed ground.
+        ground: the world's height field.
+        initial_pose: heading of the head link, and initial joint angles.
         deviation: differences of the simulated robot and its ground.
 
     """
@@ -45,10 +45,7 @@ class Shadow:
         self._start_s = self._clock.now_s()
 
     def restart(self, pose: InitialPose) -> None:
-        """Put the chain at another pose, at rest, and count time from there.
-
-        It is quick enough between two cycles of a robot that has torque. The ground is level.
-        """
+        """Put the chain at another pose, at rest, and restart its time; quick, on level ground."""
         self._lay_down(pose)
         self._start_s = self._clock.now_s()
 
@@ -60,13 +57,13 @@ class Shadow:
         *,
         sent_after_s: float = 0.0,
     ) -> JointState:
-        """Read at a time since the start, as the other chain was read, then send its goals (J,).
+        """Read at the other chain's time, then send its goals (J,).
 
         Args:
-            since_start_s: when to read.
+            since_start_s: time of the read.
             sent_rad: (J,) goals.
-            delay_s: how long the host computes between the reply and the goals.
-            sent_after_s: least time from the measurement to the goals.
+            delay_s: computing time of the host between reply and goals.
+            sent_after_s: least time from measurement to goals.
 
         """
         self._clock.sleep_until_s(self._start_s + since_start_s)
@@ -80,6 +77,6 @@ class Shadow:
 
 
 def measured_s(state: JointState) -> float:
-    """Return when the joints of a state were measured; the end of a read that failed."""
+    """Return when the joints were measured, or the end of a failed read."""
     age_s = state.age_s[state.valid]
     return state.time_s - (float(age_s.min()) if len(age_s) else 0.0)

@@ -66,7 +66,6 @@ def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
 
 
 def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
-    """Joints, parents first; ends of chains count as joints."""
     joints: list[_Joint] = []
     above: list[int] = []
     at = 0
@@ -163,7 +162,6 @@ def _about(axis: int, angle: Floats) -> Floats:
 
 
 def _longest(joints: list[_Joint]) -> list[int]:
-    """Joints of the longest chain from the root."""
     depth = [0] * len(joints)
     for k, joint in enumerate(joints):
         depth[k] = depth[joint.parent] + 1 if joint.parent >= 0 else 0

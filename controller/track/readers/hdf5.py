@@ -52,7 +52,6 @@ def load_hdf5(
 
 
 def _linked_file(name: str, link: object) -> str | None:
-    """Name of a link to another file, whose size and owner are unknown."""
     return f"{name} is in {link.filename}" if isinstance(link, h5py.ExternalLink) else None
 
 

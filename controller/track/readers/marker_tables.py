@@ -103,7 +103,6 @@ def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
 
 
 def _check_count(file: Path, key: str, about: dict[str, str], rows: int) -> None:
-    """Reject a file that has fewer rows than its head states."""
     stated = number_or_none(about.get(key, ""))
     if stated is not None and rows < stated:
         raise InputError(f"{file}: states {key} {stated:g} and has {rows} rows; copy it again")

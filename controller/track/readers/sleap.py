@@ -117,7 +117,6 @@ def load_analysis(
 
 
 def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
-    """Array with SLEAP's order of axes; sleap-io states its own in the attribute dims."""
     values = np.asarray(stored[:], dtype=float)
     named = _stated(stored, "dims")
     if not isinstance(named, list) or {*map(str, named)} != {*axes} or values.ndim != len(named):
@@ -126,7 +125,6 @@ def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
 
 
 def _stated_rate(held: Any) -> float | None:
-    """Frame rate of the video that sleap-io states; SLEAP itself states none."""
     about = _stated(held, "video_backend_metadata")
     rate = about.get("fps") if isinstance(about, dict) else None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
@@ -211,7 +209,6 @@ def load_project(
 
 
 def _rate(held: Any) -> float | None:
-    """Frame rate of a project's video; older projects state none."""
     for one in held["videos_json"][:] if "videos_json" in held else []:
         rate = parse_json(_text(one)).get("backend", {}).get("fps")
         if rate:

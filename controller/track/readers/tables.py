@@ -69,7 +69,6 @@ def load_csv(
 def _of_animal(
     file: Path, rows: list[list[str]], column: dict[str, int], choice: Choice
 ) -> list[list[str]]:
-    """Header and rows of the chosen animal, if animals are named."""
     at = column.get("animal")
     if at is None:
         choice.only(file, "a CSV of midlines")
@@ -103,7 +102,6 @@ def _about(file: Path, track: Track, rows: list[list[str]], column: dict[str, in
 
 
 def _long(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) -> Floats:
-    """Rows t, frame, point, x, y from rows that hold all points of a frame."""
     count = 1
     while {f"x_{unit}_{count + 1}", f"y_{unit}_{count + 1}"} <= column.keys():
         count += 1

@@ -93,7 +93,6 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
 
 
 def _about(track: Track, about: Any, records: list[Any]) -> Track:
-    """The track with the facts that a WCON of this program states."""
     if isinstance(about, dict):
         stated = [about.get(name) for name in ("source", "licence")]
         source, licence = (one if isinstance(one, str) else "not stated" for one in stated)
@@ -155,7 +154,6 @@ def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, F
 
 
 def _at(value: Any, k: int) -> Any:
-    """The common value, or the k-th of a list."""
     return value[k] if isinstance(value, list) else value
 
 

@@ -287,8 +287,8 @@ def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
     found = analyse(load_track(str(cropped)))
     assert found.travel is None
     assert found.sliding is None
-    assert found.travel_not_told == "places are not recorded"
-    assert analyse(load_track(str(fixed))).travel_not_told != "places are not recorded"
+    assert found.travel_unknown_reason == "places are not recorded"
+    assert analyse(load_track(str(fixed))).travel_unknown_reason != "places are not recorded"
     again = tmp_path / "again.npz"
     save_track(again, load_track(str(cropped)))
     assert not load_track(str(again)).places_recorded

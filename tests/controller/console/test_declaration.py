@@ -13,9 +13,9 @@ import typer
 
 from snakewalk.controller.console.command import command_info
 from snakewalk.controller.console.declaration import declaration
-from snakewalk.controller.console.plugins import own_plugins
+from snakewalk.controller.console.plugins import builtin_plugins
 
-COMMANDS = [each for each in own_plugins() if each.kind == "command"]
+COMMANDS = [each for each in builtin_plugins() if each.kind == "command"]
 HEAVY = ("numpy", "scipy", "numba", "mujoco", "matplotlib", "networkx", "cv2", "mcap", "viser")
 PROGRAM = f"""
 import json, sys

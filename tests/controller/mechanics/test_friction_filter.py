@@ -23,11 +23,11 @@ def run(planted: FrictionConfig, seed: int, spans: int = 40) -> list[FoundFricti
     found, about = [], FrictionFilter(FILE, SIGMA)
     noise = np.random.default_rng(seed + 1000)
     for k in range(spans):
-        foretold = np.array(
+        predicted = np.array(
             [slide(h, np.random.default_rng([seed, k])) for h in about.hypotheses()]
         )
         measured = slide(planted, np.random.default_rng([seed, k]))
-        found.append(about.update(measured + 0.3 * SIGMA * noise.normal(size=3), foretold, SPAN_S))
+        found.append(about.update(measured + 0.3 * SIGMA * noise.normal(size=3), predicted, SPAN_S))
     return found
 
 
@@ -49,21 +49,21 @@ def test_the_files_friction_stays_where_the_ground_has_it() -> None:
 def test_what_is_not_finite_tells_nothing() -> None:
     about = FrictionFilter(FILE, SIGMA)
     before = about.found
-    foretold = np.zeros((3, 3))
+    predicted = np.zeros((3, 3))
     for bad in (np.nan, np.inf):
-        told = np.where(np.eye(3) > 0.0, bad, foretold)
+        told = np.where(np.eye(3) > 0.0, bad, predicted)
         assert about.update(np.array([0.1, 0.0, 0.0]), told, SPAN_S) == before
-        assert about.update(np.array([0.1, bad, 0.0]), foretold, SPAN_S) == before
+        assert about.update(np.array([0.1, bad, 0.0]), predicted, SPAN_S) == before
 
 
 def test_a_body_that_is_carried_off_is_not_believed() -> None:
     """One span in which it goes a metre astray leaves the estimate within its interval."""
     about = FrictionFilter(FILE, SIGMA)
-    foretold = np.array([[0.2, 0.0, 0.0], [0.19, 0.003, 0.01], [0.21, -0.003, 0.02]])
+    predicted = np.array([[0.2, 0.0, 0.0], [0.19, 0.003, 0.01], [0.21, -0.003, 0.02]])
     for _ in range(20):
-        about.update(foretold[0], foretold, SPAN_S)
+        about.update(predicted[0], predicted, SPAN_S)
     before = about.found
-    after = about.update(np.array([1.2, 1.0, 2.0]), foretold, SPAN_S)
+    after = about.update(np.array([1.2, 1.0, 2.0]), predicted, SPAN_S)
     assert before.along_95[0] < after.friction.along < before.along_95[1]
     assert before.across_95[0] < after.friction.across < before.across_95[1]
     assert not after.differs
@@ -71,21 +71,21 @@ def test_a_body_that_is_carried_off_is_not_believed() -> None:
 
 def test_a_turn_around_is_not_a_turn_of_the_friction() -> None:
     about, other = FrictionFilter(FILE, SIGMA), FrictionFilter(FILE, SIGMA)
-    foretold = np.array([[0.2, 0.0, 0.1], [0.19, 0.003, 0.2], [0.21, -0.003, 0.3]])
+    predicted = np.array([[0.2, 0.0, 0.1], [0.19, 0.003, 0.2], [0.21, -0.003, 0.3]])
     measured = np.array([0.2, 0.01, 0.15])
-    one = about.update(measured, foretold, SPAN_S)
-    two = other.update(measured + np.array([0.0, 0.0, 2.0 * np.pi]), foretold, SPAN_S)
+    one = about.update(measured, predicted, SPAN_S)
+    two = other.update(measured + np.array([0.0, 0.0, 2.0 * np.pi]), predicted, SPAN_S)
     np.testing.assert_allclose(one.along_95, two.along_95, rtol=1e-9)
 
 
 def test_without_news_it_returns_to_the_file() -> None:
     about = FrictionFilter(FILE, SIGMA)
-    foretold = np.array([[0.2, 0.0, 0.0], [0.19, 0.003, 0.01], [0.21, -0.003, 0.02]])
+    predicted = np.array([[0.2, 0.0, 0.0], [0.19, 0.003, 0.01], [0.21, -0.003, 0.02]])
     for _ in range(20):
-        about.update(foretold[1] * [1.0, 1.0, 2.0], foretold, SPAN_S)
+        about.update(predicted[1] * [1.0, 1.0, 2.0], predicted, SPAN_S)
     assert about.found.friction.along > 0.105
     for _ in range(10):
-        about.update(np.full(3, np.nan), foretold, 20.0)
+        about.update(np.full(3, np.nan), predicted, 20.0)
     assert abs(about.found.friction.along - 0.1) < 1e-3
     assert about.found.along_95 == pytest.approx((0.0457, 0.219), rel=0.01)
 
@@ -103,11 +103,11 @@ def textbook(
     """Mean (2,) and covariance (2, 2) of the logarithms, by matrices."""
     mean, covariance, prior = np.zeros(2), 0.16 * np.eye(2), 0.16 * np.eye(2)
     axes = np.array([[1.0, 1.0], [1.0, -1.0]]) / np.sqrt(2.0)
-    for measured, foretold in spans:
+    for measured, predicted in spans:
         kept = np.exp(-SPAN_S / 40.0)
         covariance = kept**2 * covariance + (1.0 - kept**2) * prior
-        slopes = (foretold[1:] - foretold[0]).T / 0.1 @ axes
-        gap, noise = measured - foretold[0], np.diag(SIGMA**2) + 0.01 * slopes @ slopes.T
+        slopes = (predicted[1:] - predicted[0]).T / 0.1 @ axes
+        gap, noise = measured - predicted[0], np.diag(SIGMA**2) + 0.01 * slopes @ slopes.T
         spread = slopes @ covariance @ slopes.T
         excess = max(1.0, gap @ np.linalg.solve(spread + noise, gap) / 3.0)
         gain = covariance @ slopes.T @ np.linalg.inv(spread + excess * noise)

@@ -40,7 +40,7 @@ def test_up_takes_longer_than_level_and_level_than_down() -> None:
 def test_a_slope_that_nothing_holds_on_carries_the_body_down_and_is_told() -> None:
     steep = ahead(0.9, limit_s=1.0)
     assert steep.slide is not None
-    assert steep.slide.held_rad < steep.slide.slope_rad
+    assert steep.slide.holding_rad < steep.slide.slope_rad
     np.testing.assert_allclose(steep.slide.slope_rad, np.arctan(0.9))
     assert steep.slide.lasted_s > 0.5
     assert steep.centre_m[-1, 0] < steep.centre_m[0, 0] - 0.3

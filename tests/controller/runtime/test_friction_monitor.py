@@ -63,12 +63,12 @@ def test_the_slide_of_shapes_is_that_of_single_steps(monkeypatch: pytest.MonkeyP
     """A body slides as it did when it was made, compiled or not, but for longer steps."""
     views = sliding(FILE, 1.0)
     span = Span(tuple(views), (), CYCLE_S)
-    foretold = OnPaper().slid(span, FILE)
-    np.testing.assert_allclose(foretold, span.slid, atol=6e-3)
+    predicted = OnPaper().slid(span, FILE)
+    np.testing.assert_allclose(predicted, span.slid, atol=6e-3)
     for name, each in vars(rigid_motion).items():
         if hasattr(each, "py_func"):
             monkeypatch.setattr(rigid_motion, name, each.py_func)
-    np.testing.assert_array_equal(OnPaper().slid(span, FILE), foretold)
+    np.testing.assert_array_equal(OnPaper().slid(span, FILE), predicted)
 
 
 class Notes:

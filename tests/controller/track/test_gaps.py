@@ -44,7 +44,7 @@ def test_four_gaps_do_not_change_the_wave(gap: int, rate_hz: float, noise: float
     wave = measure_wave(track)
     assert wave.frequency_hz == pytest.approx(1.0, abs=1e-3)
     assert wave.waves == pytest.approx(1.5, rel=0.01)
-    assert (wave.not_told, wave.towards_tail, wave.headward) == (None, True, 0.0)
+    assert (wave.unknown_reason, wave.towards_tail, wave.headward) == (None, True, 0.0)
     assert track.absent == 4 * gap
 
 
@@ -71,7 +71,7 @@ def test_single_lost_frames_do_not_change_the_wave() -> None:
 def test_parts_shorter_than_a_cycle_tell_no_wave() -> None:
     number = np.flatnonzero(np.arange(500) % 40 < 20)  # 0.67 cycles of 30 frames, 0.67 without
     wave = measure_wave(cut(number, 30.0))
-    assert "the longest part without a gap has 0.7" in str(wave.not_told)
+    assert "the longest part without a gap has 0.7" in str(wave.unknown_reason)
 
 
 @pytest.mark.parametrize("every", [2, 5])
@@ -113,8 +113,8 @@ def test_figures_just_below_a_limit_have_the_digits_that_show_it() -> None:
         "1.2", "1.96", "1.996", "1.99996",
     ]  # fmt: skip
     brief = measure_wave(track_from_points("", wave_points(59, 30.0)[:59], 30.0))
-    assert "1.9" in str(brief.not_told)
-    assert "2.0 cycles" not in str(brief.not_told)
+    assert "1.9" in str(brief.unknown_reason)
+    assert "2.0 cycles" not in str(brief.unknown_reason)
 
 
 def test_missing_frames_and_notes_are_in_the_result_of_both_commands(tmp_path: Path) -> None:

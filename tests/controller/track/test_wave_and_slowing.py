@@ -19,7 +19,7 @@ def test_a_wave_is_measured_as_it_was_made(towards_tail: bool) -> None:
     wave = measure_wave(made(wave_angles(towards_tail)))
     assert wave.waves == pytest.approx(WAVES, rel=0.01)
     assert wave.frequency_hz == pytest.approx(WAVE_HZ, rel=0.01)
-    assert wave.not_told is None
+    assert wave.unknown_reason is None
     assert wave.towards_tail is towards_tail
     assert wave.headward == (0.0 if towards_tail else 1.0)
     assert wave.share > 0.95
@@ -46,7 +46,7 @@ def test_a_pure_wave_comes_back(waves: float, hz: float, noise: float, within: f
     wave = measure_wave(track_from_points("pure", points, 16.0))
     assert wave.frequency_hz == pytest.approx(hz, rel=within)
     assert wave.waves == pytest.approx(waves, rel=within)
-    assert wave.not_told is None
+    assert wave.unknown_reason is None
 
 
 @pytest.mark.parametrize("name", ["worm-like", "lamprey-like"])
@@ -61,20 +61,20 @@ def test_neither_noise_nor_fewer_frames_move_the_frequency(name: str) -> None:
         rate = track.rate_hz / every
         fewer = measure_wave(track_from_points(name, track.points[::every], rate))
         assert fewer.frequency_hz == pytest.approx(whole, rel=0.01)
-        assert fewer.not_told is None
+        assert fewer.unknown_reason is None
 
 
 def test_what_is_no_measured_wave_is_not_told() -> None:
     noisy = shaken(formula(1.5, 1.0, 8.0, 20.0), 0.02)
-    assert "of the bending" in str(measure_wave(track_from_points("", noisy, 20.0)).not_told)
+    assert "of the bending" in str(measure_wave(track_from_points("", noisy, 20.0)).unknown_reason)
     coarse = measure_wave(track_from_points("", formula(1.5, 1.0, 12.0, 3.3), 3.3))
     assert coarse.coarse
-    assert "3.3 frames a cycle are too few" in str(coarse.not_told)
+    assert "3.3 frames a cycle are too few" in str(coarse.unknown_reason)
     brief = measure_wave(track_from_points("", formula(1.5, 1.0, 1.3, 20.0), 20.0))
-    assert "too short a recording" in str(brief.not_told)
+    assert "too short a recording" in str(brief.unknown_reason)
     turning = np.linspace(0.0, 1.0, 50)[:, None] + np.zeros(100)
     straight = measure_wave(made(turning))
-    assert (straight.share, "0% of the bending" in str(straight.not_told)) == (0.0, True)
+    assert (straight.share, "0% of the bending" in str(straight.unknown_reason)) == (0.0, True)
 
 
 def test_a_recording_listed_tail_first_runs_towards_the_head() -> None:

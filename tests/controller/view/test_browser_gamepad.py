@@ -120,23 +120,23 @@ def test_a_flood_closes_the_line() -> None:
 def test_who_lets_go_or_says_nothing_stops_the_body_until_it_is_done_without() -> None:
     now_s = [10.0]
     dead_man = DeadMan(lambda: now_s[0])
-    assert dead_man.held
+    assert dead_man.is_enabled
     assert dead_man.sort_out(["m", hold_command(True, 10.0), "frequency_hz=0.4"]) == [
         "m",
         "frequency_hz=0.4",
     ]
     now_s[0] = 10.29
-    assert dead_man.held
+    assert dead_man.is_enabled
     now_s[0] = 10.31
-    assert not dead_man.held
+    assert not dead_man.is_enabled
     dead_man.sort_out([hold_command(True, 10.0)])  # it came late
-    assert not dead_man.held
+    assert not dead_man.is_enabled
     dead_man.sort_out([hold_command(True, 10.3)])
-    assert dead_man.held
+    assert dead_man.is_enabled
     dead_man.sort_out([hold_command(False, 10.31)])
-    assert not dead_man.held
+    assert not dead_man.is_enabled
     dead_man.sort_out([WITHOUT])
-    assert dead_man.held
+    assert dead_man.is_enabled
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +174,7 @@ def test_the_page_has_the_script_and_its_socket_is_behind_the_gate(
             socket.send(message)
             assert socket.recv(10.0) == "taken"
         assert gamepad.state is not None
-        assert gamepad.state.held
+        assert gamepad.state.is_enabled
         assert gamepad.commands()[0] == "m"
         socket.send("nothing of ours")
         with pytest.raises(ConnectionClosed):
@@ -216,6 +216,6 @@ def test_a_damaged_or_future_word_of_a_gamepad_moves_nothing_and_is_handed_on(co
     dead_man = DeadMan(lambda: 5.0)
     assert dead_man.sort_out([hold_command(False, 4.9)]) == []
     assert dead_man.sort_out([command, "d"]) == [command, "d"]
-    assert not dead_man.held
+    assert not dead_man.is_enabled
     assert dead_man.sort_out([hold_command(True, 5.0)]) == []
-    assert dead_man.held
+    assert dead_man.is_enabled

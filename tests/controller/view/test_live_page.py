@@ -114,7 +114,7 @@ class View:
     def on_picture(self, image: Image, time_s: float) -> None:
         LiveView.on_picture(self, image, time_s)  # type: ignore[arg-type]
 
-    held = property(lambda self: self.dead_man.held)
+    is_enabled = property(lambda self: self.dead_man.is_enabled)
 
     def pressed(self) -> list[str]:
         return self.dead_man.sort_out(self.end.commands())

@@ -7,7 +7,7 @@ import pytest
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, user_file
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import ChainError
 from snakewalk.sim.line.sim_line import SimLine
@@ -141,7 +141,7 @@ def test_a_folder_that_cannot_be_written_is_reported(
 
 def test_a_shipped_robot_has_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert own_file("alternating16") is None
-    assert own_file("mine.toml") is None
+    assert user_file("alternating16") is None
+    assert user_file("mine.toml") is None
     (tmp_path / "mine.toml").write_text("", encoding="utf-8")
-    assert own_file("mine.toml") == Path("mine.toml")
+    assert user_file("mine.toml") == Path("mine.toml")

@@ -29,21 +29,21 @@ def test_it_foretells_a_body_that_moves() -> None:
     drive.p_gain_per_rad[:] = [float(p_gain_per_rad(gain, motor)) for gain, motor in gains]
     twin = PlantTwin(ROBOT, WORLD, None)
     seen: list[tuple[BodyPose, np.ndarray]] = []
-    foretold: dict[int, np.ndarray] = {}
+    predicted: dict[int, np.ndarray] = {}
     for k in range(160):
         seen = [*seen[-1:], (plant.head_pose(), plant.position_rad.copy())]
-        if k in foretold:
-            np.testing.assert_allclose(seen[-1][0].head_in_world_m, foretold[k], atol=0.005)
+        if k in predicted:
+            np.testing.assert_allclose(seen[-1][0].head_in_world_m, predicted[k], atol=0.005)
         if k in (40, 77, 110):
             (before, before_rad), (now, now_rad) = seen
             twin.begin(before, now, before_rad, now_rad, DT_S)
             for n in range(k, k + 30):
                 pose, _ = twin.step(wave(n * DT_S), DT_S)
-            foretold[k + 30] = pose.head_in_world_m
+            predicted[k + 30] = pose.head_in_world_m
             assert np.hypot(*(pose.head_in_world_m - now.head_in_world_m)[:2]) > 0.02
         drive.goal_rad[:] = wave(k * DT_S)
         plant.advance((k + 1) * DT_S, drive)
-    assert len(foretold) == 3
+    assert len(predicted) == 3
 
 
 def test_on_another_friction_it_slides_as_one_that_was_made_for_it() -> None:
