@@ -53,9 +53,14 @@ class Canvas:
     def under_sky(self) -> Image:
         """(H, W, 3) picture with a light sky above the highest triangle of each column.
 
-        Holes below it stay black.
+        Holes below it stay black, and so do columns at the edge that no model covers, below the
+        skyline of nine tenths of the others.
         """
         open_above = np.logical_and.accumulate(~self.drawn, axis=0)
+        height = open_above.sum(axis=0)
+        skyline = height[height < len(open_above)]
+        if len(skyline):
+            open_above[round(float(np.quantile(skyline, 0.9))) :, height == len(open_above)] = False
         share = np.linspace(0.0, 1.0, len(self.colour))[:, None, None]
         sky = np.rint((1.0 - share) * _ZENITH + share * _HORIZON).astype(np.uint8)
         return np.where(open_above[..., None], sky, self.colour)
