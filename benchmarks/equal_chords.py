@@ -23,7 +23,7 @@ def run() -> list[Row]:
     rows = []
     for segments in (3, 4, 5, 6, 7, 8):
         rows += _divided(f"smooth bodies, {segments} chords", smooth_body, BODIES, segments)
-    for turn_rad in (0.6, 1.0, 1.25, 1.5):
+    for turn_rad in (0.6, 1.0, 1.25, 1.5, 2.0, 3.0):
         name = f"zigzags of {turn_rad} rad, 100 chords"
         rows += _divided(name, partial(zigzag, turn_rad=turn_rad), ZIGZAGS, 100)
     return rows
@@ -64,5 +64,6 @@ def _divided(name: str, curve: Callable[[int], Floats], number: int, segments: i
     return [
         Row(f"{name}: divided of {number}", number - methods["rejected"], ""),
         Row(f"{name}: by branches", methods["branches"], ""),
+        Row(f"{name}: by a sample of branches", methods["sample"], ""),
         Row(f"{name}: slowest", slowest * 1e3, "ms"),
     ]

@@ -47,7 +47,7 @@ def run() -> list[Row]:
     frame_s = seen_s / (BODIES * FRAMES)
     fits = physics_s / frame_s
     herd_s = herd_frame_s(repertoire)
-    plain_s, detailed_s, ground_s = drawing_s(repertoire)
+    plain_s, detailed_s, plain_ground_s, ground_s = drawing_s(repertoire)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "repertoire.npz"
         repertoire.save(file)
@@ -63,7 +63,8 @@ def run() -> list[Row]:
         Row("bodies at 60 frames a second there", FRAME_S / herd_s, "", "100", 6e3 * herd_s),
         Row("drawing 100 bodies on hills, all in full", plain_s * 1e3, "ms"),
         Row("the same with levels of detail and culling", detailed_s * 1e3, "ms"),
-        Row("the ground alone", ground_s * 1e3, "ms"),
+        Row("the ground alone, in full", plain_ground_s * 1e3, "ms"),
+        Row("the ground alone, by distance", ground_s * 1e3, "ms"),
         Row("search: a candidate", cost.candidate_s * 1e6, "us"),
         Row("a candidate run on the physics", cost.physics_candidate_s * 1e3, "ms"),
         Row(
@@ -105,29 +106,33 @@ def herd_frame_s(repertoire: Repertoire) -> float:
     return best
 
 
-def drawing_s(repertoire: Repertoire) -> tuple[float, float, float]:
-    """CPU time of a frame of ``DRAWN`` bodies in full, with levels, and without bodies."""
+def drawing_s(repertoire: Repertoire) -> tuple[float, float, float, float]:
+    """CPU time of a frame: ``DRAWN`` bodies and ground in full and by distance, ground alone."""
     world, robot = load_world(HILLS), load_robot(repertoire.robot)
     ground = build_ground(world)
     assert ground is not None, "a world with hills"
-    view = CrowdView(robot, world, ground, DRAWN, SIZE_PX)
+    views = [
+        CrowdView(robot, world, ground, DRAWN, SIZE_PX, tiled=tiled) for tiled in (False, True)
+    ]
+    shots = [
+        list(CrowdScene(repertoire, robot, ground, DRAWN, detail=detail).shots(SHOTS, 3))
+        for detail in (False, True)
+    ]
+    shots += [[replace(shot, bodies=[]) for shot in shots[1]]] * 2
+
+    def draw(view: CrowdView, shots: list[CrowdShot]) -> None:
+        for shot in shots:
+            view.draw(shot)
+
     try:
-        full, detailed = (
-            list(CrowdScene(repertoire, robot, ground, DRAWN, detail=detail).shots(SHOTS, 3))
-            for detail in (False, True)
+        one, two, three, four = (
+            cpu_s(partial(draw, view, each), 1, TRIES) / SHOTS
+            for view, each in zip([*views, *views], shots, strict=True)
         )
-        empty = [replace(shot, bodies=[]) for shot in detailed]
-
-        def draw(shots: list[CrowdShot]) -> None:
-            for shot in shots:
-                view.draw(shot)
-
-        one, two, three = (
-            cpu_s(partial(draw, shots), 1, TRIES) / SHOTS for shots in (full, detailed, empty)
-        )
-        return one, two, three
+        return one, two, three, four
     finally:
-        view.close()
+        for view in views:
+            view.close()
 
 
 def crowd_second_s(repertoire: Repertoire, visible: bool) -> float:

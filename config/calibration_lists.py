@@ -12,31 +12,47 @@ from snakewalk.config.errors import InputError
 def read_json_lists(file: Path) -> dict[str, Any] | None:
     """Values of a JSON file of plain lists and numbers, as from ``json.dump``.
 
+    An object with ``data`` is a matrix of OpenCV, also next to plain lists.
+
     Returns:
-        Arrays and numbers by name; None for another ending, or a matrix of OpenCV, which is an
-        object with ``type_id``.
+        Arrays and numbers by name, other values as they are; None for another ending, or a file
+        that only OpenCV reads: one with comments, or with matrices in base64.
 
     Raises:
-        InputError: it is too large, or has a value that is neither numbers nor text.
+        InputError: it is too large, is no JSON object, or has a ragged list.
         OSError: it cannot be read.
 
     """
     if file.suffix.lower() != ".json":
         return None
+    text = read_text(file, MOST_STORAGE_BYTES)
     try:
-        held = parse_json(read_text(file, MOST_STORAGE_BYTES))
-    except ValueError:
-        return None  # OpenCV also reads comments, and states the line of a fault
-    if not isinstance(held, dict) or any(isinstance(value, dict) for value in held.values()):
-        return None
+        held = parse_json(text)
+    except ValueError as error:
+        if "//" in text or "/*" in text:
+            return None
+        raise InputError(f"{file}: is no JSON: {error}; correct it") from None
+    if not isinstance(held, dict):
+        raise InputError(f"{file}: is no JSON object; it needs a name for each matrix")
     lists: dict[str, Any] = {}
     for name, value in held.items():
+        if isinstance(value, dict) and isinstance(value.get("data"), str):
+            return None
         if isinstance(value, str | bool) or value is None:
+            lists[name] = value
             continue
         try:
-            lists[name] = np.asarray(value, dtype=float)
+            lists[name] = _matrix(value) if isinstance(value, dict) else np.asarray(value, float)
         except (TypeError, ValueError):
             raise InputError(
                 f"{file}: {name} is not a list of numbers or of rows of equal length; correct it"
             ) from None
     return lists
+
+
+def _matrix(value: dict[str, Any]) -> Any:
+    """Array of a matrix of OpenCV; another object as it is."""
+    if "data" not in value:
+        return value
+    sizes = value.get("sizes", [value.get("rows", -1), value.get("cols", 1)])
+    return np.asarray(value["data"], dtype=float).reshape([int(size) for size in sizes])

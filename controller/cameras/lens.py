@@ -78,7 +78,9 @@ class Lens:
             faults.append(f"{file}: image_width and image_height are needed, whole and above 0")
         if faults:
             raise InputError(faults)
-        matrix, distortion = (np.asarray(value, dtype=float) for value in held)
+        matrix, distortion = (_numbers(value) for value in held)
+        if matrix.size == 9:
+            matrix = matrix.reshape(3, 3)
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
             faults.append(f"{file}: camera_matrix is not 3 x 3 numbers")
         elif min(matrix[0, 0], matrix[1, 1]) <= 0.0 or abs(np.linalg.det(matrix)) < 1e-9:
@@ -101,6 +103,14 @@ class Lens:
         store.release()
 
 
+def _numbers(value: Any) -> Floats:
+    """Array of a stored value; empty if it is not numbers."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return np.zeros(0)
+
+
 def _stored(file: Path) -> tuple[list[float], list[Any]]:
     """Width and height, and the two matrices; 0 and None for missing names.
 
@@ -112,10 +122,11 @@ def _stored(file: Path) -> tuple[list[float], list[Any]]:
     sides = "image_width", "image_height"
     lists = read_json_lists(file)
     if lists is not None:
-        size = [np.ravel(lists.get(side, 0.0)) for side in sides]
-        return [float(side[0]) if side.size == 1 else 0.0 for side in size], [
-            lists.get(name) for name in _MATRICES
-        ]
+        size = [lists.get(side) for side in sides]
+        return [
+            float(side.item()) if isinstance(side, np.ndarray) and side.size == 1 else 0.0
+            for side in size
+        ], [lists.get(name) for name in _MATRICES]
     try:
         store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
         stored = [store.getNode(side).real() for side in sides]
@@ -123,6 +134,7 @@ def _stored(file: Path) -> tuple[list[float], list[Any]]:
         store.release()
     except (cv2.error, SystemError) as error:
         raise InputError(
-            f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
+            f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
+            "file"
         ) from None
     return stored, held

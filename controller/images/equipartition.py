@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.images.chord_beam import sampled_solutions
 from snakewalk.controller.images.chord_branches import BranchBracket, BranchSearch
 from snakewalk.controller.images.chord_path import follow_chords
 from snakewalk.drivers.compiling import compiled, readonly_array
@@ -45,7 +46,8 @@ class Equipartition:
     """Distance of neighbouring points, in the curve's unit."""
     method: str
     """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``,
-    ``two places`` (3 chords), ``branches`` (``chord_branches``), ``path`` (``chord_path``)."""
+    ``two places`` (3 chords), ``branches`` (``chord_branches``), ``sample`` (``chord_beam``),
+    ``path`` (``chord_path``)."""
     solutions: int
     """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""
@@ -198,6 +200,8 @@ def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
     if not found:
         found = _by_branches(given)
     if not found:
+        found = _by_sample(given)
+    if not found:
         places = follow_chords(given.curve, given.arc, given.segments, _path_steps(given))
         if places is not None:
             found.append(_at_places(given, places))
@@ -219,6 +223,20 @@ def _by_branches(given: _Curve) -> list[Equipartition]:
     least = max(given.least * (1.0 - 1e-12), 1e-6 * given.most)
     for chord, crossing in search.solutions(least, given.most, root):
         return [given.solution(chord, "branches", crossing)]
+    return []
+
+
+def _by_sample(given: _Curve) -> list[Equipartition]:
+    """Return a solution among sampled branches, where there are too many to visit."""
+
+    def root(bracket: BranchBracket) -> float | None:
+        return _bisect(given, bracket.low, bracket.high, bracket.crossing)
+
+    chords = max(given.least * (1.0 - 1e-12), 1e-6 * given.most), given.most
+    for chord, crossing in sampled_solutions(
+        *(given.line, given.line_arc, given.length, given.segments, chords, given.residual, root)
+    ):
+        return [given.solution(chord, "sample", crossing)]
     return []
 
 

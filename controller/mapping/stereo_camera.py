@@ -91,7 +91,7 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
         raise InputError(f"{file}: is too large for a calibration")
     ending = file.suffix.lower()
     if ending == ".txt":
-        return _checked(file, _middlebury(file))
+        return _checked(file, _middlebury(file), 1.0)
     if ending in (".yml", ".yaml", ".xml", ".json"):
         held = _storage(file)
     elif ending == ".npz":
@@ -105,12 +105,10 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
     for key, names in _NAMES.items():
         name = next((name for name in names if held.get(name) is not None), None)
         if name is None and key not in _OPTIONAL:
-            raise InputError(
-                f"{file}: holds no {' or '.join(names)}; it has {', '.join(held) or 'none'}"
-            )
+            there = ", ".join(one for one, value in held.items() if value is not None)
+            raise InputError(f"{file}: holds no {' or '.join(names)}; it has {there or 'none'}")
         found[key] = np.zeros(5) if name is None else held[name]
-    found["translation"] = np.asarray(found["translation"], dtype=float) * unit_m
-    return _checked(file, found)
+    return _checked(file, found, unit_m)
 
 
 def _storage(file: Path) -> dict[str, Any]:
@@ -125,7 +123,8 @@ def _storage(file: Path) -> dict[str, Any]:
         store.release()
     except (cv2.error, SystemError) as error:
         raise InputError(
-            f"{file}: OpenCV's FileStorage cannot read it: {error}; choose another file"
+            f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
+            "file"
         ) from None
     return held
 
@@ -155,13 +154,14 @@ def _middlebury(file: Path) -> dict[str, Any]:
     }
 
 
-def _checked(file: Path, found: Mapping[str, Any]) -> StereoCalibration:
+def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalibration:
     values: dict[str, Floats] = {}
     for key, value in found.items():
         try:
-            values[key] = np.asarray(value, dtype=float)
+            values[key] = np.array(value, dtype=float)
         except (TypeError, ValueError):
             raise InputError(f"{file}: {_NAMES[key][0]} holds no numbers") from None
+    values["translation"] *= unit_m
     for key, size in (("k_left", 9), ("k_right", 9), ("rotation", 9), ("translation", 3)):
         if values[key].size != size:
             raise InputError(f"{file}: {_NAMES[key][0]} has {values[key].size} numbers, not {size}")

@@ -12,6 +12,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.crowd_mesh import CrowdMeshes
+from snakewalk.sim.rendering.ground_tiles import GroundTiles, TileView
 from snakewalk.sim.rendering.looks import dressed_model
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
@@ -61,9 +62,19 @@ class CrowdView:
         ground: HeightField,
         bodies: int,
         size_px: tuple[int, int],
+        *,
+        tiled: bool = True,
     ) -> None:
-        self._meshes, self._ground = CrowdMeshes(bodies), ground
-        self._model = model = dressed_model(robot, world, ground, additions=(self._meshes.add_to,))
+        """Prepare a model.
+
+        ``tiled``: the ground has detail by distance; else it is drawn in full.
+        """
+        self._meshes, self._ground, self._size_px = CrowdMeshes(bodies), ground, size_px
+        self._tiles = GroundTiles(ground) if tiled else None
+        more = () if self._tiles is None else (self._tiles.add_to,)
+        self._model = model = dressed_model(
+            robot, world, ground, additions=(self._meshes.add_to, *more)
+        )
         model.vis.global_.fovy = FOVY_DEG
         self._data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, self._data)
@@ -80,6 +91,9 @@ class CrowdView:
         camera, scene = self._camera, self._scene
         camera.lookat[:], camera.distance = shot.lookat_m, shot.distance_m
         camera.azimuth, camera.elevation = shot.azimuth_deg, shot.elevation_deg
+        if self._tiles is not None:
+            view = TileView.orbit(camera, FOVY_DEG, self._size_px)
+            self._tiles.choose(self._model, view)
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_STATIC,
             scene,

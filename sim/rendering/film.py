@@ -7,24 +7,18 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.sim.rendering.follow_camera import BodyTrack, follow
 from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m, surface_points_m
 from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
-
-SMOOTHING_S = 1.2
-"""The camera's smoothing, in seconds of film."""
-TURN_SMOOTHING_S = 4.0
-DISTANCE_LENGTHS = 1.2
-"""Distance of the camera from a body that keeps its place, in lengths of the body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +86,7 @@ def render_film(
         *(times, poses, np.arange(times[0], times[-1], style.speed_up / style.fps), stage.bodies)
     )
     shot_s = times[0] + np.arange(len(shots)) * style.speed_up / style.fps
-    camera, centre = _camera(
-        *(stage.model, stage.data, shots, style.fps, stage.length_m, stage.spine)
-    )
+    camera, centre = stage.camera(shots, style)
     centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
     trail = make_trail(marks.paths, times, poses, centre_m, ground)
     scene = stage.scene(trail.most)
@@ -139,8 +131,9 @@ class _Stage:
         look = style.look
         self._robot, self._reached_s = robot, marks.reached_s
         self.bodies = len(look.rest_m) if look is not None and look.free else 1
+        bones = self.bodies if self.bodies > 1 else robot.link_count + len(robot.limb_joints)
         spine = self.bodies if self.bodies > 1 else robot.link_count
-        self.spine = slice(1, 1 + (spine if look is None else look.spine or spine))
+        spine = spine if look is None else look.spine or spine
         legs_m = max((sum(pair.segments_m) for pair in robot.limbs), default=0.0)
         self.length_m = robot.length_m + legs_m
         """Length to show: the spine, and a leg to its side."""
@@ -151,11 +144,31 @@ class _Stage:
             hollow=marks.hollow,
             additions=(add_sheet,),
         )
+        parts = np.array([self.model.body(f"link{k}").id for k in range(bones)])
+        self._parts, self._spine, self._ground = parts, parts[:spine], ground
         self.shade = SoftShade(self.model, ground)
         self._faces = None if look is None else look.faces
         self.data = mujoco.MjData(self.model)
         self._view, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._reached = 0
+
+    def camera(self, shots: Floats, style: Style) -> tuple[Floats, Floats]:
+        """Camera of each frame (F, 6), and middle of the spine (F, 3)."""
+        data = self.data
+        parts = np.empty((len(shots), len(self._parts), 3))
+        for k, shot in enumerate(shots):
+            data.qpos[:] = shot
+            mujoco.mj_kinematics(self.model, data)
+            parts[k] = data.xipos[self._parts]
+        track = BodyTrack(
+            parts_m=parts,
+            spine=len(self._spine),
+            length_m=self.length_m,
+            fps=style.fps,
+            fovy_deg=float(self.model.vis.global_.fovy),
+            aspect=style.size[0] / style.size[1],
+        )
+        return follow(track, self._ground), parts[:, : len(self._spine)].mean(axis=1)
 
     def scene(self, trail: int) -> mujoco.MjvScene:
         """Return a scene for the model and ``trail`` more geoms."""
@@ -176,7 +189,7 @@ class _Stage:
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
         view.lookat[:], view.azimuth = camera[:3], camera[3]
-        view.distance, view.elevation = camera[4], -33.0
+        view.elevation, view.distance = -camera[4], camera[5]
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, view, every, scene)
         self.shade.lay(scene, self._surface_m(scene))
@@ -184,7 +197,7 @@ class _Stage:
     def _surface_m(self, scene: mujoco.MjvScene) -> Floats:
         """Points (P, 3) of the body's surface in its last pose."""
         if self._faces is None:
-            spine, data = self.spine, self.data
+            spine, data = self._spine, self.data
             links = np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])
             return link_surface_m(*links, self._robot)
         corners = np.array(scene.skinvert, float).reshape(-1, 3)[: int(self._faces.max()) + 1]
@@ -207,45 +220,13 @@ def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Flo
     return out
 
 
-def _camera(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    shots: Floats,
-    fps: int,
-    size_m: float,
-    spine: slice,
-) -> tuple[Floats, Floats]:
-    """Camera of each frame (F, 5), smoothed in both directions, and the body's centre (F, 3).
-
-    A camera is its look-at point, azimuth in degrees and distance. ``size_m`` is the length to
-    show: the spine, and a leg beyond it.
-    """
-    middle, centre, body = (
-        np.empty((len(shots), 3)),
-        np.empty((len(shots), 3)),
-        np.empty((len(shots), 2)),
-    )
-    for k, shot in enumerate(shots):
-        data.qpos[:] = shot
-        mujoco.mj_kinematics(model, data)
-        links = data.xipos[spine]
-        middle[k] = (links.min(axis=0) + links.max(axis=0)) / 2
-        centre[k] = links.mean(axis=0)
-        body[k] = links[0, :2] - links[-1, :2]
-    smooth = gaussian_filter1d(middle, SMOOTHING_S * fps, axis=0, mode="nearest")
-    heading = gaussian_filter1d(body, TURN_SMOOTHING_S * fps, axis=0, mode="nearest")
-    azimuth = np.degrees(np.unwrap(np.arctan2(heading[:, 1], heading[:, 0]))) + 28.0
-    stray = np.abs(middle - smooth).max()
-    distance = np.full(len(shots), DISTANCE_LENGTHS * size_m + stray)
-    return np.column_stack([smooth, azimuth, distance]), centre
-
-
 def _corner(camera: Floats) -> Floats:
     """Place (2,) of the scale on the ground: to the left of the look-at point, and nearer."""
     turn = np.radians(camera[3])
     ahead = np.array([np.cos(turn), np.sin(turn)])
     left = np.array([-ahead[1], ahead[0]])
-    at_m: Floats = camera[:2] + camera[4] * (0.38 * left - 0.28 * ahead)
+    nearer = float(np.interp(camera[4], [19.0, 33.0], [0.1, 0.28]))  # a low camera sees less
+    at_m: Floats = camera[:2] + camera[5] * (0.38 * left - nearer * ahead)
     return at_m
 
 

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -141,7 +142,11 @@ def dressed_model(
 
 
 def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:
-    spec.delete(spec.body("link0"))
+    robot = spec.body("link0")
+    if hasattr(spec, "delete"):
+        spec.delete(robot)
+    else:  # the first versions of MuJoCo 3.3
+        spec.detach_body(robot)
     for k in range(bones):
         bone = spec.worldbody.add_body(name=f"link{k}", mass=1.0, inertia=[1.0, 1.0, 1.0])
         bone.explicitinertial = True
@@ -187,13 +192,19 @@ def _light(spec: mujoco.MjSpec, robot: RobotConfig, fine: bool) -> None:
     spec.stat.extent = robot.length_m
     spec.worldbody.add_light(
         name="sun",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        **_directional(),
         pos=list(-3.0 * SUN_DIRECTION),
         dir=list(SUN_DIRECTION),
         diffuse=[0.75, 0.73, 0.68],
         specular=[0.25, 0.25, 0.25],
         castshadow=False,
     )
+
+
+def _directional() -> dict[str, Any]:
+    """Return the type of a light in this version of MuJoCo."""
+    types = getattr(mujoco, "mjtLightType", None)  # from 3.3.2
+    return {"directional": True} if types is None else {"type": types.mjLIGHT_DIRECTIONAL}
 
 
 def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:

@@ -23,6 +23,10 @@ SHADE = "shade"
 """Name of the skin and the texture of a soft shadow."""
 _GRID = 48
 """Cells of the sheet on the ground that carries a soft shadow, along each side."""
+_DARKEST = 0.5
+"""Share of the light that a soft shadow removes: about that of the sun (ours)."""
+_LAYER = 1.0 - (1.0 - _DARKEST) ** 0.5
+"""The same for one layer: MuJoCo draws a transparent skin twice, its back and its front."""
 _TEXELS = 128
 _SOFT = 1.6
 """Standard deviation of the edge, texels."""
@@ -99,7 +103,7 @@ def shade_picture(place: Floats) -> Image:
     soft = gaussian_filter(covered.astype(float), _SOFT)
     picture = np.empty((_TEXELS, _TEXELS, 4), dtype=np.uint8)
     picture[..., :3] = np.rint(255.0 * DARK[:3])
-    picture[..., 3] = np.rint(255.0 * 1.7 * DARK[3] * soft)
+    picture[..., 3] = np.rint(255.0 * _LAYER * soft)
     return picture
 
 

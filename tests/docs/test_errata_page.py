@@ -19,10 +19,15 @@ def test_every_module_and_test_named_exists() -> None:
     assert tests - defined == set()
 
 
-def test_every_row_names_a_test() -> None:
-    rows = [line for line in PAGE.splitlines() if line.startswith("|") and "`" in line]
-    assert len(rows) > 40
-    assert [row for row in rows if "`test_" not in row.rsplit("|", 2)[1]] == []
+def test_every_row_names_code_and_a_test() -> None:
+    rows = []
+    for block in re.findall(r"(?:^\|.*\n)+", PAGE, re.MULTILINE):
+        header, _, *body = block.splitlines()
+        if header.endswith("| test |"):
+            rows += body
+    assert len(rows) > 55
+    assert [row for row in rows if not re.match(r" `test_\w+`", row.rsplit("|", 2)[1])] == []
+    assert [row for row in rows if ".py`" not in row.rsplit("|", 3)[1]] == []
 
 
 def test_no_row_of_a_table_is_torn() -> None:

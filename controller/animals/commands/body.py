@@ -1,17 +1,23 @@
 """``snakewalk body``: a solid body from skeletons and widths, and a skin that moves."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated
 
-import numpy as np
 import typer
-from PIL import Image as Pillow
-from PIL import UnidentifiedImageError
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.commands.photograph_options import (
+    Shot,
+    SkinPicture,
+    check_frame,
+    posed_frame,
+    shots_of,
+    skin_picture,
+)
 from snakewalk.controller.animals.mesh import body_model as model
 from snakewalk.controller.animals.mesh.body_model import BodyModel, pose, straight
 from snakewalk.controller.animals.mesh.body_motion import animated
@@ -22,10 +28,9 @@ from snakewalk.controller.animals.mesh.body_skin import (
     is_skin,
     model_skin,
 )
-from snakewalk.controller.animals.mesh.mesh import body_mesh
+from snakewalk.controller.animals.mesh.mesh import body_mesh, picture_around
 from snakewalk.controller.animals.mesh.rig import spine_rig
 from snakewalk.controller.animals.mesh.skin_file import write_skin
-from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import RECORDINGS, command
 from snakewalk.controller.console.options import Force, Json, show
@@ -71,9 +76,19 @@ Up = Annotated[
     str | None,
     typer.Option(help="axis of a given mesh that points up; default: +y, for an .obj +z"),
 ]
+Picture = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="photograph for the texture, seen from above, or VIEW=FILE with VIEW top, left, right "
+        "or below; repeatable"
+    ),
+]
 Frame = Annotated[
-    int | None,
-    typer.Option(help="frame of the track that --image shows or --posed uses; default: 0"),
+    list[int] | None,
+    typer.Option(
+        help="frame of the track that --image shows or --posed uses, or one for each --image; "
+        "default: 0"
+    ),
 ]
 
 
@@ -104,14 +119,13 @@ def body(
     surface: Surface = False,
     forward: Forward = None,
     up: Up = None,
-    image: Annotated[
-        Path | None,
-        typer.Option(help="picture of the body from above, used as the texture of the skin"),
-    ] = None,
+    image: Picture = None,
     frame: Frame = None,
     side: Annotated[
         Path | None,
-        typer.Option(help="an .npz of the same body seen from the side, used for its heights"),
+        typer.Option(
+            help="an .npz of the same body seen from the side, for its heights and side pictures"
+        ),
     ] = None,
     aspect: Annotated[
         float, typer.Option(help="ratio of height to width without a side view")
@@ -140,23 +154,27 @@ def body(
         of_skins={"--fps": fps, "--curves": curves, "--order": order},
         of_meshes={"--surface": surface, "--forward": forward, "--up": up},
     )
-    if frame is not None and image is None and not posed:
+    if frame and not image and not posed:
         raise InputError("--frame: is for --image and --posed")
     how = Cut(37 if curves is None else curves, 2 if order is None else order, forward, up, surface)
     if given:
         made.refuse(textured=True)
         made.skin(body_skin(track, how), animate, fps)
         return
-    made.refuse(textured=image is not None)
-    frame = frame or 0
-    measured = _measure(track, image, frame, side, aspect)
+    made.refuse(textured=bool(image))
+    shots = shots_of(image or [], frame or [])
+    measured = _measure(track, shots, side, aspect)
     if animate is not None:
         if posed:
             raise InputError("--posed: --animate moves the body; it cannot keep one pose")
-        name = Path(track).stem
-        made.skin(model_skin(measured.model, measured.texture, name, how), animate, fps)
+        worn = measured.texture
+        skin = model_skin(
+            measured.model, worn.picture, Path(track).stem, how, around=worn.is_around
+        )
+        made.skin(replace(skin, facts=skin.facts | worn.facts), animate, fps)
         return
-    made.solid(measured, _skeleton(track, measured.points, frame) if posed else None, image)
+    pose_frame = posed_frame(shots, frame or [])
+    made.solid(measured, _skeleton(track, measured.points, pose_frame) if posed else None)
 
 
 @dataclass(frozen=True)
@@ -165,8 +183,7 @@ class _Measured:
 
     model: BodyModel
     points: Floats
-    texture: Image | None
-    shown: tuple[Image, Floats, Floats] | None
+    texture: SkinPicture
 
 
 @dataclass(frozen=True)
@@ -185,25 +202,29 @@ class _Made:
     def refuse(self, *, textured: bool) -> None:
         refuse_to_overwrite([*mesh_files(self.output, textured), *self.drawn], self.force)
 
-    def solid(self, body: _Measured, skeleton: Floats | None, image: Path | None) -> None:
+    def solid(self, body: _Measured, skeleton: Floats | None) -> None:
         """Write the ellipses along a skeleton; None is straight."""
-        one = body.model
+        one, worn = body.model, body.texture
         mesh = body_mesh(one, straight() if skeleton is None else skeleton)
-        files = self._write(mesh, body.texture)
+        corners = len(mesh.vertices)
+        if worn.is_around:
+            mesh, _ = picture_around(mesh)
+        files = self._write(mesh, worn.picture)
         if self.picture is not None:
-            _plots().draw_body(self.picture, one, mesh, body.texture, body.shown)
+            _plots().draw_body(self.picture, one, mesh, worn.picture, worn.shown)
         show(
             {
                 "files": files,
-                "vertices": len(mesh.vertices),
+                "vertices": corners,
                 "triangles": len(mesh.faces),
                 "length_m": one.length_m,
                 "widths": "measured" if one.measured else "a plain spindle: the track holds none",
                 "thickest_over_length": round(2.0 * float(one.half_width.max()), 4),
                 "height_over_width": round(float(one.half_height.max() / one.half_width.max()), 3),
-                "texture": None if image is None else str(image),
+                "texture": None,
                 "body_profile": list(one.profile),
-            },
+            }
+            | worn.facts,
             self.as_json,
         )
 
@@ -284,60 +305,21 @@ def _check_options(
         raise InputError(list(dict.fromkeys(faults)))
 
 
-def _measure(
-    track: str, image: Path | None, frame: int, side: Path | None, aspect: float
-) -> _Measured:
-    """Widths of a recording, and its texture from a picture."""
+def _measure(track: str, shots: Sequence[Shot], side: Path | None, aspect: float) -> _Measured:
+    """Widths of a recording, and its texture from photographs."""
     if track in EMBEDDED:
-        if image is not None or side is not None:
+        if shots or side is not None:
             raise InputError(f"{track}: is made from figures, without widths; give an .npz")
         recording = embedded(track)
-        return _Measured(model.spindle(recording.length_m), recording.points, None, None)
+        return _Measured(model.spindle(recording.length_m), recording.points, SkinPicture())
     top = model.read_silhouettes(Path(track))
     seen = None if side is None else model.read_silhouettes(side)
-    texture, shown = None, None
-    if image is not None:
-        _check_frame(str(image), top.points, frame)
-        shown = _read_picture(image), top.points[frame], top.radius[frame]
-        texture = _texture(image, shown, top.pixels)
+    body = model.body_model(top, seen, aspect)
     points = top.points * [1.0, -1.0] if top.pixels else top.points
-    return _Measured(model.body_model(top, seen, aspect), points, texture, shown)
+    return _Measured(body, points, skin_picture(shots, top, seen, body))
 
 
 def _skeleton(track: str, points: Floats, frame: int) -> Floats:
-    _check_frame(track, points, frame)
+    """Skeleton of one frame, in body lengths."""
+    check_frame(track, points, frame)
     return pose(points[frame])
-
-
-def _texture(image: Path, shown: tuple[Image, Floats, Floats], pixels: bool) -> Image:
-    """Strip of the skin from a picture, the skeleton in it and its radii."""
-    picture, points, radius = shown
-    if not pixels:
-        raise InputError(f"{image}: the track holds no places in pictures (points_px, skeletons)")
-    rows, columns = picture.shape[:2]
-    x, y = points.T
-    if x.min() < -1.0 or y.min() < -1.0 or x.max() > columns or y.max() > rows:
-        raise InputError(
-            f"{image}: the skeleton does not lie in this picture of {columns} x {rows} pixels; say "
-            "which --frame of the track it shows"
-        )
-    return unroll(picture, points, radius)
-
-
-def _read_picture(image: Path) -> Image:
-    try:
-        with Pillow.open(image) as picture:
-            return np.asarray(picture.convert("RGB"))
-    except FileNotFoundError:
-        raise InputError(f"{image}: no such file") from None
-    except Pillow.DecompressionBombError as error:
-        raise InputError(f"{image}: {error}") from None
-    except (UnidentifiedImageError, OSError, SyntaxError):
-        raise InputError(f"{image}: is not a readable picture; choose another file") from None
-
-
-def _check_frame(name: str, points: Floats, frame: int) -> None:
-    if not 0 <= frame < len(points):
-        raise InputError(f"{name}: frame {frame} is not in 0..{len(points) - 1}")
-    if not np.isfinite(points[frame]).all():
-        raise InputError(f"{name}: frame {frame} holds no whole skeleton")

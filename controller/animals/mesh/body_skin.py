@@ -25,6 +25,7 @@ from snakewalk.controller.animals.mesh.cross_sections import (
     ellipses,
     skin_model,
 )
+from snakewalk.controller.animals.mesh.mesh import picture_around
 from snakewalk.controller.animals.mesh.patches import Tube, fins
 from snakewalk.controller.animals.mesh.skin import Skin, carried, pde_skin
 from snakewalk.controller.animals.mesh.skin_texture import ACROSS, ALONG, painted
@@ -92,12 +93,21 @@ def body_skin(name: str, how: Cut | None = None) -> BodySkin:
     return model_skin(body_model(read_silhouettes(Path(name))), None, Path(name).stem, how)
 
 
-def model_skin(model: BodyModel, texture: Image | None, name: str, how: Cut) -> BodySkin:
-    """Cover the ellipses of a body model; without a picture it is painted."""
+def model_skin(
+    model: BodyModel, texture: Image | None, name: str, how: Cut, *, around: bool = False
+) -> BodySkin:
+    """Cover the ellipses of a body model; without a picture it is painted.
+
+    ``around``: the texture shows the whole skin, not its upper half.
+    """
     sections = ellipses(model, curves=how.curves)
     plain = load(locate("skins", _PLAIN), SkinConfig)
     worn = _paint(plain, model) if texture is None else texture
-    return BodySkin(name, _covered(sections, how.order)[1], worn, False, {"curves": how.curves})
+    skin = _covered(sections, how.order)[1]
+    if around:
+        mesh, source = picture_around(skin.mesh)
+        skin = replace(skin, mesh=mesh, along=skin.along[source])
+    return BodySkin(name, skin, worn, False, {"curves": how.curves})
 
 
 def shipped_skin(config: SkinConfig, how: Cut) -> BodySkin:

@@ -56,6 +56,34 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     )
 
 
+def picture_around(mesh: Mesh, around: int = AROUND) -> tuple[Mesh, Ints]:
+    """Fit a tube's places in the texture to a picture around the whole body.
+
+    The picture begins and ends at the belly, where the corners are split.
+
+    Args:
+        mesh: rings of ``around`` corners each, from the left side over the back, then two tips.
+        around: corners of a ring; a multiple of 4.
+
+    Returns:
+        The mesh, and (V,) the corner from which each of its corners was made.
+
+    """
+    rings = len(mesh.vertices) // around
+    share = np.append(
+        np.tile((np.arange(around) / around + 0.25) % 1.0, rings), [0.5, 0.5]
+    )  # 0 the belly, then the left side; the tips are on the back
+    corner = share[mesh.faces]
+    ends = (corner < 0.5) & (np.ptp(corner, axis=1) > 0.5)[:, None]
+    split = np.unique(mesh.faces[ends])
+    faces = mesh.faces.copy()
+    faces[ends] = len(share) + np.searchsorted(split, mesh.faces[ends])
+    source = np.concatenate([np.arange(len(share)), split])
+    across = np.concatenate([share, share[split] + 1.0])
+    uv = np.stack([mesh.uv[source, 0], across], axis=-1)
+    return Mesh(mesh.vertices[source], mesh.normals[source], uv, faces), source
+
+
 def tips(model: BodyModel) -> tuple[float, float]:
     """Half widths at the head's and the tail's tip."""
     return max(float(model.half_width[0]), 1e-4), max(float(model.half_width[-1]), 1e-4)

@@ -28,6 +28,31 @@ def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
         ValueError: fewer than 4 distinct points.
 
     """
+    side = np.linspace(1.0, -1.0, ACROSS)
+    colour = colours_across(image, points_px, radius_px, side[:, None], squeezed=True)
+    return np.asarray(np.clip(np.rint(colour), 0, 255), dtype=np.uint8)
+
+
+def colours_across(
+    image: Image, points_px: Floats, radius_px: Floats, across: Floats, *, squeezed: bool = False
+) -> Floats:
+    """Sample an image (H, W) or (H, W, 3) at places across the body.
+
+    Args:
+        image: grey or colour.
+        points_px: (P, 2) skeleton in it, as for ``unroll``.
+        radius_px: (P,) distances to the boundary.
+        across: (R, 512) or (R, 1) places over the radius, 1 on the left of the heading.
+        squeezed: fit the whole width between the mixed pixels at the boundary; else the places keep
+            their distance, and those beyond have the last pure pixel.
+
+    Returns:
+        (R, 512, 3)
+
+    Raises:
+        ValueError: fewer than 4 distinct points.
+
+    """
     colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
     chord = np.hypot(*np.diff(points_px, axis=0).T)
     arc = np.concatenate([[0.0], np.cumsum(chord)])
@@ -36,18 +61,20 @@ def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
     centre = np.stack([np.interp(at, along, even[:, k]) for k in range(2)], axis=-1)
     radius = np.interp(at, arc / arc[-1], radius_px)
-    radius = np.maximum(radius - _MIXED_PX, 0.5 * radius)
+    pure = np.maximum(radius - _MIXED_PX, 0.5 * radius)
+    off = across * pure if squeezed else np.clip(across * radius, -pure, pure)
     forward = -np.gradient(centre, axis=0)
     forward /= np.hypot(*forward.T)[:, None]
     left = np.stack([forward[:, 1], -forward[:, 0]], axis=-1)  # rows count down
-    side = np.linspace(1.0, -1.0, ACROSS)
-    place = centre[None] + (side[:, None] * radius)[..., None] * left[None]
+    place = centre[None] + off[..., None] * left[None]
     at_px = [place[..., 1], place[..., 0]]
-    channels = [
-        map_coordinates(colour[..., k].astype(float), at_px, order=1, mode="nearest")
-        for k in range(3)
-    ]
-    return np.asarray(np.clip(np.rint(np.stack(channels, axis=-1)), 0, 255), dtype=np.uint8)
+    return np.stack(
+        [
+            map_coordinates(colour[..., k].astype(float), at_px, order=1, mode="nearest")
+            for k in range(3)
+        ],
+        axis=-1,
+    )
 
 
 def painted(

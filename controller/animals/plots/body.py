@@ -1,5 +1,6 @@
 """A body model as a picture: where it was seen, its skin unrolled, and the solid."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ def draw_body(
     model: BodyModel,
     mesh: Mesh,
     texture: Image | None,
-    silhouette: tuple[Image, Floats, Floats] | None,
+    silhouettes: Sequence[tuple[Image, Floats, Floats]] = (),
 ) -> None:
     """Write one picture in the format of its ending.
 
@@ -37,7 +38,7 @@ def draw_body(
         model: cross sections.
         mesh: the solid.
         texture: unrolled skin, if there is one.
-        silhouette: image, skeleton (P, 2) and radii (P,) in its pixels, if there is one.
+        silhouettes: image, skeleton (P, 2) and radii (P,) in its pixels, of each photograph.
 
     Raises:
         InputError: the ending is not a picture's.
@@ -48,15 +49,20 @@ def draw_body(
         figure = Figure(figsize=(WIDTH_IN, 4.2), layout="constrained", dpi=110)
         halves: Any = figure.subfigures(1, 2, width_ratios=[1.0, 1.6])
         left, right = halves
-        if silhouette is None or texture is None:
+        if not silhouettes or texture is None:
             _sections(left.subplots(1, 1), model)
         else:
-            first, second, third = left.subplots(3, 1, height_ratios=[2.2, 0.7, 1.4])
-            _place(first, *silhouette)
-            second.imshow(texture, aspect="auto")
-            second.set_axis_off()
-            second.set_title("skin unrolled, head at the left")
-            _sections(third, model)
+            share = 2.2 / len(silhouettes)
+            rows = left.subplots(
+                len(silhouettes) + 2, 1, height_ratios=[share] * len(silhouettes) + [0.7, 1.4]
+            )
+            for axes, one in zip(rows, silhouettes, strict=False):
+                _place(axes, *one)
+            rows[0].set_title("skeleton, widths, head")
+            rows[-2].imshow(texture, aspect="auto")
+            rows[-2].set_axis_off()
+            rows[-2].set_title("skin unrolled, head at the left")
+            _sections(rows[-1], model)
         _solid(right, mesh, texture)
         save_picture(figure, file)
 
@@ -70,7 +76,6 @@ def _place(axes: Axes, image: Image, points: Floats, radius: Floats) -> None:
         axes.plot(*(points + side * radius[:, None] * across).T, color=RED, linewidth=0.9)
     axes.plot(*points[0], "o", color=BLUE, markersize=4)
     axes.set_axis_off()
-    axes.set_title("skeleton, widths, head")
 
 
 def _sections(axes: Axes, model: BodyModel) -> None:

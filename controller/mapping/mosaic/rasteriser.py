@@ -16,6 +16,9 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 NEAREST_M: Final = 0.01
 """Triangles with a nearer corner are not drawn (ours)."""
+_ZENITH: Final = np.array([150.0, 183.0, 218.0])
+_HORIZON: Final = np.array([236.0, 242.0, 248.0])
+"""Colours of the sky at the upper and the lower edge of a picture."""
 _MATRIX: Final = readonly_array("float64", 2, "C")
 _FLOATS: Final = readonly_array("float64", 3, "C")
 _BOOLS: Final = readonly_array("bool_", 2, "A")
@@ -46,6 +49,21 @@ class Canvas:
         empty = ~self.drawn
         self.colour[empty] = other.colour[empty]
         self.depth_m[empty] = other.depth_m[empty]
+
+    def under_sky(self) -> Image:
+        """(H, W, 3) picture with a light sky above the highest triangle of each column.
+
+        Holes below it stay black, and so do columns at the edge that no model covers, below the
+        skyline of nine tenths of the others.
+        """
+        open_above = np.logical_and.accumulate(~self.drawn, axis=0)
+        height = open_above.sum(axis=0)
+        skyline = height[height < len(open_above)]
+        if len(skyline):
+            open_above[round(float(np.quantile(skyline, 0.9))) :, height == len(open_above)] = False
+        share = np.linspace(0.0, 1.0, len(self.colour))[:, None, None]
+        sky = np.rint((1.0 - share) * _ZENITH + share * _HORIZON).astype(np.uint8)
+        return np.where(open_above[..., None], sky, self.colour)
 
 
 def cells(points_m: Floats) -> Bools:

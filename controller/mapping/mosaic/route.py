@@ -135,7 +135,7 @@ def film(
             canvas = render(walk, view, camera, size_px, alone=alone)
             took.append(perf_counter() - begin)
             holes.append(1.0 - float(canvas.drawn.mean()))
-            movie.add(canvas.colour)
+            movie.add(canvas.under_sky())
             on_frame(k + 1, len(views))
     return FilmFacts(len(views), float(np.median(took)), float(np.mean(holes)))
 

@@ -124,6 +124,12 @@ def test_plain_lists_of_json_are_read(tmp_path: Path) -> None:
     assert found.size_px == (640, 480)
     np.testing.assert_array_equal(found.matrix, lens["camera_matrix"])
     np.testing.assert_array_equal(found.distortion, lens["distortion_coefficients"])
+    file.write_text(json.dumps(lens | {"camera_matrix": np.ravel(lens["camera_matrix"]).tolist()}))
+    np.testing.assert_array_equal(Lens.read(file).matrix, found.matrix)
+    for wrong in ("abc", [1.0, 2.0], {"a": 1}):
+        file.write_text(json.dumps(lens | {"camera_matrix": wrong}))
+        with pytest.raises(InputError, match="camera_matrix is not 3 x 3 numbers"):
+            Lens.read(file)
     file.write_text(json.dumps(lens | {"image_width": [640, 480]}))
     with pytest.raises(InputError, match="image_width and image_height are needed"):
         Lens.read(file)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from snakewalk.controller.images.chord_beam import follow_places
 from snakewalk.controller.images.chord_branches import BranchSearch
 from snakewalk.controller.images.chord_path import follow_chords, solve
 from snakewalk.controller.images.equipartition import (
@@ -200,6 +201,39 @@ def test_a_hundred_chords_divide_a_zigzag(seed: int) -> None:
     assert (np.diff(found.at) > 0.0).all()
     assert np.array_equal(found.points[[0, -1]], curve[[0, -1]])
     assert on_curve(curve, found.points) < 1e-9
+
+
+def test_a_hundred_chords_divide_a_zigzag_with_too_many_branches_to_visit() -> None:
+    """Turns of 1.5 rad: no branch was found for 13 of 60 before."""
+    for seed in (3002, 3019):
+        random = np.random.default_rng(seed)
+        angle = np.cumsum(random.normal(size=60) * 1.5)
+        curve = np.cumsum(np.column_stack([np.cos(angle), np.sin(angle)]), axis=0)
+        found = equipartition(curve, 100)
+        assert np.ptp(chords(found.points)) < 1e-7
+        assert (np.diff(found.at) > 0.0).all()
+        assert on_curve(curve, found.points) < 1e-9
+
+
+def test_places_that_are_followed_are_those_of_the_march() -> None:
+    curve = bent(5, 1.5)
+    far = 3.0 * (curve[-1] - curve[-2])
+    step = np.hypot(*np.diff(curve, axis=0).T)
+    line = np.ascontiguousarray(np.vstack([curve, curve[-1] + 50.0 * far]))
+    length = float(step.sum())
+    arc = np.concatenate([[0.0], np.cumsum(step), [length + 50.0 * np.hypot(*far)]])
+    steps, excess = np.zeros((20, 40), dtype=np.int8), np.empty(20)
+    points, at = np.empty((41, 2)), np.empty(41)
+    total = 0
+    for chord in np.linspace(0.31, 1.13, 10):
+        found = follow_places(line, arc, chord, np.array([12.0 * chord, length]), steps, excess)
+        for k in range(found):
+            done = march(line, arc, chord, steps[k].astype(np.int64), points, at)
+            assert done == 40
+            assert at[-1] - length == pytest.approx(excess[k], abs=1e-9)
+        total += found
+    assert total > 100
+    assert (np.abs(excess[:found]) == np.sort(np.abs(excess[:found]))).all()
 
 
 def test_the_sum_of_signs_counts_the_branches_that_pass_the_end() -> None:

@@ -97,6 +97,37 @@ def test_rectified_pairs_of_middlebury_stay_as_they_are(tmp_path: Path) -> None:
     )
 
 
+def test_lists_of_any_shape_and_opencvs_matrices_mix_in_json(tmp_path: Path) -> None:
+    flat: dict[str, object] = {
+        "K1": K.ravel().tolist(),
+        "K2": [K.tolist()],
+        "R": np.eye(3).tolist(),
+    }
+    flat |= {"T": T_M[:, None].tolist(), "D1": [0.1, 0.0, 0.0, 0.0]}
+    file = tmp_path / "flat.json"
+    file.write_text(json.dumps(flat))
+    found = read_calibration(file)
+    np.testing.assert_array_equal(found.k_left, K)
+    np.testing.assert_array_equal(found.k_right, K)
+    np.testing.assert_array_equal(found.translation_m, T_M)
+    matrix = {
+        "type_id": "opencv-matrix",
+        "rows": 3,
+        "cols": 3,
+        "dt": "d",
+        "data": K.ravel().tolist(),
+    }
+    file.write_text(json.dumps(flat | {"K1": matrix}))
+    np.testing.assert_array_equal(read_calibration(file).k_left, K)
+    packed = tmp_path / "packed.json"
+    store = cv2.FileStorage(str(packed), cv2.FILE_STORAGE_WRITE_BASE64)
+    for name, value in {"K1": K, "K2": K, "R": np.eye(3), "T": T_M}.items():
+        store.write(name, value)
+    store.release()
+    assert "base64" in packed.read_text()
+    np.testing.assert_array_equal(read_calibration(packed).k_right, K)
+
+
 def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
     def fault(name: str, text: str = "", **arrays) -> str:
         if arrays:
@@ -113,7 +144,14 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
     assert "K1 or M1" in fault("b.yml", "%YAML:1.0\n---\na: 3\n")
     assert "holds no K1 or M1" in fault("c.json", '{"R": [1, 2]}')
     assert "K1 is not a list of numbers or of rows" in fault("d.json", '{"K1": [[1, 2], [3]]}')
-    assert "OpenCV's FileStorage cannot read it" in fault("e.json", '{"K1": [1, ')
+    assert "e.json: is no JSON: Expecting value: line 1 column 12" in fault("e.json", '{"K1": [1, ')
+    assert "l.json: is no JSON object" in fault("l.json", "[1, 2]")
+    text = '{"K1": "abc", "K2": [1], "R": [1], "T": [1]}'
+    assert "K1 holds no numbers" in fault("t.json", text)
+    text = text.replace('"abc"', "[1]").replace('"T": [1]', '"T": "x"')
+    assert "T holds no numbers" in fault("t.json", text)
+    assert "holds no K1" in fault("n.json", '{"K1": null, "R": [1]}')
+    assert "it has R" in fault("n.json", '{"K1": null, "R": [1]}')
     assert "K1 has 2 numbers, not 9" in fault(
         "f.json", '{"K1": [1, 2], "K2": [1], "R": [1], "T": [1]}'
     )

@@ -63,6 +63,8 @@ def test_a_ball_in_the_air_darkens_the_ground_where_the_sun_puts_it(hills: bool)
             assert scene.ngeom == count  # no patches
             screen.reload(model, shade.texture)
             pictures.append(screen.draw(scene).astype(int).sum(axis=2))
+    left = (pictures[1] / pictures[0]).min()
+    assert left == pytest.approx(0.5, abs=0.06)  # half of the light, not a black patch
     darker = pictures[0] - pictures[1]
     rows, columns = np.nonzero(darker > 40)
     assert 100 < len(rows) < 2500

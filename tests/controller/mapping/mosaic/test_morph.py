@@ -109,3 +109,18 @@ def test_a_slanted_plane_is_drawn_in_perspective_and_the_nearer_surface_wins() -
     draw(canvas, wall_m, K, whole, np.full_like(image, 77))
     assert canvas.colour[rows[depth > 3.1], 120, 0] == pytest.approx(77)
     assert (canvas.colour[rows[kept & (depth < 2.9)], 120, 0] > 77).all()
+
+
+def test_the_sky_is_light_and_holes_below_a_surface_stay_black() -> None:
+    canvas = Canvas.blank(3, 6)
+    canvas.colour[2:] = 90
+    canvas.depth_m[2:] = 1.0
+    canvas.depth_m[4, 1] = np.inf
+    canvas.colour[4, 1] = 0
+    canvas.depth_m[:, 2], canvas.colour[:, 2] = np.inf, 0  # a column that shows nothing
+    seen = canvas.under_sky()
+    assert seen[:2].min() > 140
+    assert (np.diff(seen[:2, 2].astype(int), axis=0) > 0).all()
+    np.testing.assert_array_equal(seen[2:, :2], canvas.colour[2:, :2])
+    assert seen[2:, 2].max() == 0  # no sky below the skyline of the others
+    assert Canvas.blank(3, 6).under_sky().min() > 140

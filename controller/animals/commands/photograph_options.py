@@ -1,0 +1,154 @@
+"""Photographs of ``snakewalk body``: their options, files and the texture of the skin."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PIL import Image as Pillow
+from PIL import UnidentifiedImageError
+
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.mesh.body_model import BodyModel, Silhouettes
+from snakewalk.controller.animals.mesh.photographs import VIEWS, Photograph, blend
+from snakewalk.controller.animals.mesh.skin_texture import unroll
+from snakewalk.controller.console.messages import LOGGER
+
+_OF_TOP = ("top", "below")
+"""Views whose skeletons are those of the body seen from above."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A photograph, as it was asked for."""
+
+    view: str
+    """One of ``VIEWS``."""
+    file: Path
+    frame: int
+    """Row of the skeleton that lies in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class SkinPicture:
+    """The texture of a skin."""
+
+    picture: Image | None = None
+    is_around: bool = False
+    """Whether it shows the whole skin, instead of its upper half."""
+    shown: tuple[tuple[Image, Floats, Floats], ...] = ()
+    """Image, skeleton (P, 2) and radii (P,) of each photograph."""
+    facts: dict[str, object] = field(default_factory=dict)
+
+
+def shots_of(images: Sequence[str], frames: Sequence[int]) -> tuple[Shot, ...]:
+    """Read ``--image`` and ``--frame``.
+
+    Raises:
+        InputError: an unknown view, or another number of frames.
+
+    """
+    if len(frames) > 1 and len(frames) != len(images):
+        raise InputError(
+            f"--frame: give one, or one for each --image; there are {len(frames)} frames and "
+            f"{len(images)} images"
+        )
+    each = list(frames) * len(images) if len(frames) == 1 else list(frames) or [0] * len(images)
+    return tuple(Shot(*_view(one), frame) for one, frame in zip(images, each, strict=True))
+
+
+def posed_frame(shots: Sequence[Shot], frames: Sequence[int]) -> int:
+    """Frame of ``--posed``: the one of the first photograph from above, or from below."""
+    of_top = [one.frame for one in shots if one.view in _OF_TOP]
+    return of_top[0] if of_top else 0 if shots or not frames else frames[0]
+
+
+def _view(text: str) -> tuple[str, Path]:
+    view, equals, file = text.partition("=")
+    if equals and view in VIEWS:
+        return view, Path(file)
+    if equals and view.isalpha() and not Path(text).exists():
+        raise InputError(f"--image {text}: the view is one of {', '.join(VIEWS)}, not {view}")
+    return "top", Path(text)
+
+
+def skin_picture(
+    shots: Sequence[Shot], top: Silhouettes, side: Silhouettes | None, body: BodyModel
+) -> SkinPicture:
+    """Make the texture: of one photograph from above, mirrored; else around the whole body.
+
+    Raises:
+        InputError: a file is not a picture, or does not hold its skeleton.
+
+    """
+    if not shots:
+        return SkinPicture()
+    shown = tuple(_shown(one, top, side) for one in shots)
+    files = [str(one.file) for one in shots]
+    if [one.view for one in shots] == ["top"]:
+        facts: dict[str, object] = {"texture": files[0], "texture_seen": 0.5}
+        return SkinPicture(unroll(*shown[0]), False, shown, facts)
+    made = blend(
+        [Photograph(*seen, VIEWS[one.view]) for one, seen in zip(shots, shown, strict=True)], body
+    )
+    for file, gain in zip(files, made.gains, strict=True):
+        if gain is None:
+            LOGGER.warning(
+                "%s: shows no part of the body that %s or a matched photograph shows; its "
+                "brightness stays as it is",
+                *(file, files[0]),
+            )
+    facts = {
+        "texture": files,
+        "texture_seen": round(made.seen, 3),
+        "texture_gains": [
+            None if gain is None else [round(x, 3) for x in gain] for gain in made.gains
+        ],
+    }
+    return SkinPicture(made.picture, True, shown, facts)
+
+
+def _shown(one: Shot, top: Silhouettes, side: Silhouettes | None) -> tuple[Image, Floats, Floats]:
+    """Image, skeleton and radii in it."""
+    track = top if one.view in _OF_TOP else side
+    if track is None:
+        raise InputError(
+            f"{one.file}: a photograph from the {one.view} needs the skeletons in it; "
+            "give their .npz as --side"
+        )
+    check_frame(str(one.file), track.points, one.frame)
+    image, points = _read_picture(one.file), track.points[one.frame]
+    if not track.pixels:
+        raise InputError(
+            f"{one.file}: the track holds no places in pictures (points_px, skeletons)"
+        )
+    rows, columns = image.shape[:2]
+    x, y = points.T
+    if x.min() < -1.0 or y.min() < -1.0 or x.max() > columns or y.max() > rows:
+        raise InputError(
+            f"{one.file}: the skeleton does not lie in this picture of {columns} x {rows} pixels; "
+            "say which --frame of the track it shows"
+        )
+    return image, points, track.radius[one.frame]
+
+
+def _read_picture(image: Path) -> Image:
+    """Grey or colour, whatever the file holds."""
+    try:
+        with Pillow.open(image) as picture:
+            return np.asarray(picture.convert("RGB"))
+    except FileNotFoundError:
+        raise InputError(f"{image}: no such file") from None
+    except Pillow.DecompressionBombError as error:
+        raise InputError(f"{image}: {error}") from None
+    except (UnidentifiedImageError, OSError, SyntaxError):
+        raise InputError(f"{image}: is not a readable picture; choose another file") from None
+
+
+def check_frame(name: str, points: Floats, frame: int) -> None:
+    """Reject a frame without a complete skeleton."""
+    if not 0 <= frame < len(points):
+        raise InputError(f"{name}: frame {frame} is not in 0..{len(points) - 1}")
+    if not np.isfinite(points[frame]).all():
+        raise InputError(f"{name}: frame {frame} holds no whole skeleton")

@@ -1,0 +1,145 @@
+"""Equal chords on curves with many sharp turns, from a sample of the branches ([PT] 2.3).
+
+At a sharp turn a place has several crossings, so a chord has too many branches to visit them all
+(``chord_branches``). Among many branches some end near B by chance: a small change of the chord
+then moves the last place onto B, unless the branch vanishes before. At each step the search keeps
+some places that are spread evenly along the curve.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakewalk.config.arrays import Floats, Ints
+from snakewalk.controller.images.chord_branches import BranchBracket, crossings_ahead
+from snakewalk.drivers.compiling import compiled, readonly_array
+
+_LIMITS = ((12.0, 48), (30.0, 192), (90.0, 192))
+"""Limit of a place's crossings, in chords along the curve, and number of chords tried."""
+_KEPT = 400
+"""Places of a step that are followed."""
+_NEAREST = 24
+"""Branches of a chord whose last places are moved to B."""
+_MOST_CROSSINGS = 33
+_WIDENINGS = 6
+_LINE = f"{readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}"
+
+
+def sampled_solutions(
+    line: Floats,
+    arc: Floats,
+    length: float,
+    segments: int,
+    chords: tuple[float, float],
+    residual: Callable[[float, Ints], float],
+    root: Callable[[BranchBracket], float | None],
+) -> Iterator[tuple[float, Ints]]:
+    """Yield chords and crossings of solutions.
+
+    Args:
+        line: (M, 2) vertices; the last piece extends the curve beyond B.
+        arc: (M,) arc length of the vertices.
+        length: arc length of B.
+        segments: number of chords.
+        chords: the smallest and the largest possible chord.
+        residual: signed arc from B to the last place of a chord with these crossings.
+        root: as in ``BranchSearch.solutions``.
+
+    """
+    least, most = chords
+    steps = np.zeros((_NEAREST, segments), dtype=np.int8)
+    excess = np.empty(_NEAREST)
+    for reach, number in _LIMITS:
+        # halves, quarters, ...: the chords of most solutions are in the middle
+        order = np.argsort([_bit_reversed(k) for k in range(number)], kind="stable")
+        for chord in least + (most - least) * (order + 0.5) / number:
+            limits = np.array([reach * chord, length])
+            found = follow_places(line, arc, chord, limits, steps, excess)
+            for k in np.argsort(np.abs(excess[:found])):
+                crossing = steps[k].astype(np.int64)
+                bracket = _bracket(chord, float(excess[k]), crossing, segments, residual)
+                at = None if bracket is None else root(bracket)
+                if at is not None:
+                    yield at, crossing
+
+
+def _bit_reversed(number: int) -> int:
+    return int(f"{number:08b}"[::-1], 2)
+
+
+def _bracket(
+    chord: float,
+    excess: float,
+    crossing: Ints,
+    segments: int,
+    residual: Callable[[float, Ints], float],
+) -> BranchBracket | None:
+    """Chords between which the last place of a branch passes B; None if it vanishes before."""
+    step = -excess / segments
+    for _ in range(_WIDENINGS):
+        other = residual(chord + step, crossing)
+        if np.isnan(other):
+            return None
+        if other * excess <= 0.0:
+            low, high = sorted((chord, chord + step))
+            return BranchBracket(low, high, crossing)
+        step *= 2.0
+    return None
+
+
+@compiled(f"int64({_LINE}, float64, float64[::1], int8[:, ::1], float64[::1])")
+def follow_places(
+    line: Floats, arc: Floats, chord: float, limits: Floats, steps: NDArray[np.int8], excess: Floats
+) -> int:
+    """Follow evenly spread places of a chord, step by step.
+
+    Args:
+        line: (M, 2).
+        arc: (M,).
+        chord: length of every step.
+        limits: (2,) distance of a crossing along the curve, and arc length of B.
+        steps: (K, N) out: indices of the crossings of the branches that end nearest to B.
+        excess: (K,) out: signed arc from B to their last places.
+
+    Returns:
+        Number of those branches.
+
+    """
+    count = steps.shape[1]
+    at, piece = np.zeros(_KEPT), np.zeros(_KEPT, dtype=np.int64)
+    parent = np.zeros((count, _KEPT), dtype=np.int64)
+    taken = np.zeros((count, _KEPT), dtype=np.int8)
+    places, kept = _KEPT * _MOST_CROSSINGS, 1
+    new_at, new_piece = np.empty(places), np.empty(places, dtype=np.int64)
+    new_parent, new_taken = np.empty(places, dtype=np.int64), np.empty(places, dtype=np.int8)
+    ahead, pieces = np.empty(_MOST_CROSSINGS), np.zeros(_MOST_CROSSINGS, dtype=np.int64)
+    for step in range(count):
+        number = 0
+        for k in range(kept):
+            pieces[0] = piece[k]
+            crossings = crossings_ahead(line, arc, chord, at[k] + limits[0], ahead, pieces, at[k])
+            for c in range(crossings):
+                if ahead[c] + (count - 1 - step) * chord > limits[1] + 2.0 * chord:
+                    continue  # it ends too far beyond B
+                new_at[number], new_piece[number] = ahead[c], pieces[c]
+                new_parent[number], new_taken[number] = k, c
+                number += 1
+        if number == 0:
+            return 0
+        order = np.argsort(new_at[:number])
+        kept = min(number, _KEPT)
+        for k in range(kept):
+            one = order[k * number // kept]
+            at[k], piece[k] = new_at[one], new_piece[one]
+            parent[step, k], taken[step, k] = new_parent[one], new_taken[one]
+    off = np.abs(at[:kept] - limits[1])
+    nearest = np.argsort(off)[: len(excess)]
+    for row in range(len(nearest)):
+        place = nearest[row]
+        excess[row] = at[place] - limits[1]
+        for back in range(count):
+            step = count - 1 - back
+            steps[row, step] = taken[step, place]
+            place = parent[step, place]
+    return len(nearest)
