@@ -1,7 +1,8 @@
 """CPU time of a program from its start until torque is on.
 
-``python -m benchmarks.torque_start`` starts a gait with the command of a user on 16 simulated
-servos, which this process serves on a pseudo-terminal, and watches their register Torque Enable.
+``python -m benchmarks.torque_start`` starts a gait and a walk with the commands of a user on 16
+simulated servos, which this process serves on a pseudo-terminal, and watches their register Torque
+Enable.
 The loops must be compiled already (``snakewalk compile``). With ``--write`` it replaces the table
 of ``docs/benchmarks/startup.md``.
 """
@@ -41,11 +42,14 @@ def main() -> None:
         (f"import: {name}", sorted(_import_s(code) for _ in range(given.starts)))
         for name, code in IMPORTS.items()
     ]
-    rows.append(("torque is on", sorted(torque_s() for _ in range(given.starts))))
+    for name, words in COMMANDS.items():
+        times = sorted(torque_s(name) for _ in range(given.starts))
+        rows.append((f"torque is on: `{' '.join(words)}`", times))
     load = os.getloadavg()[0]
-    lines = ["| end of the stage | least, s | median, s | most, s |", "| --- | ---: | ---: | ---: |"]
+    lines = ["| until | least, s | median, s | most, s |", "| --- | ---: | ---: | ---: |"]
     for name, times in rows:
-        lines.append(f"| {name} | {times[0]:.2f} | {times[len(times) // 2]:.2f} | {times[-1]:.2f} |")
+        shown = (f"{each:.2f}" for each in (times[0], times[len(times) // 2], times[-1]))
+        lines.append(f"| {name} | {' | '.join(shown)} |")
     command = f"python -m benchmarks.torque_start {' '.join(sys.argv[1:])}".strip()
     about = f"{provenance(command)} n = {given.starts} each; load average {load:.1f}."
     text = "\n".join([about, "", *lines])
@@ -54,8 +58,8 @@ def main() -> None:
         write_tables(PAGES / "startup.md", "torque", text)
 
 
-def torque_s() -> float:
-    """Return the CPU time of one program until the first servo has torque.
+def torque_s(name: str) -> float:
+    """Return the CPU time of one program of ``COMMANDS`` until the first servo has torque.
 
     Raises:
         SystemExit: no torque came.
@@ -65,7 +69,7 @@ def torque_s() -> float:
     try:
         with TemporaryDirectory() as folder:
             out = Path(folder) / "run"
-            words = [*COMMANDS["gait"], "--port", bus.path, "--no-film", "--out", str(out)]
+            words = [*COMMANDS[name], "--port", bus.path, "--no-film", "--out", str(out)]
             for each in PATIENT:
                 words += ["--set", each]
             with started(ROOT, *words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:

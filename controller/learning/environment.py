@@ -20,7 +20,7 @@ from snakewalk.config.loader import checked, load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.run.backend import simulated
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.prepared_run import PathlessRun, pose_with
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.clock import Clock, WallClock

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from snakewalk.controller.console.plugins import require
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runtime.drive import OnEvent, PoseSource
-from snakewalk.controller.terrain.growing_map import GrowingMap
+
+if TYPE_CHECKING:
+    from snakewalk.controller.terrain.growing_map import GrowingMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ class MapProvider:
 
     measure: PoseSource
     """Measures the pose, and captures pictures when they are due."""
-    ground_map: GrowingMap | None = None
+    ground_map: "GrowingMap | None" = None
     """None where the walk knows its ground from the world."""
     true_ground: HeightField | None = None
     head_m: float = 0.0

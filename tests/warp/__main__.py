@@ -22,7 +22,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_world
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.run.external.gait_batch import MakeBodies, run_together
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.sim.batch.warp_bodies import WarpBodies
