@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.source import MotionSource, Pace
     from snakewalk.controller.run.execute import execute
+    from snakewalk.controller.run.external.real_time_robot import RealTimeRobot
     from snakewalk.controller.run.factory import prepare_policy, prepare_source, prepare_walk
     from snakewalk.controller.run.kinds.gait_factory import prepare_gait
     from snakewalk.controller.runlog.reader import read_log
@@ -59,6 +60,7 @@ __all__ = [
     "MotionSource",
     "Needs",
     "Pace",
+    "RealTimeRobot",
     "RobotConfig",
     "RunConfig",
     "RunRecord",
@@ -96,6 +98,7 @@ _NAMES = {
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
     "controller.run.execute": ("execute",),
+    "controller.run.external.real_time_robot": ("RealTimeRobot",),
     "controller.run.kinds.gait_factory": ("prepare_gait",),
     "controller.run.factory": (
         "prepare_policy",
