@@ -3,8 +3,9 @@
 ``python -m benchmarks.cpu_quota`` runs a gait at 50 Hz with the command of a user, with its log, on
 16 servos that another process serves on a pseudo-terminal. The program runs from its start under a
 CPU quota of the kernel (a control group of version 2 or 1; needs write access to it), or without
-one (``--limiter stop``) is stopped and continued. ``--minutes 10`` is the long version. With
-``--write`` it replaces the table of ``docs/benchmarks/cpu-quota.md``.
+one (``--limiter stop``) is stopped and continued. In version 1 the same share limits its real-time
+priority. ``--minutes 10`` is the long version. With ``--write`` it replaces the table of
+``docs/benchmarks/cpu-quota.md``.
 """
 
 import argparse
@@ -14,7 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -68,6 +69,8 @@ class Outcome:
     """CPU time of a cycle."""
     throttled: int
     """Periods in which the program had to wait: its quota was used up, or it was stopped."""
+    scheduling: str
+    """Priority of the control loop."""
     load: float
     """Load average of the machine at the end."""
 
@@ -99,6 +102,7 @@ def table(outcome: Outcome) -> str:
         "began late: median, 99 %, most, ms": f"{median:.2f}, {nearly_all:.2f}, {most:.2f}",
         "CPU time of a cycle, ms": f"{outcome.cpu_ms:.2f}",
         "periods in which the program had to wait": f"{outcome.throttled:,}",
+        "priority of the control loop": outcome.scheduling,
         "load average of the machine": f"{outcome.load:.1f}",
     }
     lines = ["| quantity | value |", "| --- | ---: |"]
@@ -130,6 +134,7 @@ def measured(seconds: float, limiter: str) -> Outcome:
             used_s = cpu_s(run.pid) - start_cpu_s
             window_s = time.monotonic() - begun_s
             throttled = limits.throttled() - throttled
+            scheduling = _scheduling(run.pid)
             load = os.getloadavg()[0]
             limits.lift()  # the report of the run is not part of the loop
             errors = run.communicate()[1]
@@ -148,8 +153,16 @@ def measured(seconds: float, limiter: str) -> Outcome:
             (float(np.median(late_ms)), float(np.quantile(late_ms, 0.99)), float(late_ms.max())),
             1e3 * used_s / window_s * record.period_s,
             throttled,
+            scheduling,
             load,
         )
+
+
+def _scheduling(process: int) -> str:
+    """Return how the kernel schedules the main thread of a process."""
+    if os.sched_getscheduler(process) & ~os.SCHED_RESET_ON_FORK == os.SCHED_RR:
+        return f"real time, {os.sched_getparam(process).sched_priority}"
+    return f"niceness {os.getpriority(os.PRIO_PROCESS, process)}"
 
 
 def _wait_for_cycles(run: "subprocess.Popen[str]", log: Path) -> None:
@@ -178,6 +191,9 @@ def quota(process: int) -> Iterator[Limits]:
             file, unlimited = group / "cpu.cfs_quota_us", "-1"
             (group / "cpu.cfs_period_us").write_text(str(period_us))
             file.write_text(str(quota_us))
+            with suppress(OSError):  # a kernel without it
+                (group / "cpu.rt_period_us").write_text(str(period_us))
+                (group / "cpu.rt_runtime_us").write_text(str(quota_us))
         (group / "cgroup.procs").write_text(str(process))
     except OSError as error:
         if group.exists():

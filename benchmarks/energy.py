@@ -22,7 +22,8 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.effort import energy_track, sampled_energy
 from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits

@@ -27,7 +27,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
     fit_friction,

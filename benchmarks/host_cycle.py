@@ -87,8 +87,10 @@ def served() -> Iterator[str]:
     """Serve 16 simulated servos by another process; yields their port."""
     with started(ROOT, "bus", "serve", "--servos", "1-16") as bus:
         assert bus.stdout is not None
-        yield next(found[1] for line in bus.stdout if (found := re.match(r"port (\S+)", line)))
-        bus.kill()
+        try:
+            yield next(found[1] for line in bus.stdout if (found := re.match(r"port (\S+)", line)))
+        finally:  # the exit of Popen waits for its process
+            bus.kill()
 
 
 def cpu_s(process: int) -> float:

@@ -15,7 +15,7 @@ from rich.table import Table
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run.deviation import Deviation
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.studies.shadow.diagnosis import Signatures, answers, goals_of
 
 KINDS = ("none", "friction", "load", "weaker servo", "slipped horn")

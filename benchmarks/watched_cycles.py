@@ -32,7 +32,7 @@ from websockets.typing import Origin, Subprotocol
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.view.live_view import LiveView
 
 CONDITIONS = (

@@ -6,8 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import scipy  # scipy.interpolate loads when it is first used
-from scipy.ndimage import gaussian_filter
+import scipy  # its modules load when they are first used
 
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
@@ -106,7 +105,7 @@ def _random(ground: RandomGround) -> Floats:
     samples = _cells(ground.size_m, ground.spacing_m) + 1
     noise = np.random.default_rng(ground.seed).normal(size=(samples, samples))
     width = ground.correlation_m / 2.0 / ground.spacing_m
-    z = gaussian_filter(noise, width, mode="wrap", truncate=5.0)
+    z = scipy.ndimage.gaussian_filter(noise, width, mode="wrap", truncate=5.0)
     along_x, along_y = np.diff(z, axis=1), np.diff(z, axis=0)
     # Each cell has two triangles: one has the gradient of its lower and right edge, the other that
     # of its left and upper edge.

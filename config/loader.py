@@ -149,12 +149,10 @@ def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
         ConfigError: no such file, world or ground, or each fault of it.
 
     """
-    from snakewalk.config.world import ElevationGround, MapGround, WorldConfig  # noqa: PLC0415  slow to build
-
     path = locate("worlds", name_or_path, beside)
-    world = load(path, WorldConfig)
-    if isinstance(world.ground, ElevationGround | MapGround):
-        named = world.ground.source
+    world = load(path, _schemas().world)
+    named: str | None = getattr(world.ground, "source", None)
+    if named is not None:
         source = (path.parent / named).absolute()  # a log names it to other folders
         if source.is_file():
             ground = world.ground.model_copy(update={"source": str(source)})

@@ -21,12 +21,9 @@ if TYPE_CHECKING:
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.source import MotionSource, Pace
     from snakewalk.controller.run.execute import execute
-    from snakewalk.controller.run.factory import (
-        prepare_gait,
-        prepare_policy,
-        prepare_source,
-        prepare_walk,
-    )
+    from snakewalk.controller.run.external.real_time_robot import RealTimeRobot
+    from snakewalk.controller.run.factory import prepare_policy, prepare_source, prepare_walk
+    from snakewalk.controller.run.kinds.gait_factory import prepare_gait
     from snakewalk.controller.runlog.reader import read_log
     from snakewalk.controller.runlog.record import RunRecord
     from snakewalk.controller.runtime.loop import ticks
@@ -63,6 +60,7 @@ __all__ = [
     "MotionSource",
     "Needs",
     "Pace",
+    "RealTimeRobot",
     "RobotConfig",
     "RunConfig",
     "RunRecord",
@@ -100,8 +98,9 @@ _NAMES = {
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
     "controller.run.execute": ("execute",),
+    "controller.run.external.real_time_robot": ("RealTimeRobot",),
+    "controller.run.kinds.gait_factory": ("prepare_gait",),
     "controller.run.factory": (
-        "prepare_gait",
         "prepare_policy",
         "prepare_source",
         "prepare_walk",

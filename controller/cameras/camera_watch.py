@@ -24,7 +24,8 @@ from snakewalk.controller.cameras.device_camera import (
     open_device,
     overhead_detector,
 )
-from snakewalk.controller.run.backend import metal, simulated
+from snakewalk.controller.run.backend import metal
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.types import JointCommand

@@ -11,6 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.config.plain_text import plain
 from snakewalk.controller.cli.compilation_notice import CompilationNotice
+from snakewalk.controller.console.import_speed import without_collections
 from snakewalk.controller.console.safe_path import make_path_safe
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.errors import DriverError, PortError
@@ -55,7 +56,8 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         _check_words(sys.argv[1:])
-        from snakewalk.controller.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
+        with without_collections():
+            from snakewalk.controller.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
         _tell_of_pipes()
         observe_compilation(CompilationNotice(_print_line))

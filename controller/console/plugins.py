@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.import_speed import without_collections
 
 ENTRY_POINTS: Final = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
@@ -63,7 +64,8 @@ class Plugin:
         """
         module, _, attribute = self.target.partition(":")
         try:
-            return getattr(import_module(module), attribute)
+            with without_collections():
+                return getattr(import_module(module), attribute)
         except InputError:
             raise
         except Exception as error:

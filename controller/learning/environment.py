@@ -19,7 +19,8 @@ from snakewalk.config.loader import checked, load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.run.backend import simulated
+from snakewalk.controller.run.external.served_robot import simulated_views
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.prepared_run import PathlessRun, pose_with
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.clock import Clock, WallClock
@@ -280,9 +281,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             return None
         prepared = self._prepared
         if self._screen is None:
-            from snakewalk.sim.rendering import chase_view  # noqa: PLC0415  an extra
-
-            kind = chase_view.ChaseWindow if self.render_mode == "human" else chase_view.ChaseView
+            views = simulated_views()
+            kind = views.ChaseWindow if self.render_mode == "human" else views.ChaseView
             self._screen = kind(prepared.robot, prepared.world, prepared.ground)
         return self._screen.draw(self._backend.qpos())
 

@@ -20,7 +20,8 @@ from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.factory import is_gait, prepare_gait, prepare_policy
+from snakewalk.controller.run.factory import prepare_policy
+from snakewalk.controller.run.kinds.gait_factory import is_gait, prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.kinds.source_run import SourceRun
 from snakewalk.controller.studies.sweep_measure import varied

@@ -25,7 +25,7 @@ from snakewalk.controller.mechanics.friction_filter import (
 from snakewalk.controller.mechanics.slide_window import HeadReadings, SlideWindow
 from snakewalk.controller.mechanics.slope_load import slope_load
 from snakewalk.controller.pose.external_pose import MeasuredHeads, TimedHead
-from snakewalk.controller.runtime.friction_monitor import FrictionEstimator
+from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 
 WINDOW_S: Final = 4.0
 """Duration of motion that is compared at once (ours): the noise of slow sources averages out."""

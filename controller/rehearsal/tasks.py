@@ -23,12 +23,8 @@ from snakewalk.controller.console.plugins import find
 from snakewalk.controller.rehearsal.judgement import true_arrivals
 from snakewalk.controller.rehearsal.rehearsal import RehearsalCase, rehearse
 from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.factory import (
-    prepare_gait,
-    prepare_job,
-    prepare_policy,
-    prepare_source,
-)
+from snakewalk.controller.run.factory import prepare_job, prepare_policy, prepare_source
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.record import RunRecord
 

@@ -11,7 +11,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.kinematics.links import BodyView, body_in_world
-from snakewalk.controller.run.backend import simulated
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink

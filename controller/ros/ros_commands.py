@@ -30,7 +30,7 @@ from snakewalk.controller.motion.command import (
 )
 from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
 from snakewalk.controller.ros.ros_options import RosOptions
-from snakewalk.controller.run.factory import gait_by_name, is_gait
+from snakewalk.controller.run.kinds.gait_factory import gait_by_name, is_gait
 
 _PENDING_MAX: Final = 16
 """Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that

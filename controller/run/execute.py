@@ -26,10 +26,7 @@ from snakewalk.controller.run.backend import (
     metal,
     on_ports,
     real_ports,
-    simulated,
-    split,
 )
-from snakewalk.controller.run.external.second_body import second_body, use_worker
 from snakewalk.controller.run.map_provider import MapProvider, map_faults, map_provider
 from snakewalk.controller.run.observer_watch import ObserverWatch, Watcher
 from snakewalk.controller.run.pose_provider import (
@@ -38,7 +35,7 @@ from snakewalk.controller.run.pose_provider import (
     pose_faults,
     pose_provider,
 )
-from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
+from snakewalk.controller.run.prepared_run import HasWaypoints, PreparedRun
 from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.run.watchers import SHADOW
 from snakewalk.controller.runlog.reader import read_log
@@ -52,8 +49,10 @@ from snakewalk.controller.runtime.drive import (
     Outcome,
     Sensors,
 )
+from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
+from snakewalk.controller.walk.twin import UsesFriction
 from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError
@@ -210,7 +209,9 @@ class _Execution:
             return self.rehearsed.open(prepared.run, robot)
         if initial_pose is None:
             return metal(prepared.run, robot, port or "")
-        make = simulated if port is None else split
+        from snakewalk.controller.run.external import simulated_backend  # noqa: PLC0415  slow to import
+
+        make = simulated_backend.simulated if port is None else simulated_backend.split
         return make(prepared.run, robot, prepared.world, prepared.ground, initial_pose)
 
     def _loop(
@@ -242,11 +243,8 @@ class _Execution:
             ExitStack() as workers,
         ):
             source = prepared.make_source(log_event)
-            friction = second_body(prepared, source, backend, pose)
+            friction = self._helped(source, backend, pose, workers)
             evidence = pose_evidence(prepared, backend)
-            if self.port is not None and evidence.is_measured:
-                now_s = None if self.rehearsed is None else clock.now_s
-                use_worker(prepared, source, now_s, workers)
             if self.waypoint_commands is not None:
                 source = _live(prepared, source, self.waypoint_commands, log_event)
             link = SafeLink(
@@ -292,6 +290,21 @@ class _Execution:
                     button.end(end)
         return outcome, pose, mapped, source
 
+    def _helped(
+        self, source: MotionSource, backend: Backend, pose: PoseProvider, workers: ExitStack
+    ) -> FrictionEstimator | None:
+        """Let a walk use a second body; return the estimator of the friction under it."""
+        if not isinstance(source, UsesFriction):
+            return None
+        from snakewalk.controller.run.external import second_body  # noqa: PLC0415  slow to import
+
+        prepared = self.prepared
+        friction = second_body.second_body(prepared, source, backend, pose)
+        if self.port is not None and pose_evidence(prepared, backend).is_measured:
+            now_s = None if self.rehearsed is None else backend.clock.now_s
+            second_body.use_worker(prepared, source, now_s, workers)
+        return friction
+
     def _recovery(self, backend: Backend, warn: Callable[[str, str], None]) -> Recovery[Recheck]:
         safety = self.prepared.run.safety
         return Recovery(
@@ -326,7 +339,7 @@ def _live(
         InputError: the motion follows no course.
 
     """
-    if not isinstance(prepared, PathRun) or not isinstance(source, OnCourse):
+    if not isinstance(prepared, HasWaypoints) or not isinstance(source, OnCourse):
         raise InputError(f"run {prepared.run.name}: its motion has no waypoints that can be set")
     return LiveCourse(cast(MotionOnCourse, source), commands, prepared.check_waypoint, on_event)
 

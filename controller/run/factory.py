@@ -1,36 +1,28 @@
-"""Factory of runs: from a configuration or a command's options to a ``PreparedRun``."""
+"""The one factory of runs: from a configuration, or a command's options, to a ``PreparedRun``."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
 
 from snakewalk.config.camera import MappingConfig
-from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.errors import InputError
-from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import (
     checked,
-    load_gait,
     load_robot,
     load_run,
     load_world,
-    shipped,
 )
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import MOTIONS, WALKS, RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import find, require, unknown
 from snakewalk.controller.console.plugins import names as plugin_names
-from snakewalk.controller.gaits.gait import Gait, fitting_robot
-from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.policy import load_policy
 from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.run.assembly import assemble, load_body
 from snakewalk.controller.run.kinds.commanded_run import CommandedRun, MakeCommanded
-from snakewalk.controller.run.kinds.gait_run import GaitRun, MakeOperator
+from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.kinds.playback_run import PlaybackRun
 from snakewalk.controller.run.kinds.source_run import MakeSource, SourceRun
 from snakewalk.controller.run.kinds.steered_run import SteeredRun
@@ -38,7 +30,6 @@ from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.pose_provider import pose_plugin
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.run.run_keys import (
-    OF_A_GAIT,
     OF_A_RECORDING,
     OF_A_SOURCE,
     checked_keys,
@@ -49,10 +40,10 @@ from snakewalk.controller.track.readers.load import track_beside
 
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
-    """Prepare a run from its configuration, such as that of a log.
+    """Prepare a run from its configuration, for example from that in a log.
 
     Raises:
-        InputError: the configuration is incomplete, or has no waypoints.
+        InputError: the configuration alone does not hold the run, or has no waypoints to walk to.
 
     """
     if run.motion == "gait":
@@ -72,6 +63,12 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
 
 
 def _extension(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
+    """Prepare a run whose motion is a plug-in: a kind of run, or a motion source.
+
+    Raises:
+        InputError: the motion does not exist.
+
+    """
     kind = find("run", run.motion)
     if kind is not None:
         prepared: PreparedRun = kind.load()(run, robot, world)
@@ -93,7 +90,7 @@ def prepare_walk(
     on_paper: bool = False,
     **changes: object,
 ) -> WalkRun:
-    """Load a walk's run like ``prepare_job``, which also accepts gaits along waypoints.
+    """Load a walk's run: as ``prepare_job``, which also accepts gaits along waypoints.
 
     Raises:
         ConfigError: every fault of a file at once.
@@ -177,18 +174,8 @@ def prepare_job(
     return WalkRun(run, robot, world)
 
 
-def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
-    """Return keys of run, robot and world for a gait's run, angles in rad.
-
-    Raises:
-        InputError: no file has a key, or an option sets it; one line each.
-
-    """
-    return checked_keys(keys, OF_A_GAIT)
-
-
 def _refuse_one_joint(robot: RobotConfig) -> None:
-    """Reject a body with one yaw joint: such a motion leads nowhere.
+    """Refuse a body that can only bend to and fro: such a motion leads nowhere.
 
     Raises:
         InputError: it has one yaw joint.
@@ -210,98 +197,8 @@ def _reject_legs(robot: RobotConfig) -> None:
         )
 
 
-def prepare_gait(
-    name: str,
-    *,
-    robot: str | None = None,
-    world: str | None = None,
-    parameters: dict[str, Any] | None = None,
-    seconds: float = 20.0,
-    seed: int = 0,
-    look_heading_rad: float | None = None,
-    look_at_m: tuple[float, float] | None = None,
-    make_operator: MakeOperator | None = None,
-    then: Sequence[tuple[float, str, dict[str, Any]]] = (),
-    by: Literal["blend", "cpg"] = "blend",
-    keys: Mapping[str, object] | None = None,
-) -> GaitRun:
-    """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
-
-    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes,
-    ``keys`` values of run, robot and world that are replaced, as of ``prepare_walk``.
-
-    Raises:
-        InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
-            order or together with an operator.
-
-    """
-    if make_operator is not None and (then or by == "cpg"):
-        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
-    keys = gait_keys(keys)
-    gait, known = gait_by_name(name, parameters)
-    if known is not None:
-        robot, world = robot or known.robot, world or known.world
-    changes = [(at_s, gait_by_name(other, values)[0]) for at_s, other, values in then]
-    gaits = [gait, *(other for _, other in changes)]
-    pitch = any(each.needs.pitch for each in gaits)
-    own = robot or fitting_robot(each.needs for each in gaits)
-    body = load_body(own, keys)
-    for each in gaits:
-        each.check(body)
-    run, ground = assemble(
-        {
-            "name": name.removesuffix(".toml").rpartition("/")[2],
-            "robot": body.name,
-            "world": world or gait.world,
-            "motion": "gait",
-            "seed": seed,
-            "time_limit_s": seconds + (60.0 if by == "cpg" else 30.0),
-            "gait": {
-                "name": gait.name,
-                "parameters": gait.params.model_dump(),
-                "duration_s": seconds,
-                "look_heading_rad": look_heading_rad,
-                "look_at_m": look_at_m,
-                "then": [
-                    {"at_s": at_s, "name": g.name, "parameters": g.params.model_dump()}
-                    for at_s, g in changes
-                ],
-                "by": by,
-            },
-            "compliance": known.compliance if known is not None else None,
-        },
-        keys,
-        body,
-    )
-    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
-    body = with_gains(body, pitch=pitch, soft=soft)
-    prepared = GaitRun(run, body, ground, make_operator)
-    remark = prepared.remark()
-    if remark is not None:
-        LOGGER.warning("%s", remark)
-    return prepared
-
-
-def is_gait(name: str) -> bool:
-    """Whether this is the name of a gait or of a shipped set of its parameters."""
-    return name in GAITS or name in shipped("gaits")
-
-
-def moves_by_gait(name: str) -> bool:
-    """Whether this names a gait, or a run that goes along its waypoints by a gait."""
-    return is_gait(name) or load_run(name).motion == "gait"
-
-
-def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
-    """Return a run whose joints yield or not; None leaves the run's setting."""
-    if on is None:
-        return run
-    table = (run.compliance or ComplianceConfig()) if on else None
-    return run.model_copy(update={"compliance": table})
-
-
 def with_map(run: RunConfig, source: str | None) -> RunConfig:
-    """Return a run that knows its ground, or maps it; None leaves the run's setting.
+    """Let the walk know the ground of its world, or map it as it goes; None: as the run says.
 
     Raises:
         InputError: the source is neither ``world`` nor a plug-in.
@@ -317,7 +214,7 @@ def with_map(run: RunConfig, source: str | None) -> RunConfig:
 
 
 def changed(prepared: PreparedRun, **fields: object) -> PreparedRun:
-    """Return a prepared run with changed fields, for example ``run`` or ``world``."""
+    """Return a prepared run with other values of its fields, for example ``run`` or ``world``."""
     made: PreparedRun = replace(prepared, **fields)  # type: ignore[type-var]
     return made
 
@@ -336,13 +233,13 @@ def prepare_playback(
     topic: str | None = None,
     episode: int | None = None,
 ) -> PlaybackRun:
-    """Prepare to play a recording; ``keys`` as in ``prepare_walk``.
+    """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
 
-    ``joints``, ``unit``, ``topic`` and ``episode`` state facts that a file of joint angles omits,
-    like the keys of ``[playback]``.
+    ``joints``, ``unit``, ``topic`` and ``episode`` answer what a file of joint angles does not
+    state, as the keys of ``[playback]`` do.
 
     Raises:
-        InputError: the recording does not exist, bends joints too far, or is too fast.
+        InputError: no such recording, joints that do not bend so far, too fast for them.
 
     """
     keys = checked_keys(keys, OF_A_RECORDING)
@@ -413,12 +310,12 @@ def prepare_policy(
     seed: int = 0,
     keys: Mapping[str, object] | None = None,
 ) -> SourceRun:
-    """Prepare a learnt policy, shipped or from a file; it comes to rest after ``seconds``.
+    """Prepare a learnt policy, shipped or of a file; after ``seconds`` it comes to rest.
 
-    Robot and world are by default those of its training.
+    Robot and world are by default those that it was learnt on.
 
     Raises:
-        InputError: the policy does not exist, or does not know the robot's joints.
+        InputError: no such policy, or a robot whose joints it does not know.
 
     """
     policy = load_policy(name)
@@ -442,12 +339,12 @@ def prepare_commanded(
     name: str,
     keys: Mapping[str, object] | None = None,
 ) -> CommandedRun:
-    """Prepare a run that another program commands, for at most ``seconds``.
+    """Prepare a run that another program commands, for ``seconds`` at most.
 
-    Pitch joints are set up as for gaits; ``keys`` as in ``prepare_walk``.
+    Pitch joints are set up to carry links, as for gaits; ``keys`` as of ``prepare_walk``.
 
     Raises:
-        InputError: robot or world do not exist, or the cycle does not fit the wire.
+        InputError: no such robot or world; its cycle does not fit the wire.
 
     """
     keys = checked_keys(keys, OF_A_SOURCE)
@@ -461,16 +358,3 @@ def prepare_commanded(
     }
     run, ground = assemble(fields, keys, body)
     return CommandedRun(run, with_gains(body, pitch=bool(len(body.pitch_joints))), ground, make)
-
-
-def gait_by_name(name: str, parameters: dict[str, Any] | None) -> tuple[Gait, GaitSetConfig | None]:
-    """Make a gait by its name or by that of a set of parameters, and return the set."""
-    if name in GAITS:
-        return make_gait(name, parameters), None
-    if not is_gait(name) and not name.endswith(".toml"):
-        raise InputError(
-            f"{name}: no such gait; there are {', '.join(GAITS)}; "
-            f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
-        )
-    known = load_gait(name)
-    return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known

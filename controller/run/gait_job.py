@@ -15,10 +15,11 @@ from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.commands.gait_options import parameters
 from snakewalk.controller.run.execute import Finished
-from snakewalk.controller.run.factory import prepare_gait, with_compliance
 from snakewalk.controller.run.finish import by_evidence, show_run, summarized
 from snakewalk.controller.run.hands import Hands, open_hands
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.run_keys import with_compliance
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

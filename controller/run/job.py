@@ -11,10 +11,12 @@ from snakewalk.controller.console.options import key_values, show
 from snakewalk.controller.console.progress import PathBar, TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.carry_out import Carried, carry_out, watched_by
-from snakewalk.controller.run.factory import changed, prepare_job, with_compliance, with_map
+from snakewalk.controller.run.factory import changed, prepare_job, with_map
 from snakewalk.controller.run.film_look import check_look
 from snakewalk.controller.run.finish import by_evidence, exit_code, write_artifacts
-from snakewalk.controller.run.prepared_run import PathRun, PreparedRun
+from snakewalk.controller.run.kinds.path_run import PathRun
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.run_keys import with_compliance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Final, TypeVar
 
+from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import with_keys
 from snakewalk.config.robot import RobotConfig
@@ -85,3 +86,11 @@ def with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
     """
     own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
     return with_keys(config, own, f"{file} {config.name}") if own else config
+
+
+def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
+    """Let joints yield, by the run's own table if it has one, or not; None: as the run says."""
+    if on is None:
+        return run
+    table = (run.compliance or ComplianceConfig()) if on else None
+    return run.model_copy(update={"compliance": table})

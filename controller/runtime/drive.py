@@ -31,7 +31,7 @@ from snakewalk.controller.runlog.topics import (
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.cycle_row import log_cycle
 from snakewalk.controller.runtime.derating import Derating
-from snakewalk.controller.runtime.friction_monitor import FrictionEstimator
+from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.controller.runtime.loop import Tick, ticks
 from snakewalk.controller.runtime.pose_hold import PoseHealth, PoseHold
 from snakewalk.controller.runtime.roll_monitor import RollMonitor

@@ -17,7 +17,8 @@ from snakewalk.config.ground import build_ground
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.comparison import Comparison, compare
 from snakewalk.controller.repertoire import repertoire_run
-from snakewalk.controller.run.backend import Backend, simulated
+from snakewalk.controller.run.backend import Backend
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.factory import prepare_run
 from snakewalk.controller.runlog.record import Header, InitialPose, RunRecord
 from snakewalk.controller.runlog.topics import PoseTable

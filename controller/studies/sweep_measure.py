@@ -14,7 +14,7 @@ from snakewalk.controller.metrics.effort import effort
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.travel import Travel
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.prepared_run import GroundedRun
 from snakewalk.controller.runlog.record import RunRecord

@@ -15,7 +15,7 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait, Range, ranges
 from snakewalk.controller.gaits.registry import GAITS
-from snakewalk.controller.run.factory import gait_keys
+from snakewalk.controller.run.kinds.gait_factory import gait_keys
 from snakewalk.controller.run.run_keys import with_keys_of
 
 SLOWEST_HZ = 0.2

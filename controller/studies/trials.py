@@ -18,15 +18,11 @@ from snakewalk.controller.console.pool import each
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import (
-    changed,
-    is_gait,
-    prepare_gait,
-    prepare_job,
-    with_compliance,
-)
+from snakewalk.controller.run.factory import changed, prepare_job
+from snakewalk.controller.run.kinds.gait_factory import is_gait, prepare_gait
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.run_keys import with_compliance
 from snakewalk.controller.terrain.summary import path_relief
 from snakewalk.controller.track.readers.load import load_track
 

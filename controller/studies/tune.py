@@ -19,7 +19,7 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.gaits.gait import Aim as Goal
 from snakewalk.controller.gaits.registry import make_gait
-from snakewalk.controller.run.factory import gait_keys
+from snakewalk.controller.run.kinds.gait_factory import gait_keys
 from snakewalk.controller.run.run_keys import with_keys_of
 from snakewalk.controller.studies.sweep_measure import Measurement, measure
 from snakewalk.controller.studies.sweep_points import Point, Space, robot_file

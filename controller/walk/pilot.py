@@ -33,6 +33,7 @@ from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
+from snakewalk.controller.walk.twin import UsesFriction
 from snakewalk.controller.walk.twin_answers import Coasting, TwinAsker
 from snakewalk.controller.walk.twin_rollout import LENGTH_BODIES, TwinRollout
 
@@ -106,15 +107,6 @@ class AsksAboutPieces(Protocol):
 
     ask: Callable[[PathPose, Sequence[Floats]], None] | None
     answers: Callable[[], Mapping[int, Rolled | None]]
-
-
-@runtime_checkable
-class UsesFriction(Protocol):
-    """A motion, or a ``ShapeChooser``, whose predictions use friction."""
-
-    def use_friction(self, friction: FrictionConfig) -> None:
-        """Use this friction from the next prediction."""
-        ...
 
 
 class Pilot(OnCourse):

@@ -12,7 +12,7 @@ from snakewalk.controller.kinematics.roll_compensation import RollCompensation
 from snakewalk.controller.mechanics.rollout import Rolled
 from snakewalk.controller.walk.steering import PathPose
 from snakewalk.controller.walk.time_law import TimeLaw
-from snakewalk.controller.walk.twin_rollout import seen_state
+from snakewalk.controller.walk.twin import seen_state
 from snakewalk.drivers.types import BodyPose
 
 

@@ -10,32 +10,14 @@ from typing import Protocol, runtime_checkable
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.kinematics.links import BodyView, body_in_world, chain_angles_rad
+from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.mechanics.rollout import Followed, Rolled
 from snakewalk.controller.walk.steering import PathPose
-from snakewalk.drivers.types import BodyPose
+from snakewalk.controller.walk.twin import Twin, seen_state
 
 LENGTH_BODIES = 1.0
 """Length of pulse that is rolled out."""
 _LONGEST_S = 6.0
-
-
-class Twin(Protocol):
-    """A simulated body of the robot."""
-
-    def begin(
-        self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
-    ) -> None:
-        """Place it at the robot's pose, moving as the robot did since ``dt_s`` ago."""
-        ...
-
-    def use_friction(self, friction: FrictionConfig) -> None:
-        """Set the friction of its ground."""
-        ...
-
-    def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
-        """Hold goals (J,) for ``dt_s``; return the head's pose and the joints (J,) then."""
-        ...
 
 
 @runtime_checkable
@@ -113,9 +95,3 @@ class TwinRollout:
             view = body_in_world(robot, now, now_rad)
             time_s += self._dt_s
             yield view
-
-
-def seen_state(robot: RobotConfig, view: BodyView) -> tuple[BodyPose, Floats]:
-    """Head pose and joints (J,) of an observed body."""
-    pose = BodyPose(0.0, view.link_m[0], view.rotation[0])
-    return pose, chain_angles_rad(robot, view)

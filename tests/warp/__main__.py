@@ -9,7 +9,6 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,23 +16,17 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import warp
-from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_world
 from snakewalk.controller.gaits.registry import GAITS
-from snakewalk.controller.run.external.gait_batch import MakeBodies, run_together
-from snakewalk.controller.run.factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.sim.batch.warp_bodies import WarpBodies
+from tests.helpers.gait_links import SECONDS, links_of, prepared_gaits
 from tests.oracles.compiled_bodies import CompiledBodies
 
-SECONDS = 4.0
 MOST = 0.005
 """Largest deviation."""
 IMPRECISE = {"carangiform", "thunniform"}
 """Swimming gaits that creep a few millimetres per second on a floor: single precision changes them
-(docs/benchmarks/warp.md)."""
+(``python -m benchmarks.rounded_bodies``)."""
 
 
 def main() -> int:
@@ -46,7 +39,7 @@ def main() -> int:
     given = parser.parse_args()
     kernels_s, rows, rates = [], [], {}
     for robot in given.robot:
-        prepared = _prepared(robot, given.gait)
+        prepared = prepared_gaits(robot, given.gait)
         if not prepared:
             continue
         found, warp_s, compile_s = _compare(prepared, given.device, given.copies)
@@ -74,22 +67,6 @@ def main() -> int:
     return int(not worst <= MOST)
 
 
-def _prepared(robot: str, gaits: Sequence[str]) -> list[GaitRun]:
-    found = []
-    for name in gaits:
-        world = load_world(GAITS[name].world)
-        flat = world.ground.kind == "flat" and world.obstacle is None
-        where = world.name if flat else "isotropic"
-        try:
-            run = prepare_gait(name, robot=robot, world=where, seconds=SECONDS + 1.0)
-            run.check_plan()
-        except InputError as error:
-            print(f"{robot:15} {name:22} left out: {error.faults[0]}")
-            continue
-        found.append(run)
-    return found
-
-
 def _compare(
     prepared: list[GaitRun], device: str, copies: int
 ) -> tuple[list[tuple[float, float]], float, float]:
@@ -101,9 +78,9 @@ def _compare(
             first_s.append(time.perf_counter() - begin_s)
 
     with TemporaryDirectory() as folder:
-        ours = _links(prepared, CompiledBodies, Path(folder) / "compiled")
+        ours = links_of(prepared, CompiledBodies, Path(folder) / "compiled")
         begin_s = time.perf_counter()
-        theirs = _links(
+        theirs = links_of(
             prepared * copies, partial(WarpBodies, device=device), Path(folder) / "warp", note
         )
     warp_s = time.perf_counter() - begin_s - first_s[0]
@@ -113,23 +90,6 @@ def _compare(
         off_m = float(np.linalg.norm(b[-1] - a[-1], axis=1).mean())
         found.append((off_m / way_m, way_m))
     return found, warp_s, first_s[0]
-
-
-def _links(
-    prepared: list[GaitRun],
-    make_bodies: MakeBodies,
-    folder: Path,
-    note: object = lambda time_s: None,
-) -> list[Floats]:
-    """Places of the links at the begin and at ``SECONDS``, (2, L, 3) of each run."""
-    logs = [folder / f"{number}.mcap" for number in range(len(prepared))]
-    run_together(prepared, logs, make_bodies, note)  # type: ignore[arg-type]
-    found = []
-    for log in logs:
-        pose = read_log(log).pose
-        at = int(np.searchsorted(pose.time_s, SECONDS - 1e-9))
-        found.append(pose.links_m[[0, at]])
-    return found
 
 
 if __name__ == "__main__":

@@ -29,8 +29,9 @@ from snakewalk.controller.ros.ros_link import open_ros
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.commands.gait_options import Param, parameters
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import gait_by_name, prepare_commanded
+from snakewalk.controller.run.factory import prepare_commanded
 from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.kinds.gait_factory import gait_by_name
 from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer
 
 _WEEK_S = 604_800.0

@@ -13,7 +13,7 @@ from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.run.commands.gait_options import Name, Param, needed_joints, parameters
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 
 
 @command(

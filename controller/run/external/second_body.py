@@ -14,14 +14,14 @@ from snakewalk.controller.run.external.twin_worker import ProcessTwin, Rehearsed
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.pose_provider import PoseProvider
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.controller.runtime.friction_monitor import (
-    FrictionEstimator,
     FrictionMonitor,
     OnPaper,
     OnTwin,
     SlideModel,
 )
-from snakewalk.controller.walk.pilot import UsesFriction
+from snakewalk.controller.walk.twin import UsesFriction
 from snakewalk.controller.walk.twin_answers import AsksTwin, TwinAsker
 from snakewalk.controller.walk.twin_rollout import TwinRollout, UsesTwin
 

@@ -82,6 +82,19 @@ def physics_modules() -> tuple[Any, Any]:
     return plant, twin
 
 
+def simulated_views() -> Any:
+    """Return the module whose cameras follow a simulated body.
+
+    Raises:
+        InputError: MuJoCo is not installed.
+
+    """
+    require_extra("a simulated camera needs", "mujoco")
+    from snakewalk.sim.rendering import chase_view  # noqa: PLC0415  an extra
+
+    return chase_view
+
+
 def simulated_line(
     robot: RobotConfig,
     plant: Plant,

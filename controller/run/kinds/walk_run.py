@@ -16,7 +16,8 @@ from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.rollout import Rollout
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.motion.source import MotionSource, Pace
-from snakewalk.controller.run.prepared_run import PathRun, pose_with
+from snakewalk.controller.run.kinds.path_run import PathRun
+from snakewalk.controller.run.prepared_run import pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults

@@ -28,7 +28,7 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.run.factory import moves_by_gait
+from snakewalk.controller.run.kinds.gait_factory import moves_by_gait
 from snakewalk.controller.studies import trials as study
 from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.trials_table import KINDS, TrialsTable

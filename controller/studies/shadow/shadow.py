@@ -8,8 +8,8 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.run.backend import simulated
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.runlog.record import InitialPose
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy  # scipy.io loads when it is first used
 from numpy.typing import NDArray
 
 from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays
@@ -73,14 +74,12 @@ def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None
 
 def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
     """Load a MATLAB file up to version 7 with ``track_from_arrays``; 7.3 is HDF5."""
-    from scipy.io import loadmat, whosmat  # noqa: PLC0415  slow to import
-
     size = file.stat().st_size
     check_expansion(file, size, _unpacked_mat(file.read_bytes()))
     try:
-        said = 8 * sum(math.prod(shape) for _, shape, _ in whosmat(file))
+        said = 8 * sum(math.prod(shape) for _, shape, _ in scipy.io.whosmat(file))
         check_expansion(file, size, said)  # also for cells and structs
-        held = loadmat(file)
+        held = scipy.io.loadmat(file)
     except InputError:
         raise
     except Exception as error:

@@ -10,7 +10,7 @@ from PIL import Image
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.report.artifacts import make_artifacts
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 
 WIDTH, HEIGHT = 400, 225
 SHOWN_S = 5.0

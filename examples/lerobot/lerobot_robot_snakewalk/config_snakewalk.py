@@ -12,11 +12,15 @@ class SnakewalkConfig(RobotConfig):
     """A chain of servos on a port."""
 
     port: str
-    """Serial device, for example one that ``snakewalk bus serve`` prints; or ``sim``: servos on a
-    bench, simulated in this process and in real time."""
+    """Serial device, for example one that ``snakewalk bus serve`` prints; or ``sim``: simulated in
+    this process and in real time, servos on a bench or, with ``simulator_camera``, the robot."""
     robot: str = "yaw16"
     """Name of a shipped robot, or a TOML file."""
     rate_hz: float = 50.0
     """Control cycles per second; LeRobot's frame rate may be lower."""
     cameras: dict[str, CameraConfig] = field(default_factory=dict)
     """Cameras of LeRobot, by name."""
+    simulator_camera: bool = False
+    """Observe pictures of the simulated robot, 480 by 640, as ``simulator``; needs port ``sim``."""
+    world: str = "flat"
+    """Ground of the robot that ``simulator_camera`` shows: a shipped world, or a TOML file."""

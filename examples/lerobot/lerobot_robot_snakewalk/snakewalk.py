@@ -13,9 +13,12 @@ from lerobot.utils.decorators import check_if_already_connected, check_if_not_co
 import snakewalk as sw
 from lerobot_robot_snakewalk.config_snakewalk import SnakewalkConfig
 from lerobot_robot_snakewalk.control_loop import ControlLoop
+from lerobot_robot_snakewalk.simulator_camera import SimulatorCamera
 
 SIMULATED = "sim"
 """Port of servos that this process simulates."""
+CAMERA = "simulator"
+"""Name of the camera that draws the simulated robot."""
 
 
 class Snakewalk(Robot):
@@ -32,9 +35,21 @@ class Snakewalk(Robot):
         super().__init__(config)
         if not 0.0 < config.rate_hz < math.inf:
             raise ValueError(f"robot.rate_hz: {config.rate_hz} is not a rate; give a positive one")
+        if config.simulator_camera and config.port != SIMULATED:
+            raise ValueError(
+                "robot.simulator_camera: draws a robot that this process simulates, and "
+                f"robot.port is {config.port}; use --robot.port={SIMULATED}, or --robot.cameras"
+            )
+        if config.simulator_camera and CAMERA in config.cameras:
+            raise ValueError(
+                f"robot.cameras: {CAMERA} is the name of the simulator's camera; use another"
+            )
         self.config = config
         self.robot = sw.load_robot(config.robot)
-        self.cameras = make_cameras_from_configs(config.cameras)
+        self.cameras: dict[str, Any] = make_cameras_from_configs(config.cameras)
+        self._body = SimulatorCamera(self.robot, config.world) if config.simulator_camera else None
+        if self._body is not None:
+            self.cameras[CAMERA] = self._body
         self._loop: ControlLoop | None = None
         self._opened = ExitStack()
 
@@ -49,7 +64,7 @@ class Snakewalk(Robot):
             for what in ("pos", "vel", "current")
             for name in self.robot.joint_names
         }
-        sizes = {name: (each.height, each.width, 3) for name, each in self.config.cameras.items()}
+        sizes = {name: (each.height, each.width, 3) for name, each in self.cameras.items()}
         return measured | sizes
 
     @property
@@ -72,7 +87,11 @@ class Snakewalk(Robot):
         robot, limits = self.robot, sw.SafetyConfig()
         with ExitStack() as stack:
             device = self.config.port
-            if device == SIMULATED:
+            if self._body is not None:
+                self._body.connect()  # before the servos, which are those of the body
+                stack.callback(self._body.disconnect)
+                device = self._body.path
+            elif device == SIMULATED:
                 ids = ",".join(str(each) for each in robot.servo_ids)
                 bus = sw.ServoBus(f"{ids}:{robot.servo.model}", baud=robot.servo.baud)
                 stack.callback(bus.close)
@@ -82,6 +101,8 @@ class Snakewalk(Robot):
             bus = sw.DynamixelBus(port, robot.servo.model)
             chain = sw.ServoChain(bus, robot, watchdog_s=limits.watchdog_s)
             for camera in self.cameras.values():
+                if camera is self._body:
+                    continue
                 camera.connect()
                 stack.callback(camera.disconnect)
             loop = ControlLoop(

@@ -19,7 +19,7 @@ from snakewalk.controller.animals.mesh.skin_file import Y_UP
 from snakewalk.controller.images.mesh_files import read_mesh
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.types import BodyPose
 from tests.helpers.command import snakewalk

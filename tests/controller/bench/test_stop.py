@@ -12,7 +12,7 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.controller.bench import emergency_stop
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.safety.stop_button import StopButton

@@ -24,7 +24,7 @@ from snakewalk.controller.console.result_files import (
 )
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.tune import Tuned
 

@@ -7,7 +7,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.cpg_motion import CpgMotion
-from snakewalk.controller.run.factory import prepare_gait, prepare_run
+from snakewalk.controller.run.factory import prepare_run
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 
 ROBOT = load_robot("alternating16")
 THEN = [(3.0, "turn-in-place", {}), (8.0, "rolling", {"frequency_hz": 0.3})]

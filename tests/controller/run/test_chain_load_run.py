@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.servo_setup import _check_fuse
 from snakewalk.controller.runtime.derating import LEAST, Derating
 from snakewalk.drivers.types import JointState

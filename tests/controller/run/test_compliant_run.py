@@ -9,7 +9,8 @@ import pytest
 from snakewalk.config.faults import FaultPlan
 from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.external import simulated_bus
-from snakewalk.controller.run.factory import prepare_gait, with_compliance
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.run_keys import with_compliance
 from snakewalk.controller.studies.trials import Case, prepare_case
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.sim.faults.fault_player import FaultPlayer

@@ -8,7 +8,7 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 
 

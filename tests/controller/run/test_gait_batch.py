@@ -9,7 +9,7 @@ import pytest
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external.gait_batch import run_together
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from tests.oracles.compiled_bodies import CompiledBodies
 

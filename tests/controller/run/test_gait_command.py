@@ -22,7 +22,8 @@ from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import Operator
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait, prepare_run, prepare_walk
+from snakewalk.controller.run.factory import prepare_run, prepare_walk
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.replay import differences, replay

@@ -14,7 +14,7 @@ from pytest_mock import MockerFixture
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.chain.servo_chain import ServoChain

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from snakewalk.controller.run.execute import Finished, execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.observer_watch import ObserverWatch
 from snakewalk.controller.run.watcher import WatcherProcess
 from snakewalk.controller.run.watchers import Watchers

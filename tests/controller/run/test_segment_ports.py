@@ -13,7 +13,9 @@ from snakewalk.config.loader import checked, load_robot, with_keys
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.run import backend
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.run.external import simulated_backend
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.errors import BusError, PortError
 from snakewalk.drivers.port import network_port
@@ -187,8 +189,8 @@ def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
             off_rad.append((self._plant.position_rad - position_rad)[8:])
             super().follow(at_s, position_rad, velocity_rad_s)
 
-    monkeypatch.setattr("snakewalk.controller.run.backend.SplitPlant", Watched)
-    monkeypatch.setattr("snakewalk.controller.run.backend.RealTimeClock", lambda: bench.clock)
+    monkeypatch.setattr(simulated_backend, "SplitPlant", Watched)
+    monkeypatch.setattr(simulated_backend, "RealTimeClock", lambda: bench.clock)
     bench.lines[1].taps.append(tap)
     walk = prepare_walk("flat-square", robot="yaw16", keys={"run.time_limit_s": 6.0})
     port = f"1-8=sim,9-16={bench.paths[1]}"
@@ -217,7 +219,7 @@ def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
 def test_a_real_servo_that_dies_stops_the_simulated_ones_as_well(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("snakewalk.controller.run.backend.RealTimeClock", lambda: bench.clock)
+    monkeypatch.setattr(simulated_backend, "RealTimeClock", lambda: bench.clock)
     dies = {"seed": 1, "fault": [{"kind": "mute", "ids": [12], "at_s": 2.5, "for_s": 60.0}]}
     FaultPlayer(bench.lines[1], checked(FaultPlan, dies, "faults"))
     gait = prepare_gait("lateral-undulation", seconds=3.0)

@@ -15,7 +15,8 @@ from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.repertoire import repertoire_recording
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
-from snakewalk.controller.run.factory import prepare_gait, prepare_playback, prepare_walk
+from snakewalk.controller.run.factory import prepare_playback, prepare_walk
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies import tune
 from snakewalk.controller.studies.sweep_measure import Measurement, measure

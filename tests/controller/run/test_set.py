@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.options import key_values
-from snakewalk.controller.run.factory import prepare_gait, prepare_playback, prepare_walk
+from snakewalk.controller.run.factory import prepare_playback, prepare_walk
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.replay import differences, replay
 from tests.helpers.in_process import leave_out_pages

@@ -8,7 +8,8 @@ from pytest_mock import MockerFixture
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.errors import BusError

@@ -15,7 +15,7 @@ from snakewalk.controller.run import backend
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external.served_robot import simulated_line
 from snakewalk.controller.run.external.simulated_bus import SimulatedBus
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError

@@ -25,8 +25,9 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait, prepare_walk
+from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.hands import Hands
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd

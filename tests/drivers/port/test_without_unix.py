@@ -25,7 +25,7 @@ for name in ("getuid", "sched_setscheduler", "setpriority", "O_NOFOLLOW", "O_CLO
 os.environ["USERNAME"] = "somebody"
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.drivers.safety.stop_button import StopButton, stoppable_runs
 
 def command(*words):

@@ -7,7 +7,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.world import CorridorObstacle, FrictionConfig, PegsObstacle, WorldConfig
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.servo.motor import MOTORS, make_drive
 

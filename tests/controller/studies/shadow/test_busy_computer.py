@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snakewalk.controller.run import backend, execute
+from snakewalk.controller.run import execute
+from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.external import simulated_backend
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, RunShadow, ShadowAlarm
 from snakewalk.drivers.types import JointCommand, JointState
 from tests.controller.studies.shadow.test_run_shadow import short_run
@@ -27,7 +30,7 @@ class BusyChain:
 
     """
 
-    def __init__(self, made: backend.Backend, seed: int, host_s: float, line_s: float) -> None:
+    def __init__(self, made: Backend, seed: int, host_s: float, line_s: float) -> None:
         self._chain, self._clock = made.chain, made.clock
         self._rng = np.random.default_rng(seed)
         self._host_s, self._line_s = host_s, line_s
@@ -63,11 +66,11 @@ def alarms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Alarms:
     def run(
         seed: int, host_s: float, line_s: float, deviation: Deviation = NO_DEVIATION
     ) -> list[str]:
-        def busy(*given: Any) -> backend.Backend:
-            made = backend.simulated(*given, deviation=deviation)
+        def busy(*given: Any) -> Backend:
+            made = simulated(*given, deviation=deviation)
             return replace(made, chain=BusyChain(made, seed, host_s, line_s))  # type: ignore[arg-type]
 
-        monkeypatch.setattr(execute, "simulated", busy)
+        monkeypatch.setattr(simulated_backend, "simulated", busy)
         finished = execute.execute(short_run(8.0), tmp_path / "run", shadow=True, stoppable=False)
         assert finished.outcome.tripped is None
         return [event.text for event in finished.record.events if event.kind == "shadow"]

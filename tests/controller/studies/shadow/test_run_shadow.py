@@ -17,9 +17,10 @@ from snakewalk.controller.bench.emergency_stop import StopOutcome, runs_of, stop
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.result_files import SUMMARY
 from snakewalk.controller.metrics.comparison import compare
-from snakewalk.controller.run import backend, execute
+from snakewalk.controller.run import execute
 from snakewalk.controller.run.deviation import Deviation
-from snakewalk.controller.run.factory import prepare_gait
+from snakewalk.controller.run.external import simulated_backend
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.studies.shadow.diagnosis import MOST_S, goals_of
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, RunShadow
 
@@ -35,7 +36,8 @@ def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     weak = Deviation(torque=np.array([1.0, 0.4, 1.0]))
-    monkeypatch.setattr(execute, "simulated", partial(backend.simulated, deviation=weak))
+    weaker = partial(simulated_backend.simulated, deviation=weak)
+    monkeypatch.setattr(simulated_backend, "simulated", weaker)
     told: list[tuple[str, str]] = []
     finished = execute.execute(
         short_run(4.0),

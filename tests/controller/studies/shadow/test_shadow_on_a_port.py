@@ -12,7 +12,9 @@ import pytest
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load_world
 from snakewalk.controller.run import backend
+from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.studies.shadow import shadow
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, ALARM_RAD
 from snakewalk.drivers.errors import PortError
@@ -70,11 +72,11 @@ def test_the_simulator_is_built_before_torque_is_on(
     """A simulator that needs a second is five times as slow as the servos' bus watchdogs."""
     torque: list[bool] = []
 
-    def slow(*args: Any) -> backend.Backend:
+    def slow(*args: Any) -> Backend:
         bench.clock.sleep_until_s(bench.clock.now_s() + 1.0)
         bench.line.settle()
         torque.append(bool(bench.line.firmware.drive.torque_on.any()))
-        return backend.simulated(*args)
+        return simulated(*args)
 
     monkeypatch.setattr(shadow, "simulated", slow)
     finished = bench.run(tmp_path, 3.0)

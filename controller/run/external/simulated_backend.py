@@ -1,0 +1,155 @@
+"""Bus of a run with simulated servos: in the same process, or next to real ones."""
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.robot import SIMULATED, RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.config.world import WorldConfig
+from snakewalk.controller.run.backend import Backend, bus_on_ports
+from snakewalk.controller.run.deviation import Deviation
+from snakewalk.controller.run.external.served_robot import physics_modules, simulated_line
+from snakewalk.controller.run.external.simulated_bus import SimulatedBus
+from snakewalk.controller.runlog.record import InitialPose
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.port.port_map import port_map_text
+from snakewalk.drivers.types import JointState
+from snakewalk.sim.line.clock import RealTimeClock
+from snakewalk.sim.physics.split_plant import SplitPlant
+from snakewalk.sim.servo.motor import motors_of
+
+if TYPE_CHECKING:
+    from snakewalk.sim.physics.plant import MujocoPlant
+
+
+class _SimulatedBody:
+    """The body of a run in MuJoCo, not yet placed, and the parts that are made from it."""
+
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None,
+        deviation: Deviation,
+    ) -> None:
+        plant, twin = physics_modules()
+        self.plant: MujocoPlant = plant.MujocoPlant(
+            *(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s),
+            is_placed=False,
+        )
+        self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
+        """Makes the robot's IMU from the motion of the body; None without an IMU."""
+        self.twin = partial(twin.PlantTwin, robot, world, ground)
+        """Makes a second body."""
+
+
+def simulated(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    initial_pose: InitialPose,
+    deviation: Deviation | None = None,
+) -> Backend:
+    """Servos on a simulated line that turn a MuJoCo body with its head at the start.
+
+    Args:
+        run: start and physics step.
+        robot: the body and its servos.
+        world: friction and ground.
+        ground: the world's height field, where it has one.
+        initial_pose: heading of the head link, and joint angles to begin with, as servos say them.
+        deviation: differences of the simulated robot and its ground from ``robot`` and ``world``;
+            None is the run's.
+
+    """
+    if deviation is None:
+        deviation = Deviation.of_run(run.deviation, robot)
+    made = _SimulatedBody(run, robot, world, ground, deviation)
+    body = made.plant
+    joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
+    body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
+    servos = SimulatedBus.of(robot, body, deviation, made.imu())
+    chain = ServoChain(
+        servos.bus(),
+        servos.robot,
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+        can_hold=run.safety.on_trip == "hold",
+    )
+
+    def lay_down(pose: InitialPose) -> None:
+        servos.settle()
+        shaft_rad = deviation.shaft_rad(pose.joint_rad)
+        body.lay_down(run.start_m, pose.heading_rad, shaft_rad)
+        servos.hold_position()
+
+    return Backend(
+        "sim",
+        chain,
+        servos.clock,
+        body.head_pose,
+        lambda: body.qpos,
+        lambda: servos.busy_s,
+        servos.energy,
+        made.twin,
+        lay_down,
+        servos.cut_power,
+    )
+
+
+def split(
+    run: RunConfig,
+    robot: RobotConfig,
+    world: WorldConfig,
+    ground: HeightField | None,
+    initial_pose: InitialPose,
+) -> Backend:
+    """Real servos on the robot's ports, the others on a simulated line, in real time.
+
+    The joints of the simulated body that have real servos follow what those measure, so that the
+    others feel their weight and friction; the body's pose is the simulator's.
+
+    Raises:
+        PortError: a port is not there, is taken, or may not be opened.
+
+    """
+    (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
+    rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
+    deviation = Deviation.of_run(run.deviation, robot)
+    made = _SimulatedBody(run, robot, world, ground, deviation)
+    plant = made.plant
+    plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
+    motors = motors_of(robot)
+    body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
+    clock, imu = RealTimeClock(), made.imu()
+    line = simulated_line(
+        *(robot, body, replace(deviation, slip_rad=None)),
+        imu if imu is not None and imu.config.id in here else None,
+        rows=rows,
+        clock=clock,
+    )
+    bus = bus_on_ports(robot, clock, line)
+    chain = ServoChain(
+        bus,
+        robot,
+        watchdog_s=run.safety.watchdog_s,
+        rate_hz=run.cycle_hz,
+        can_hold=run.safety.on_trip == "hold",
+    )
+
+    def follow(state: JointState) -> None:
+        body.follow(state.time_s - state.age_s, state.position_rad, state.velocity_rad_s)
+
+    chain.on_state = follow
+    return Backend(
+        port_map_text((each.port, each.ids) for each in robot.ports),
+        chain,
+        clock,
+        plant.head_pose,
+        lambda: plant.qpos,
+        lambda: float("nan"),
+    )

@@ -1,0 +1,120 @@
+"""Runs of a gait, from a command's options."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.gait import GaitSetConfig
+from snakewalk.config.loader import load_gait, load_run, shipped
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.gaits.gait import Gait, fitting_robot
+from snakewalk.controller.gaits.registry import GAITS, make_gait
+from snakewalk.controller.run.assembly import assemble, load_body
+from snakewalk.controller.run.kinds.gait_run import GaitRun, MakeOperator
+from snakewalk.controller.run.run_keys import OF_A_GAIT, checked_keys
+from snakewalk.controller.run.servo_setup import with_gains
+
+
+def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
+    """Return keys of run, robot and world that a gait's run accepts, angles in rad.
+
+    Raises:
+        InputError: a key is of none of the files, or has an option of its own; one line each.
+
+    """
+    return checked_keys(keys, OF_A_GAIT)
+
+
+def prepare_gait(
+    name: str,
+    *,
+    robot: str | None = None,
+    world: str | None = None,
+    parameters: dict[str, Any] | None = None,
+    seconds: float = 20.0,
+    seed: int = 0,
+    look_heading_rad: float | None = None,
+    look_at_m: tuple[float, float] | None = None,
+    make_operator: MakeOperator | None = None,
+    then: Sequence[tuple[float, str, dict[str, Any]]] = (),
+    by: Literal["blend", "cpg"] = "blend",
+    keys: Mapping[str, object] | None = None,
+) -> GaitRun:
+    """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
+
+    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes,
+    ``keys`` values of run, robot and world that are replaced, as of ``prepare_walk``.
+
+    Raises:
+        InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
+            order or together with an operator.
+
+    """
+    if make_operator is not None and (then or by == "cpg"):
+        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
+    keys = gait_keys(keys)
+    gait, known = gait_by_name(name, parameters)
+    if known is not None:
+        robot, world = robot or known.robot, world or known.world
+    changes = [(at_s, gait_by_name(other, values)[0]) for at_s, other, values in then]
+    gaits = [gait, *(other for _, other in changes)]
+    pitch = any(each.needs.pitch for each in gaits)
+    own = robot or fitting_robot(each.needs for each in gaits)
+    body = load_body(own, keys)
+    for each in gaits:
+        each.check(body)
+    run, ground = assemble(
+        {
+            "name": name.removesuffix(".toml").rpartition("/")[2],
+            "robot": body.name,
+            "world": world or gait.world,
+            "motion": "gait",
+            "seed": seed,
+            "time_limit_s": seconds + (60.0 if by == "cpg" else 30.0),
+            "gait": {
+                "name": gait.name,
+                "parameters": gait.params.model_dump(),
+                "duration_s": seconds,
+                "look_heading_rad": look_heading_rad,
+                "look_at_m": look_at_m,
+                "then": [
+                    {"at_s": at_s, "name": g.name, "parameters": g.params.model_dump()}
+                    for at_s, g in changes
+                ],
+                "by": by,
+            },
+            "compliance": known.compliance if known is not None else None,
+        },
+        keys,
+        body,
+    )
+    soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
+    body = with_gains(body, pitch=pitch, soft=soft)
+    prepared = GaitRun(run, body, ground, make_operator)
+    remark = prepared.remark()
+    if remark is not None:
+        LOGGER.warning("%s", remark)
+    return prepared
+
+
+def is_gait(name: str) -> bool:
+    """Whether this is the name of a gait or of a shipped set of its parameters."""
+    return name in GAITS or name in shipped("gaits")
+
+
+def moves_by_gait(name: str) -> bool:
+    """Whether this names a gait, or a run that goes along its waypoints by a gait."""
+    return is_gait(name) or load_run(name).motion == "gait"
+
+
+def gait_by_name(name: str, parameters: dict[str, Any] | None) -> tuple[Gait, GaitSetConfig | None]:
+    """Make a gait by its name or by that of a set of parameters, and return the set."""
+    if name in GAITS:
+        return make_gait(name, parameters), None
+    if not is_gait(name) and not name.endswith(".toml"):
+        raise InputError(
+            f"{name}: no such gait; there are {', '.join(GAITS)}; "
+            f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
+        )
+    known = load_gait(name)
+    return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known

@@ -1,0 +1,59 @@
+"""Interface of the estimators of the friction under the body."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.mechanics.friction_filter import FoundFriction
+
+_NOTABLE = 0.25
+"""Change of a friction since the last report that is reported."""
+
+
+class FrictionEstimator(ABC):
+    """Estimates the friction under a body; call ``update`` once a cycle."""
+
+    def __init__(self, file: FrictionConfig, use: Callable[[FrictionConfig], None]) -> None:
+        self._file, self._use = file, use
+        self._confirmed = 0
+        self._used = self._reported = file
+
+    @abstractmethod
+    def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
+        """Process the body, and the goals (J,) that were sent in the cycle before.
+
+        Returns:
+            The finding, if motion has just been judged; else None.
+
+        """
+
+    def accept(self, found: FoundFriction) -> None:
+        """Use a finding: the estimate if it contradicts the file, else the file's friction."""
+        self._confirmed = 0 if found.differs else self._confirmed + 1
+        friction = found.friction if found.differs else self._file
+        if friction != self._used:
+            self._used = friction
+            self._use(friction)
+
+    @property
+    def confirms_file(self) -> bool:
+        """Whether the newest motion that was judged agrees with the world's file."""
+        return self._confirmed > 0
+
+    def event_text(self) -> str | None:
+        """A line when the friction in use has changed notably since the last one."""
+        used, reported = self._used, self._reported
+        change = max(
+            abs(used.along / reported.along - 1.0), abs(used.across / reported.across - 1.0)
+        )
+        if change < _NOTABLE:
+            return None
+        self._reported, file = used, self._file
+        if used == file:
+            return "the friction found is that of the world's file again"
+        return (
+            f"found {used.along:.2f} along and {used.across:.2f} across the body; the world's file "
+            f"has {file.along:g} and {file.across:g}"
+        )
