@@ -33,6 +33,7 @@ EFFECTS: dict[str, Effect] = {
     "rolling bands, smooth, 40 %": bands(0.4, hard=False),
     "rolling bands, steep, 40 %": bands(0.4, hard=True),
     "rolling bands, steep, 60 %": bands(0.6, hard=True),
+    "JPEG of quality 30": jpeg(30),
     "JPEG of quality 20": jpeg(20),
     "JPEG of quality 10": jpeg(10),
 }

@@ -5,7 +5,7 @@ Three conditions need another comparison, and are recognised in the frame itself
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Self
 
 import cv2
@@ -14,21 +14,22 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.cameras.floor_light import banded_floor, grey_of, lit_floor, unexplained
+from snakewalk.controller.cameras.floor_light import banded_floor, lit_floor, unexplained
 from snakewalk.controller.cameras.pose_tracking import (
     REACH_M,
     BodyPrior,
     StandingOut,
     ToPixels,
     TrackedPose,
+    track_pose,
 )
+from snakewalk.controller.images.compression import Compression, compression_of, without_blocks
 
 _CALM_PX: Final = 200  # fewest pixels away from the body for the noise
-_BLOCK_PX: Final = 8  # of JPEG and of MJPEG
-_BLOCKS: Final = 1.3  # steps between blocks over those within: more is compression (ours)
-_STEP: Final = 4  # grey levels: a larger step is an edge of the scene (ours)
-_ALONE: Final = 3.0  # times the single steps at other columns: more is compression (ours)
-_CLEAR: Final = 0.4  # of the body's contrast; halos of compression have less (ours)
+_CLEAR, _CLEAR_IN_BLOCKS = 0.2, 0.4
+"""Shares of the body's contrast: halos of compression have less, without and with blocks (ours)."""
+_DISAGREES: Final = 0.7
+"""Variance of a pose over the square of its distance from that of the frame with blocks (ours)."""
 DEEP_SHADE: Final = 0.9
 """Share of the light that a hard shadow may remove (ours)."""
 _COLOURLESS: Final = 0.08  # largest spread of a shadow's light over the channels (ours)
@@ -41,7 +42,9 @@ class BodyContrast:
     """The part of a frame around an expected body, and of its floor."""
 
     frame: Image
-    """(h, w[, 3])."""
+    """(h, w[, 3]), of a compressed frame without its blocks."""
+    coded: Image
+    """(h, w[, 3]) as the camera sent it."""
     floors: tuple[Image, ...]
     """(h, w[, 3]) each: a pixel that one of them explains is floor."""
     near: NDArray[np.uint8]
@@ -52,7 +55,7 @@ class BodyContrast:
     radius_px: float
     area_px: float
     """Area of the body."""
-    is_compressed: bool
+    compression: Compression | None
 
     @classmethod
     def around(
@@ -71,7 +74,9 @@ class BodyContrast:
         left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
         right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
         high, wide = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
-        frame = np.ascontiguousarray(image[high, wide])
+        coded = np.ascontiguousarray(image[high, wide])
+        compression = compression_of(image)
+        frame = coded if compression is None else without_blocks(coded, compression)
         line = to_px(prior.links_m) - (left, top)
         metre = float(np.hypot(*np.diff(line, axis=0).T).sum()) / robot.centre_distance_m
         radius = robot.body_radius_m * metre
@@ -79,13 +84,14 @@ class BodyContrast:
         _draw(near, line, 2.0 * reach_m * metre)
         return cls(
             frame,
+            coded,
             tuple(banded_floor(image[high], floor[high])[:, wide] for floor in floors),
             near,
             np.array([left, top], dtype=float),
             to_px,
             radius,
             2.0 * radius * robot.length_m * metre,
-            _is_compressed(image),
+            compression,
         )
 
     def standing_out(self, shade: float) -> StandingOut:
@@ -104,15 +110,16 @@ class BodyContrast:
         low_level = middle + 2.0 * spread
         if body.size <= 0.2 * self.area_px:
             level = 255.0
-        elif self.is_compressed:  # halos are not the body
+        elif self.compression is not None:  # halos are not the body
+            clear = _CLEAR_IN_BLOCKS if self.compression.quality is None else _CLEAR
             strongest = np.sort(apart[self.near > 0])[-int(self.area_px) :]
             level = float(np.median(strongest))
-            low_level = max(low_level, _CLEAR * level)
+            low_level = max(low_level, clear * level)
         else:
             level = float(np.median(body))
         share = (apart - low_level) / max(0.7 * level - low_level, spread)
         share = np.clip(share, 0.0, 1.0) * (self.near > 0)
-        return StandingOut(share.astype(np.float32), self.origin_px, self.to_px, self.is_compressed)
+        return StandingOut(share.astype(np.float32), self.origin_px, self.to_px, self.compression)
 
     def hard_shadow(self, links_m: Floats, shade: float) -> float:
         """Area of dark colourless pixels next to a body at links (L, 2), in body areas.
@@ -136,7 +143,7 @@ class BodyContrast:
     def _lit(self, floor: Image) -> Image:
         """(h, w[, 3]) the floor in the light of the frame, smoothed."""
         ground = np.ascontiguousarray(floor)
-        if not self.is_compressed or self.frame.ndim == 2:
+        if self.compression is None or self.frame.ndim == 2:
             return _smooth(lit_floor(self.frame, ground, self.area_px))
         channels = [  # compression shifts colours over large parts
             lit_floor(
@@ -146,6 +153,25 @@ class BodyContrast:
             for k in range(self.frame.shape[2])
         ]  # fmt: skip
         return _smooth(np.dstack(channels))
+
+
+def confirmed(
+    robot: RobotConfig, contrast: BodyContrast, prior: BodyPrior, found: TrackedPose, shade: float
+) -> TrackedPose:
+    """Return the pose in a compressed frame, less certain if the frame with its blocks disagrees.
+
+    Poses in other frames are returned as they are.
+    """
+    blocks = contrast.compression
+    if found.fault or blocks is None or blocks.quality is None:
+        return found
+    as_coded = replace(contrast, frame=contrast.coded, compression=Compression(None))
+    other = track_pose(robot, as_coded.standing_out(shade), prior, found.time_s)
+    turn = other.heading_rad - found.heading_rad
+    apart = np.append(other.head_m - found.head_m, np.arctan2(np.sin(turn), np.cos(turn)))
+    wider = replace(found, covariance=found.covariance + _DISAGREES * np.outer(apart, apart))
+    too_wide = wider.sigma_m > blocks.sigma_limit * robot.body_radius_m
+    return replace(wider, fault=str(blocks)) if too_wide else wider
 
 
 def links_at(prior: BodyPrior, found: TrackedPose) -> Floats:
@@ -164,20 +190,3 @@ def _smooth(image: Image) -> Image:
 def _draw(mask: NDArray[np.uint8], line_px: Floats, wide_px: float) -> None:
     spots = np.rint(line_px).astype(np.int32).reshape(-1, 1, 2)
     cv2.polylines(mask, [spots], False, 255, max(1, round(wide_px)))
-
-
-def _is_compressed(image: Image) -> bool:
-    """Whether every eighth column of a frame has the largest steps, or the only ones.
-
-    Strong compression leaves most blocks without any step, except to the next block.
-    """
-    grey = grey_of(image[::3]).astype(np.int16)
-    steps = np.minimum(np.abs(np.diff(grey, axis=1)), _STEP)
-    steps = steps[:, : steps.shape[1] // _BLOCK_PX * _BLOCK_PX]
-    mean = np.median(steps.mean(axis=0).reshape(-1, _BLOCK_PX), axis=0)  # scenes have few edges
-    if float(np.median(mean)) > 0.0:
-        return bool(mean[-1] > _BLOCKS * np.median(mean[:-1]))
-    moved = (steps > 0).astype(np.float32)
-    beside = cv2.boxFilter(moved, -1, (_BLOCK_PX - 1, 1), normalize=False)
-    alone = ((moved > 0) & (beside < 1.5)).sum(axis=0).reshape(-1, _BLOCK_PX).sum(axis=0)
-    return bool(alone[-1] > _ALONE * max(float(np.median(alone[:-1])), 1.0))

@@ -11,7 +11,7 @@ from snakewalk.controller.cameras.markers.floor_markers import FEWEST
 from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
 from snakewalk.controller.console.finding import Finding
 
-Lock = Literal["locked", "automatic", "not told"]
+Lock = Literal["locked", "automatic", "not reported"]
 _SLOW: Final = 0.8  # of the requested rate
 _GAP: Final = 3.0  # periods of a frame
 _SEEN: Final = 0.9  # of the pictures: a marker with less is unreliable
@@ -120,7 +120,9 @@ def _lock(name: str, state: Lock) -> Finding:
         return Finding(name, "ok", state)
     if state == "automatic":
         return Finding(name, "warn", state, "lock it, e.g. with v4l2-ctl: a robot changes it")
-    return Finding(name, "warn", "the camera does not report it", "see the light below")
+    return Finding(
+        name, "warn", "the camera does not report whether it is locked", "see the light below"
+    )
 
 
 def _light(report: CameraReport) -> Finding:

@@ -176,12 +176,12 @@ class CameraWatch:
 def device_locks(device: cv2.VideoCapture) -> dict[str, Lock]:
     """Whether exposure and white balance are locked, if Video4Linux reports it."""
     if device.getBackendName() != "V4L2":
-        return {"exposure": "not told", "white balance": "not told"}
+        return {"exposure": "not reported", "white balance": "not reported"}
     exposure: dict[float, Lock] = {1.0: "locked", 0.0: "automatic", 3.0: "automatic"}
     white: dict[float, Lock] = {0.0: "locked", 1.0: "automatic"}
     return {
-        "exposure": exposure.get(device.get(cv2.CAP_PROP_AUTO_EXPOSURE), "not told"),
-        "white balance": white.get(device.get(cv2.CAP_PROP_AUTO_WB), "not told"),
+        "exposure": exposure.get(device.get(cv2.CAP_PROP_AUTO_EXPOSURE), "not reported"),
+        "white balance": white.get(device.get(cv2.CAP_PROP_AUTO_WB), "not reported"),
     }
 
 

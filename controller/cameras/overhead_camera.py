@@ -17,7 +17,12 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.cameras.body_contrast import DEEP_SHADE, BodyContrast, links_at
+from snakewalk.controller.cameras.body_contrast import (
+    DEEP_SHADE,
+    BodyContrast,
+    confirmed,
+    links_at,
+)
 from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
 from snakewalk.controller.cameras.ground_rest import Heights
 from snakewalk.controller.cameras.lens import Lens, projected
@@ -377,6 +382,7 @@ class OverheadDetector:
         shadow = contrast.hard_shadow(links_at(prior, found), self.shade)
         if shadow > _SHADOW:
             found = _next_to_shadow(robot, contrast, prior, found, shadow)
+        found = confirmed(robot, contrast, prior, found, self.shade)
         if self.bump is not None and not self.bump.undone:
             return replace(found, fault=str(self.bump), bump=self.bump)
         px = self.model.in_image(prior.links_m, self.axis_height_m)
@@ -435,7 +441,9 @@ def _next_to_shadow(
     """
     by_colour = track_pose(robot, contrast.standing_out(DEEP_SHADE), prior, found.time_s)
     if not by_colour.fault:
-        return by_colour
+        compressed = contrast.compression is not None  # blocks of colour may look like a shadow
+        better = compressed and not found.fault and found.error_m < by_colour.error_m
+        return found if better else by_colour
     if found.fault or shadow < _LARGE_SHADOW:
         return found
     return replace(found, fault="a hard shadow near the body has its colour; soften the light")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.markers.floor_markers import Bump
+from snakewalk.controller.images.compression import Compression
 from snakewalk.drivers.least_squares import least_squares
 
 REACH_M: Final = 0.10
@@ -31,6 +32,7 @@ _SAMPLES: Final = 17
 _OUTER: Final = 2  # of them, at each end of a section
 _FREE: Final = 0.3  # share of the body's contrast there, without another object (ours)
 _LEAST_FREE: Final = 0.5  # of the sections: with fewer free ones all are used
+_TIP_IN_BLOCKS_M: Final = 0.009  # of a tip in a compressed frame, whose sections are worse (ours)
 _SECTION_M: Final = 0.003  # usual error of a section's middle
 _TIP_M: Final = 0.012  # of a tip: heads and tails differ from the model
 _CAP: Final = 0.4  # of the radius: a tip beyond its link
@@ -39,8 +41,6 @@ _LEAST_SEEN: Final = 0.7  # of the sections
 _LEAST_HALF: Final = 0.5  # of those of each half of the body
 _OFF: Final = 0.3  # of the radius: largest residual of an accepted fit
 _OFF_IN_BLOCKS: Final = 0.2  # the same in a compressed frame (ours)
-_SIGMA_IN_BLOCKS: Final = 0.25  # of the radius: largest standard deviation there (ours)
-_TOO_COMPRESSED: Final = "the frame is compressed too strongly; raise the camera's JPEG quality"
 _TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
 _NO_TIP: Final = "a tip of the body is not where it must be"
 _BOTH: Final = np.array([False, False])
@@ -101,8 +101,8 @@ class StandingOut:
     origin_px: Floats
     """(2,) x, y of its first pixel in the frame."""
     to_px: ToPixels
-    is_compressed: bool = False
-    """Whether compression has blurred the colours of the frame over blocks."""
+    compression: Compression | None = None
+    """Compression of a frame whose colours are blurred over blocks; None for other frames."""
 
     def at(self, places_m: Floats) -> Floats:
         """(...,) share at places (..., 2)."""
@@ -126,7 +126,12 @@ def track_pose(
     if not found.fault:
         return found
     start = _search(seen, chain.places_m, chain.middle_m, robot.body_radius_m)
-    return _fit(robot, seen, chain, time_s, start)
+    found = _fit(robot, seen, chain, time_s, start)
+    blocks = seen.compression
+    if found.fault and blocks is not None and blocks.explains_faults:
+        own = found.fault == str(blocks)
+        return replace(found, fault=str(blocks) if own else f"{found.fault}; {blocks}")
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,13 +215,14 @@ def _look(
     sections, ends = (width > _THIN) & (width < _THICK), ends & ~hidden
     free = _outside(value[:count].reshape(section_spots.shape[:2])) < _FREE
     used = sections & free
-    if wide != _NARROW or used.mean() < _LEAST_FREE or seen.is_compressed:
+    if wide != _NARROW or used.mean() < _LEAST_FREE or seen.compression is not None:
         used = sections
+    tip_m = _TIP_M if seen.compression is None else _TIP_IN_BLOCKS_M
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
     rows = np.concatenate([
-        _rows(here, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / _TIP_M
+        _rows(here, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / tip_m
     ])  # fmt: skip
-    target = np.concatenate([across[used] / _SECTION_M, along[ends] / _TIP_M])
+    target = np.concatenate([across[used] / _SECTION_M, along[ends] / tip_m])
     return _Look(across, sections, used, along, ends, rows, target)
 
 
@@ -269,7 +275,8 @@ def _fit_tips(
     heading = chain.heading_rad + turn
     off_m = look.across[look.used]
     error_m = float(np.sqrt(np.mean(off_m**2))) if off_m.size else np.inf
-    alike = _ALIKE_IN_BLOCKS if seen.is_compressed else _ALIKE
+    blocks = seen.compression
+    alike = _ALIKE if blocks is None else _ALIKE_IN_BLOCKS * blocks.widening**2
     found = TrackedPose(
         time_s,
         head,
@@ -278,10 +285,11 @@ def _fit_tips(
         _covariance(robot, look, head - chain.middle_m - shift, alike),
         _fault(robot, look, error_m, shift),
     )
-    vague = max(error_m / _OFF_IN_BLOCKS, found.sigma_m / _SIGMA_IN_BLOCKS) > robot.body_radius_m
-    if seen.is_compressed and vague and not found.fault:
-        return replace(found, fault=_TOO_COMPRESSED)
-    return found
+    if blocks is None or found.fault:
+        return found
+    radius_m = robot.body_radius_m
+    vague = error_m > _OFF_IN_BLOCKS * radius_m or found.sigma_m > blocks.sigma_limit * radius_m
+    return replace(found, fault=str(blocks)) if vague else found
 
 
 def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -> Floats:

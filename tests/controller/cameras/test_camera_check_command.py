@@ -101,7 +101,7 @@ def test_a_film_is_looked_through_in_its_own_time(film: Path) -> None:
     assert float(str(found["moved_px"])) < 0.2
     assert float(str(found["residual_mm"])) < 3.0
     assert found["latency_ms"] is None
-    assert found["exposure"] == "not told"
+    assert found["exposure"] == "not reported"
     few = film / "few.toml"
     few.write_text(table + MARKERS.format(-1.2, 1.2).replace("12 =", "13 =").replace("7 =", "8 ="))
     code, found = call(str(few), "--device", str(film / "film.avi"))
@@ -171,7 +171,7 @@ def test_a_good_camera_is_told_so() -> None:
         (replace(GOOD, bump=Bump((4.0, 0.0))), LOCKED, "place", "warn", "moved by 4.0 px"),
         (replace(GOOD, bump=Bump((9.0, 0.0), undone=False)), LOCKED, "place", "fail", "up again"),
         (GOOD, {"exposure": "automatic"}, "exposure", "warn", "lock it"),
-        (GOOD, {"exposure": "not told"}, "exposure", "warn", "does not report"),
+        (GOOD, {"exposure": "not reported"}, "exposure", "warn", "does not report"),
         (replace(GOOD, light_spread=0.1), LOCKED, "light", "warn", "10.0 %"),
         (replace(GOOD, latency=None), LOCKED, "latency", "warn", "--port"),
         (replace(GOOD, latency=LatencyFit(0.0, 0.0, 0.0, "why")), LOCKED, "latency", "warn", "why"),
@@ -212,8 +212,8 @@ class Device:
     [
         (Device("V4L2", 1.0, 0.0), "locked", "locked"),
         (Device("V4L2", 3.0, 1.0), "automatic", "automatic"),
-        (Device("V4L2", -1.0, -1.0), "not told", "not told"),
-        (Device("FFMPEG", 0.0, 0.0), "not told", "not told"),
+        (Device("V4L2", -1.0, -1.0), "not reported", "not reported"),
+        (Device("FFMPEG", 0.0, 0.0), "not reported", "not reported"),
     ],
 )
 def test_locks_are_those_of_video4linux(device: Device, exposure: str, white: str) -> None:

@@ -10,11 +10,11 @@ import pytest
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.cameras.body_contrast import _is_compressed
 from snakewalk.controller.cameras.floor_light import banded_floor
 from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDetector
 from snakewalk.controller.cameras.pose_fit import fit_both_ends
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
+from snakewalk.controller.images.compression import compression_of, without_blocks
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.drivers.types import BodyPose
 from tests.oracles.overhead_scene import DrawnView
@@ -136,11 +136,40 @@ def test_compression_is_noticed_even_if_most_blocks_have_one_level(quality: int)
     floor += np.random.default_rng(3).normal(0.0, 3.0, floor.shape)
     floor[60:75, 40:240] = 60.0
     coded = cv2.imencode(".jpg", sensed(floor), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-    assert _is_compressed(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)))
-    assert not _is_compressed(sensed(floor))
+    assert compression_of(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR))) is not None
+    assert compression_of(sensed(floor)) is None
 
 
 def test_a_frame_without_noise_is_not_taken_for_a_compressed_one() -> None:
     x, y = np.meshgrid(np.arange(320.0), np.arange(240.0))
     ramp = np.floor(100.0 + 0.11 * x + 0.07 * y)
-    assert not _is_compressed(sensed(np.dstack([ramp] * 3)))
+    assert compression_of(sensed(np.dstack([ramp] * 3))) is None
+
+
+@pytest.mark.parametrize("quality", [5, 10, 15, 20, 30])
+def test_a_compressed_frame_shows_its_quality_and_is_closer_without_blocks(quality: int) -> None:
+    pose, bend, frame, chance = next(poses(11))
+    view = View.of(ROBOT, MODEL, pose, bend, frame)
+    coded = sensed(jpeg(quality)(view, chance))
+    found = compression_of(coded)
+    assert found is not None
+    assert found.quality == quality
+    smooth = without_blocks(coded, found)
+    near = np.full(frame.shape[:2], 255, np.uint8)
+    cv2.polylines(near, [np.rint(view.axis_px).astype(np.int32)], False, 0)
+    close = cv2.distanceTransform(near, cv2.DIST_L2, 5) < 12.0
+    before, after = (
+        float(np.square(one[close].astype(float) - frame[close]).mean()) for one in (coded, smooth)
+    )
+    assert after < 0.97 * before
+
+
+@pytest.mark.parametrize("quality", [8, 10, 14, 18])
+def test_no_pose_of_a_strongly_compressed_frame_is_used_and_wrong(quality: int) -> None:
+    """Rejected frames state the compression, its quality and the remedy."""
+    results = tracked(jpeg(quality), 12)
+    used = [np.hypot(*error[:2]) for error, found in results if not found.fault]
+    assert max(used, default=0.0) < 0.01
+    faults = [found.fault for _, found in results if found.fault]
+    assert all(f"JPEG quality about {quality}); set the camera's" in one for one in faults)
+    assert quality > 16 or len(faults) == POSES
