@@ -22,7 +22,7 @@ from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
-from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, own_file
+from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, user_file
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.port.byte_port import BytePort
@@ -124,7 +124,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
 
 def _fingerprint_file(run: RunConfig) -> FingerprintFile | None:
     """Fingerprints of the servos, next to the robot's file; None for a shipped robot."""
-    path = own_file(run.robot)
+    path = user_file(run.robot)
     return None if path is None else FingerprintFile(path)
 
 

@@ -42,7 +42,7 @@ class PathRun(GroundedRun):
                 f"{where} is outside the world, {wide_m[0]:.1f} m by {wide_m[1]:.1f} m"
             )
         obstacle = self.world.obstacle
-        if obstacle is not None and obstacle.stands_at(x_m, y_m):
+        if obstacle is not None and obstacle.is_blocked_at(x_m, y_m):
             raise InputError(f"{where} is in the world's obstacle, the {obstacle.kind}")
 
     def on_map(self, points_m: Floats) -> Bools:
