@@ -8,12 +8,18 @@ from pathlib import Path
 from pydantic import BaseModel
 from sphinx.application import Sphinx
 
-sys.path.insert(0, str(Path(__file__).parent))  # notebook_page
+sys.path.insert(0, str(Path(__file__).parent))  # notebook_page, reference_pages
 project = "snakewalk"
 author = "the authors of snakewalk"
 copyright = "Apache-2.0"
 version = release = installed("snakewalk")
-extensions = ["myst_parser", "notebook_page", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_parser",
+    "notebook_page",
+    "reference_pages",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["tables"]
 nitpicky = True

@@ -16,7 +16,9 @@ from snakewalk.controller.cli.command_line import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-COMMAND = re.compile(r"^ *(?:\$ )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE)
+COMMAND = re.compile(
+    r"^ *(?:\$ |\. \.venv/bin/activate && )?(snakewalk (?:.*\\\n)*.*)$", re.MULTILINE
+)
 
 
 def printed(page: Path) -> list[str]:

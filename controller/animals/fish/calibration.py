@@ -1,8 +1,8 @@
-"""The model's size and sections from the film itself, [TH] 3.2.3, without a fish that holds still.
+"""Size and sections of the model from the film, [TH] 3.2.3, for a moving fish.
 
-The text films a straight fish and grows a small model until it fits best. Here the posture is
-searched in a few frames, and the width is measured on the silhouettes along the spines found.
-Length, width and pectoral fins are scaled to the largest V; all of it twice.
+The text grows a model on a straight fish. Here the posture is searched in a few frames, and the
+width is measured on the silhouettes along these spines. Length, width and pectoral fins are scaled
+to the largest V; all of it twice.
 """
 
 from dataclasses import replace

@@ -1,8 +1,7 @@
-"""The first posture of a search: the silhouette's skeleton, with the head at either end.
+"""First posture of a search: the silhouette's skeleton, with the head at either end.
 
-[TH] 3.3.1 uses the displacement of the silhouette's centre from the first frame to the second as
-the direction of the head. A fish at rest has no displacement, and one that backs has the wrong one,
-so the build decides: both orientations are matched, and the better one is kept.
+[TH] 3.3.1 derives the head from the displacement between the first two frames. This fails for a
+fish at rest or backward, so both orientations are matched, and the better one is kept.
 """
 
 import cv2

@@ -1,7 +1,6 @@
-"""A whole film, one camera or two, to postures: calibrate, then track from frame to frame.
+"""Postures of a complete film of one or two cameras: calibration, then tracking.
 
-The last posture is the start of the next search; a lost fish is searched again in the complete
-frame.
+The last posture starts the next search; a lost fish is searched again in the complete frame.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -139,16 +138,15 @@ def track_film(
 ) -> Iterator[TrackedFrame]:
     """Match every frame.
 
-    A search starts from three postures. They are the last one moved on by the last step ([TH]:
-    around the prolongation of the head), the last one itself, and the silhouette's skeleton with
-    its head at the same end. The third one finds a fish that beats its tail fast. Where V falls
-    below ``LEAST_VALUE`` the head may be at either end again.
+    A search starts from three postures: the last one moved by the last step ([TH]), the last one,
+    and the silhouette's skeleton with its head at the same end. The third one finds a fish with a
+    fast tail. Where V falls below ``LEAST_VALUE`` the head may be at either end again.
 
     Args:
         frames: grey pictures and silhouettes.
         model: the calibrated fish.
-        travel: (2,) displacement of the fish in the first frames, x right and y up; decides which
-            end is the head where the build does not.
+        travel: (2,) displacement of the fish in the first frames, x right and y up; it decides
+            which end is the head where the build does not.
 
     """
     last: Floats | None = None

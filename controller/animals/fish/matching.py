@@ -100,8 +100,8 @@ class Target:
 def _edges(grey: Image, area: Image, width_px: int) -> Image | None:
     """Canny edges near the silhouette's rim, ``width_px`` wide; None without edges.
 
-    Thresholds come from the contrast between fish and surroundings. Marks on the back and marks on
-    the ground are edges too, but of no outline: only those near the rim count.
+    Thresholds come from the contrast between fish and surroundings. Only edges near the rim count,
+    because marks on back and ground have edges, too.
     """
     inside = area > 127
     if not inside.any() or inside.all():

@@ -1,8 +1,8 @@
-"""The deformable fish: a rigid head, a spine of a few angles, an elliptic section at each place.
+"""The deformable fish: a rigid head, a spine of a few angles, elliptic sections.
 
-[TH] 3.2.2 has five skeleton pieces, the angles A0..A3 between them, and a skin of NURBS.
-Here each angle is spread evenly over the piece length around its joint: the tangent of a quadratic
-B-spline on that skeleton, but of constant length and linear in the angles.
+[TH] 3.2.2 has five skeleton pieces, the angles A0..A3, and a skin of NURBS. Here each angle is
+spread evenly over the piece length around its joint: the tangent of a quadratic B-spline, of
+constant length and linear in the angles.
 """
 
 from dataclasses import dataclass, field, replace
@@ -70,7 +70,7 @@ class FishModel:
     ) -> Floats:
         """(STATIONS, 3) points of the spine, snout first: x, y of the top view, and height.
 
-        ``base_px`` (2,) or (3,) is where the base of the head is; pitch lifts the head, and turns
+        ``base_px`` (2,) or (3,) is the base of the head; pitch lifts the head, and turns
         the whole fish about its base.
         """
         tangents = self.tangents_rad(head_rad, angles_rad)

@@ -1,7 +1,7 @@
-"""Coordinate search: each parameter in turn, then a leap along what helped, then smaller steps.
+"""Coordinate search: each parameter in turn, a leap along the improvement, smaller steps.
 
 [TH] 3.3.3 changes position and head angle on a grid of 3 px and 3 degrees, then of 1, then the
-spine angles in turn. This is that, with the leap of Hooke and Jeeves.
+spine angles in turn; the leap is that of Hooke and Jeeves.
 """
 
 from collections.abc import Callable

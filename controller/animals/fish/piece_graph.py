@@ -1,9 +1,8 @@
-"""Which segment may follow which, [TH] 4.2.1, also where the rule permits none.
+"""Successors of each segment, [TH] 4.2.1, also where the rule permits none.
 
-A segment follows another where the speed at the end of one and at the beginning of the other fall
-into the same of three classes. The text draws at random until a permitted one comes up; where none
-is permitted that never ends. Here a segment that only leads to dead ends is avoided as long as
-there is another, and at a dead end the segment of the nearest speed follows, and is counted.
+A segment may follow another if the speeds at their joint fall into the same of three classes. The
+text draws at random until a permitted one appears, which may never end. Here segments without a way
+on are avoided; after one, the segment of the nearest speed follows, and is counted.
 """
 
 from dataclasses import dataclass

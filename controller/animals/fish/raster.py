@@ -1,8 +1,7 @@
-"""The model as the camera would see it: filled areas and outlines on a small grey canvas.
+"""The model as the camera sees it: filled areas and outlines on a small grey canvas.
 
-Coordinates are pixels of the full frame, x to the right and y *up* (minus the row), so that angles
-turn to the left as everywhere else. Edges of areas are shaded by the share of the pixel covered, so
-that a score changes smoothly when the model moves by less than a pixel.
+Coordinates are pixels of the full frame, x to the right and y *up* (minus the row). Edges of areas
+are shaded by their share of the pixel, so that a score changes smoothly with the model.
 """
 
 from dataclasses import dataclass

@@ -14,8 +14,8 @@ PICTURES = Path(__file__).resolve().parents[1]
 SIZE = 240, 135
 CROPS = {
     "simulation": ("traverse.jpg", (0.06, 0.13, 0.5, 1.0)),
-    "bench": ("view.jpg", (0.1, 0.05, 1.0, 0.95)),
-    "rehearsal": ("view-two.jpg", (0.25, 0.3, 0.85, 0.95)),
+    "bench": ("view.jpg", (0.27, 0.1, 1.0, 0.88)),
+    "rehearsal": ("view-two.jpg", (0.08, 0.2, 0.7, 0.86)),
     "animals": ("capture-worm.jpg", (0.0, 0.0, 0.5, 0.45)),
 }
 """Picture of the site, and left, top, right and bottom of the part that is shown."""
