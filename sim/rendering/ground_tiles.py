@@ -175,7 +175,7 @@ def _mesh(ground: HeightField, j: Ints, i: Ints, error_m: float, skirt_m: float)
     column, row = np.meshgrid(i, j)
     x, y = ground.x0_m + ground.spacing_m * column, ground.y0_m + ground.spacing_m * row
     top = np.stack([x, y, ground.z_m[row, column]], axis=-1).reshape(-1, 3)
-    slope_y, slope_x = np.gradient(ground.z_m, ground.spacing_m)
+    slope_y, slope_x = (np.gradient(ground.z_m, ground.spacing_m, axis=axis) for axis in (0, 1))
     normal = np.stack([-slope_x[row, column], -slope_y[row, column], np.ones(x.shape)], axis=-1)
     normal = (normal / np.linalg.norm(normal, axis=-1, keepdims=True)).reshape(-1, 3)
     number = np.arange(top.shape[0]).reshape(len(j), len(i))
