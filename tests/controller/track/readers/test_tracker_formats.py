@@ -117,7 +117,7 @@ def test_one_frame_is_told_as_such_and_not_as_a_low_score(tmp_path: Path) -> Non
     dlc_csv(tmp_path / "a.csv")
     rows = (tmp_path / "a.csv").read_text().splitlines()
     (tmp_path / "one.csv").write_text("\n".join(rows[:4]) + "\n")
-    with pytest.raises(InputError, match="1 frames are no motion; give a longer film"):
+    with pytest.raises(InputError, match="holds 1 frame; two or more are needed"):
         load_file(tmp_path / "one.csv", RATE_HZ)
 
 
