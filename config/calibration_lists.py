@@ -31,9 +31,9 @@ def read_json_lists(file: Path) -> dict[str, Any] | None:
     except ValueError as error:
         if "//" in text or "/*" in text:
             return None
-        raise InputError(f"{file}: is no JSON: {error}; correct it") from None
+        raise InputError(f"{file}: cannot be read as JSON: {error}; correct it") from None
     if not isinstance(held, dict):
-        raise InputError(f"{file}: is no JSON object; it needs a name for each matrix")
+        raise InputError(f"{file}: lacks names of its matrices; write a JSON object")
     lists: dict[str, Any] = {}
     for name, value in held.items():
         if isinstance(value, dict) and isinstance(value.get("data"), str):

@@ -89,6 +89,7 @@ def slowing(demand: Demand, speed_limit_rad_s: float, acceleration_limit_rad_s2:
 
 def _smooth(joints_rad: Floats, width: float) -> Floats:
     """Smooth over time; the ends are continued point-symmetrically, without a kink."""
+    width = min(width, len(joints_rad))  # a still body has a wave of no frequency
     room = min(int(np.ceil(4.0 * width)), len(joints_rad) - 1)
     if room == 0:
         return joints_rad

@@ -1,6 +1,7 @@
 """``snakewalk fish synthesise``: new motion from segments of a film."""
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -144,6 +145,11 @@ def _points(words: list[str]) -> list[tuple[float, ...]]:
         found.append(point)
     if len({len(point) for point in found}) > 1:
         raise InputError("--through: give the height of all control points, or of none")
+    for number, (one, other) in enumerate(pairwise(found), 1):
+        if one == other:
+            raise InputError(
+                f"--through: control points {number} and {number + 1} are the same; remove one"
+            )
     return found
 
 
@@ -152,6 +158,11 @@ def _tank(word: str | None) -> tuple[float, float, float, float] | None:
     if word is None:
         return None
     x0, y0, x1, y1 = _numbers("--tank", word, 4, "XMIN,YMIN,XMAX,YMAX, as in -2,-2,6,4")
+    if max(x1 - x0, y1 - y0) < 1.0:
+        raise InputError(
+            f"--tank {word}: no wall is as long as the fish, whose length is 1; give "
+            "XMIN,YMIN,XMAX,YMAX in body lengths"
+        )
     return x0, y0, x1, y1
 
 

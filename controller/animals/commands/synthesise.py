@@ -129,6 +129,7 @@ def synthesise(
     as_json: Json = False,
 ) -> None:
     """Make an animal's motion over a world: a snake from states ([PT]), or legs ([KP])."""
+    record = None if tongue is None or animal is not None else TongueRecord.read(tongue)
     prepared = prepare_walk(
         run, keys=key_values("--set", set_), on_paper=True, seed=seed, motion=motion, robot=robot,
         world=world, track=track,
@@ -147,7 +148,7 @@ def synthesise(
     if animal is None:
         if feet is not None:
             raise InputError(f"--feet {feet}: is for animals with legs; add --animal")
-        facts, complete = _snake(prepared, frames, look, tongue, files)
+        facts, complete = _snake(prepared, frames, look, record, files)
     else:
         kept = {"--motion": motion, "--track": track, "--tongue": tongue}
         kept["--look"] = None if look == "animal" else look
@@ -168,7 +169,7 @@ def _snake(
     prepared: WalkRun,
     frames: int | None,
     look: str,
-    tongue: Path | None,
+    tongue: TongueRecord | None,
     files: Mapping[str, Path],
 ) -> tuple[dict[str, object], bool]:
     """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
@@ -179,8 +180,7 @@ def _snake(
         worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
     elif look != ANIMAL:
         raise InputError(f"--look {look}: is for --film and --glb")
-    record = None if tongue is None else TongueRecord.read(tongue)
-    made = SnakeSynthesis(prepared, record).synthesise(frames)
+    made = SnakeSynthesis(prepared, tongue).synthesise(frames)
     with atomic_write(files["track"]) as part:
         made.save(part, files["track"].stem, f"snakewalk synthesise of {prepared.run.track}")
     draw_walk(

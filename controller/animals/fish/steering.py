@@ -47,8 +47,10 @@ def steered(
     head, pitch = motion.head_rad.copy(), np.zeros(motion.frames)
     samples = round(_SEARCH_S * motion.rate_hz)
     begin, at, turned = 0, [], 0.0
-    for point, guess in zip(points, reached_at, strict=True):
-        window = np.arange(max(begin + 1, guess - samples), min(guess + samples + 1, motion.frames))
+    for number, (point, guess) in enumerate(zip(points, reached_at, strict=True), 1):
+        # each later point needs a later frame
+        end = min(guess + samples + 1, motion.frames - (len(points) - number))
+        window = np.arange(min(max(begin + 1, guess - samples), end - 1), end)
         frame = int(window[np.argmin(np.linalg.norm(place[window] - point, axis=1))])
         missing = point - place[frame]
         if np.linalg.norm(missing) > radius:

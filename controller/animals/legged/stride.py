@@ -248,7 +248,7 @@ def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
     low = 1.0 / time_s[-1]
     tried = np.arange(low, _MOST_HZ * rate_hz, 0.25 * low)
     if len(tried) == 0:
-        raise InputError(f"{len(ahead)} frames are too few")
+        raise InputError(f"{len(ahead)} frames are too few for a stride; give a longer film")
     costs = [unexplained(f) for f in tried]
     best = float(tried[int(np.argmin(costs))])
     bounds = max(best - 0.3 * low, 0.5 * low), best + 0.3 * low

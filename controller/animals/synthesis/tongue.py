@@ -66,7 +66,7 @@ class TongueRecord:
         try:
             time_s, value = np.array([[float(row["time_s"]), float(row[kind])] for row in rows]).T
         except (TypeError, ValueError):
-            raise InputError(f"{file}: a cell is not a number; remove its row") from None
+            raise InputError(f"{file}: a cell is not a number; fill it in") from None
         steps = np.diff(time_s)
         if len(rows) < 3 or steps.min() <= 0.0 or np.ptp(steps) > 0.05 * np.median(steps):
             raise InputError(f"{file}: time_s must rise evenly over three rows or more")

@@ -142,6 +142,8 @@ class Keypoints:
         """
         file, least = self.file, self.least_score
         places = self.places[:, order]
+        if len(places) < 2:
+            raise InputError(f"{file}: holds {len(places)} frame; two or more are needed")
         if self.scores is None and least > 0.0:
             raise InputError(f"{file}: holds no scores to compare with a least score of {least}")
         if self.scores is not None:

@@ -144,8 +144,10 @@ def test_what_is_no_calibration_is_refused(tmp_path: Path) -> None:
     assert "K1 or M1" in fault("b.yml", "%YAML:1.0\n---\na: 3\n")
     assert "holds no K1 or M1" in fault("c.json", '{"R": [1, 2]}')
     assert "K1 is not a list of numbers or of rows" in fault("d.json", '{"K1": [[1, 2], [3]]}')
-    assert "e.json: is no JSON: Expecting value: line 1 column 12" in fault("e.json", '{"K1": [1, ')
-    assert "l.json: is no JSON object" in fault("l.json", "[1, 2]")
+    assert "e.json: cannot be read as JSON: Expecting value: line 1 column 12" in fault(
+        "e.json", '{"K1": [1, '
+    )
+    assert "l.json: lacks names of its matrices" in fault("l.json", "[1, 2]")
     text = '{"K1": "abc", "K2": [1], "R": [1], "T": [1]}'
     assert "K1 holds no numbers" in fault("t.json", text)
     text = text.replace('"abc"', "[1]").replace('"T": [1]', '"T": "x"')

@@ -138,3 +138,12 @@ def test_speed_asks_for_its_ratio_and_acceleration_for_the_root() -> None:
     assert slow.where_needed == pytest.approx((1 + 2 + 4 + 1) / 4)
     easy = slowing(Demand(np.array([0.5]), np.array([1.0]), 0.5), 2.0, 25.0)
     assert (easy.throughout, easy.where_needed) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("wave_hz", [0.0, 1e-18, 1e-6])
+def test_a_body_that_does_not_move_demands_nothing(wave_hz: float) -> None:
+    """Its wave has a frequency of rounding errors, for which the filter was as wide as memory."""
+    still = np.tile(np.linspace(-0.4, 0.4, 8), (40, 1))
+    demand = joint_demand(still, np.arange(40) / 25.0, 25.0, wave_hz)
+    assert demand.speed_rad_s.max() == pytest.approx(0.0, abs=1e-9)
+    assert slowing(demand, 2.0, 20.0).throughout == 1.0

@@ -129,6 +129,10 @@ def test_bad_input_is_one_line(tmp_path: Path) -> None:
     assert "of all control points" in refused("synthesise", tmp_path / "p.npz", *mixed, *out)
     assert "X,Y,Z" in refused("synthesise", tmp_path / "p.npz", "--through", "1,2,3,4", *out)
     assert "X,Y,Z" in refused("synthesise", tmp_path / "p.npz", "--through", "1,nan", *out)
+    twice = ("--through", "1,2", "--through", "1,2")
+    assert "points 1 and 2 are the same" in refused("synthesise", tmp_path / "p.npz", *twice, *out)
+    small = ("--tank=-0.2,-0.2,0.3,0.3",)
+    assert "as long as the fish" in refused("synthesise", tmp_path / "p.npz", *small, *out)
     assert "straight or commonest" in refused(
         "synthesise", tmp_path / "p.npz", "--reference", "bent", *out
     )

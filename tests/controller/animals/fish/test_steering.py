@@ -96,3 +96,16 @@ def test_a_fish_stays_in_its_tank() -> None:
     assert made.facts.wall_distance > 0.0
     with pytest.raises(InputError, match="does not start inside"):
         synthesise_motion(TRUTH, SynthesisOptions(through=[], tank=(1.0, 1.0, 2.0, 2.0)))
+
+
+def test_points_at_the_end_of_a_motion_have_frames_of_their_own() -> None:
+    """Two points near each other took the last frame for the first, and none was left."""
+    motion = compose(
+        piece_graph(TRUTH, segment_motion(TRUTH)),
+        sequence_through(piece_graph(TRUTH, segment_motion(TRUTH)), np.array([[2.0, 0.0]]),
+                         radius=1.0),
+    )  # fmt: skip
+    last = motion.frames - 1
+    ahead = motion.base[last] + 0.01 * (motion.base[last] - motion.base[last - 1])
+    found = steered(motion, np.array([ahead, ahead + 1e-3]), (last, last), 0.5)
+    assert found.reached_at == (last - 1, last)

@@ -113,6 +113,14 @@ def test_what_a_tracker_was_not_sure_of_is_missing(tmp_path: Path) -> None:
             load_file(tmp_path / name, RATE_HZ, 0.95)
 
 
+def test_one_frame_is_told_as_such_and_not_as_a_low_score(tmp_path: Path) -> None:
+    dlc_csv(tmp_path / "a.csv")
+    rows = (tmp_path / "a.csv").read_text().splitlines()
+    (tmp_path / "one.csv").write_text("\n".join(rows[:4]) + "\n")
+    with pytest.raises(InputError, match="holds 1 frame; two or more are needed"):
+        load_file(tmp_path / "one.csv", RATE_HZ)
+
+
 def test_sleap_analysis(tmp_path: Path) -> None:
     sleap_h5(tmp_path / "one.h5")
     assert same(load_file(tmp_path / "one.h5", 20.0)).dropped == 0
