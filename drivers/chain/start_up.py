@@ -119,11 +119,16 @@ def inspect(
         on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
         missing = [str(i) for i in on_it if i in asked and i not in found]
         if missing:
-            text = (
-                f"{part.port.name}: no answer from servo {', '.join(missing)} of "
-                f"{_ids_in_words(on_it)} at {part.port.getBaudRate()} baud: "
-                "power, cable, id or baud rate"
-            )
+            port, baud = part.port.name, part.port.getBaudRate()
+            whole = _ids_in_words(on_it)
+            text = f"{port}: no answer from servo {', '.join(missing)} of {whole} at {baud} baud: "
+            text += "power, cable, id or baud rate"
+            if len(missing) == len(on_it) > 1:
+                text = (
+                    f"{port}: no answer from any of the servos {whole} at {baud} baud: power, "
+                    f"cable, baud rate or another make; snakewalk scan --port {port} lists the "
+                    "servos that reply"
+                )
             faults.append(ChainFault(FaultCause.NO_ANSWER, text))
     servos, others = [], defaultdict[tuple[str, str], list[int]](list)
     for servo_id, servo in found.items():

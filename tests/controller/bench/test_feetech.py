@@ -15,6 +15,7 @@ from snakewalk.controller.bench.eeprom_backup import back_up, plan_restore
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.servo_settings import SettingsRequest, apply, open_servo, plan
 from snakewalk.controller.console.finding import Finding
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import ChainError
@@ -67,6 +68,18 @@ def test_servos_of_another_series_are_named(bus: str, robot: str) -> None:
     with pytest.raises(ChainError) as info:
         chain.enable()
     assert info.value.faults == (f"servos 1 to 12: are {bus}, not {robot}",)
+
+
+def test_a_bus_of_another_make_is_named_as_a_cause() -> None:
+    """A run without --robot on a Feetech bus listed 16 IDs and did not name this cause."""
+    robot = load_robot("yaw16")
+    line = a_line()
+    with pytest.raises(ChainError) as info:
+        ServoChain(DynamixelBus(line, robot.servo.model), robot).enable()
+    assert info.value.faults == (
+        f"{line.name}: no answer from any of the servos 1 to 16 at 1000000 baud: power, cable, "
+        f"baud rate or another make; snakewalk scan --port {line.name} lists the servos that reply",
+    )
 
 
 def test_the_doctor_finds_nothing_on_a_new_chain_and_names_no_dynamixel() -> None:
