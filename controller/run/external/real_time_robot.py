@@ -102,7 +102,7 @@ class RealTimeRobot:
 
 
 def _serve(line: Connection, robot: RobotConfig, world: WorldConfig) -> None:
-    """Serve until the line is closed; the first message is the device, or why there is none."""
+    """Serve until the line is closed; the first message is the device, or an ``InputError``."""
     try:
         served = ServedRobot(robot, world, Place(), Serving())
         server = PtyServer(served.line, WallClock())
