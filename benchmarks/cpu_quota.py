@@ -61,6 +61,8 @@ class Outcome:
     cycles: int
     late: int
     """Deadlines that passed without a cycle."""
+    waited: int
+    """Of them, those in cycles that waited for replies of the served servos."""
     late_at_s: tuple[float, ...]
     """Times of the first ten of them, from the first cycle."""
     lateness_ms: tuple[float, float, float]
@@ -98,6 +100,7 @@ def table(outcome: Outcome) -> str:
         "CPU time until the first logged cycle, s": f"{outcome.start_cpu_s:.1f}",
         "cycles": f"{outcome.cycles:,}",
         "late cycles (deadlines that passed)": f"{outcome.late:,}",
+        "of them, in cycles that waited for replies": f"{outcome.waited:,}",
         "their times, at most ten, s": ", ".join(f"{t:.1f}" for t in outcome.late_at_s) or "none",
         "began late: median, 99 %, most, ms": f"{median:.2f}, {nearly_all:.2f}, {most:.2f}",
         "CPU time of a cycle, ms": f"{outcome.cpu_ms:.2f}",
@@ -149,6 +152,7 @@ def measured(seconds: float, limiter: str) -> Outcome:
             start_cpu_s,
             len(late_ms),
             int(skipped.sum()),
+            int(skipped[~record.cycle.valid[:-1].all(axis=1)].sum()),
             tuple(float(time_s) for time_s in late_at_s),
             (float(np.median(late_ms)), float(np.quantile(late_ms, 0.99)), float(late_ms.max())),
             1e3 * used_s / window_s * record.period_s,

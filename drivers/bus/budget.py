@@ -47,6 +47,8 @@ class WireBudget:
     """All servos' replies."""
     return_delay_s: float
     """Sum over the replies."""
+    may_be_fast: bool = True
+    """Whether the servos have fast reads."""
 
     @property
     def total_bytes(self) -> int:
@@ -86,7 +88,7 @@ class WireBudget:
 
         """
         if self.share(rate_hz) > 1.0:
-            fast = "" if self.fast else ", use fast sync read"
+            fast = ", use fast sync read" if self.may_be_fast and not self.fast else ""
             raise BudgetError(
                 f"{rate_hz:g} Hz: a cycle of {self.servos} servos at {self.baud} baud occupies "
                 f"the wire for {self.cycle_s * 1e3:.2f} ms, which allows at most "
@@ -183,7 +185,7 @@ def _feetech_budget(facts: ServoModel, servos: int, baud: int) -> WireBudget:
     for length in (block, max(_FEETECH_SUPPLY_BYTES, CHECK_BYTES)):
         requests, replies = feetech.wire_bytes(facts, servos, length)
         request, reply = request + requests, reply + replies
-    return WireBudget(servos, baud, False, goal, request, reply, 0.0)
+    return WireBudget(servos, baud, False, goal, request, reply, 0.0, may_be_fast=False)
 
 
 def _port_budget(servos: int, baud: int, *, fast: bool, with_imu: bool) -> WireBudget:

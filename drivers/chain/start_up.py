@@ -5,6 +5,7 @@ counts.
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import PingReply
 from snakewalk.drivers.chain.chain_settings import (
@@ -57,6 +59,8 @@ _SETTINGS = (
     *("Goal PWM", "Position P Gain", *SHAPING_SETTINGS, IDENTITY),
 )
 """Registers that ``configure`` checks."""
+_FEW = 3
+"""Up to this number of servos of another model, each has a line of its own (ours)."""
 ALL_REPLY = 2
 """Status Return Level(68)."""
 
@@ -115,24 +119,26 @@ def inspect(
         on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
         missing = [str(i) for i in on_it if i in asked and i not in found]
         if missing:
-            text = (
-                f"{part.port.name}: no answer from servo {', '.join(missing)} of "
-                f"{_ids_in_words(on_it)} at {part.port.getBaudRate()} baud: "
-                "power, cable, id or baud rate"
-            )
+            port, baud = part.port.name, part.port.getBaudRate()
+            whole = _ids_in_words(on_it)
+            text = f"{port}: no answer from servo {', '.join(missing)} of {whole} at {baud} baud: "
+            text += "power, cable, id or baud rate"
+            if len(missing) == len(on_it) > 1:
+                text = (
+                    f"{port}: no answer from any of the servos {whole} at {baud} baud: power, "
+                    f"cable, baud rate or another make; snakewalk scan --port {port} lists the "
+                    "servos that reply"
+                )
             faults.append(ChainFault(FaultCause.NO_ANSWER, text))
-    servos = []
+    servos, others = [], defaultdict[tuple[str, str], list[int]](list)
     for servo_id, servo in found.items():
         joint = robot.joint_label(robot.servo_ids.index(servo_id))
         table = bus.table_of(servo_id)
-        name = table.model
         if servo.model_number != table.model_number:
-            numbers = model_numbers(table.facts.protocol)
-            name = numbers.get(servo.model_number, f"number {servo.model_number}")
-            text = f"{joint}: is a {name}, not a {table.model}"
-            faults.append(ChainFault(FaultCause.OTHER_MODEL, text))
+            name = _replying_model(servo.model_number, table.facts)
+            others[name, table.model].append(servo_id)
             continue
-        report = read_report(bus, servo_id, name)
+        report = read_report(bus, servo_id, table.model)
         servos.append(report)
         if report.hardware_error:
             text = (
@@ -140,7 +146,22 @@ def inspect(
                 "remove the cause and reboot it"
             )
             faults.append(ChainFault(FaultCause.ALARM, text))
+    for (name, model), ids in others.items():
+        if len(ids) <= _FEW:
+            labels = (robot.joint_label(robot.servo_ids.index(each)) for each in ids)
+            texts = [f"{label}: is a {name}, not a {model}" for label in labels]
+        else:
+            texts = [f"servos {_ids_in_words(ids)}: are {name}, not {model}"]
+        faults += [ChainFault(FaultCause.OTHER_MODEL, text) for text in texts]
     return Inspection(tuple(servos), tuple(faults))
+
+
+def _replying_model(number: int, expected: ServoModel) -> str:
+    """Return the name of another model; Feetech's series have different orders of bytes."""
+    names = model_numbers(expected.protocol)
+    if expected.is_feetech and number not in names:
+        number = int.from_bytes(number.to_bytes(2, "little"), "big")
+    return names.get(number, f"number {number}")
 
 
 def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:

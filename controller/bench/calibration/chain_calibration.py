@@ -90,7 +90,7 @@ def find_servos(
         feetech: whether the servos speak Feetech's protocol.
 
     Raises:
-        InputError: two servos share an ID.
+        InputError: two servos share an ID, or all servos that reply are of another make.
         ControlTableError: a servo is of a model that is not known.
         PortError: the port is gone.
 
@@ -105,6 +105,8 @@ def find_servos(
         if count is None or len(found) == count:
             break
         found |= scan()
+    if not found:
+        _reject_another_make(port, latency_s, feetech=feetech)
     shared = [str(servo_id) for servo_id in sorted(found) if not _is_alone(bus, servo_id)]
     if shared:
         raise InputError(
@@ -122,6 +124,26 @@ def _models(bus: DynamixelBus) -> dict[int, str]:
 def _feetech_models(port: BytePort, latency_s: float) -> dict[int, str]:
     found = find_feetech(port, (port.getBaudRate(),), latency_s=latency_s)
     return {each.servo_id: each.model for each in found}
+
+
+def _reject_another_make(port: BytePort, latency_s: float, *, feetech: bool) -> None:
+    """Reject a bus on which only servos of another make reply.
+
+    Raises:
+        InputError: names them.
+
+    """
+    if feetech:
+        others = _models(DynamixelBus(port, latency_s=latency_s, tries=BUS_TRIES))
+    else:
+        others = _feetech_models(port, latency_s)
+    if others:
+        model = next(iter(others.values()))
+        ids = ", ".join(map(str, others))
+        raise InputError(
+            f"{port.name}: the servos that reply (ID {ids}) are {model}, of another make than the "
+            f"robot's; name a robot by --robot whose servos have model = {model!r}"
+        )
 
 
 def _is_alone(bus: DynamixelBus, servo_id: int) -> bool:

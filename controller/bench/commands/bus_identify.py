@@ -77,4 +77,4 @@ def bus_identify(
         )
     console.print(table)
     if out is not None:
-        console.print(f"robot {out}: say the axes, then: snakewalk calibrate --robot {out}")
+        console.print(f"robot {out}: set its joint_axes, then: snakewalk calibrate --robot {out}")

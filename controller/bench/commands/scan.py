@@ -62,8 +62,14 @@ def scan(
     elif noise:
         console.print(f"{lines.port}: no reply came whole: cables, plugs, termination, ground?")
     else:
-        console.print(
-            f"{lines.port}: nobody answers at any baud rate: power? cable? adapter's switch?"
-        )
+        console.print(f"{lines.port}: {_silence(baud)}")
     if not found:
         raise SystemExit(1)
+
+
+def _silence(bauds: list[int] | None) -> str:
+    """Return what a silent bus means, and what to do."""
+    if not bauds:
+        return "nobody answers at any baud rate: power? cable? adapter's switch?"
+    rates = " or ".join(str(each) for each in bauds)
+    return f"nobody answers at {rates} baud; leave --baud out to search all rates"

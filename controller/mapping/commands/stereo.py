@@ -99,8 +99,11 @@ def stereo(
     The origin of the world is below the left camera; the x axis points where the camera looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
-    from snakewalk.controller.mapping import stereo_camera, stereo_ground  # noqa: PLC0415  an extra
-    from snakewalk.controller.mapping.colour_picture import read_colours  # noqa: PLC0415  an extra
+    from snakewalk.controller.mapping import (  # noqa: PLC0415  an extra
+        colour_picture,
+        stereo_camera,
+        stereo_ground,
+    )
 
     faults = not_positive(
         {"--height": height, "--spacing": spacing, "--error": error, "--far": far, "--scale": scale}
@@ -115,7 +118,8 @@ def stereo(
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
     calibrated = stereo_camera.read_calibration(calibration, _UNITS_M[unit])
-    pair = stereo_camera.rectify(calibrated, read_colours(left), read_colours(right))
+    pictures = (colour_picture.read_colours(side) for side in (left, right))
+    pair = stereo_camera.rectify(calibrated, *pictures)
     stand = None
     if height is not None and tilt is not None:
         stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))

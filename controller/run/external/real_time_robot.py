@@ -1,15 +1,17 @@
-"""A simulated robot on its ground at a serial device of this process, in real time."""
+"""A simulated robot on its ground at a serial device, in real time, by another process."""
 
-import threading
+from multiprocessing.connection import Connection
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.console.child_process import pipe, start
 from snakewalk.controller.run.external.served_robot import (
     Place,
     ServedRobot,
@@ -17,17 +19,18 @@ from snakewalk.controller.run.external.served_robot import (
     simulated_views,
 )
 from snakewalk.drivers.clock import WallClock
-from snakewalk.sim.serve.pty import PtyServer
+from snakewalk.drivers.priority import raised_priority
+from snakewalk.sim.serve.pty import IDLE_S, PtyServer
 
-_JOIN_S = 5.0
-"""Longest wait for the last step of the server."""
+_ASK: Final = b"qpos"
 
 
 class RealTimeRobot:
     """Serves the servos of a robot that lies straight on its ground; a context manager.
 
-    A thread advances the simulation by wall time. ``picture`` belongs to one thread: the graphics
-    context does, which the first call makes.
+    Another process simulates it by wall time, because work of this one would delay the replies. It
+    starts as by ``multiprocessing``: a script needs ``if __name__ == "__main__":``. ``picture``
+    belongs to one thread, that of its first call, as its graphics context does.
 
     Raises:
         InputError: MuJoCo is missing, or the robot or its ground cannot be simulated.
@@ -36,16 +39,19 @@ class RealTimeRobot:
 
     def __init__(self, robot: RobotConfig, world: WorldConfig) -> None:
         self._robot, self._world = robot, world
-        self._served = ServedRobot(robot, world, Place(), Serving())
-        self._server = PtyServer(self._served.line, WallClock())
-        self.path = self._server.path
-        """Serial device to open."""
         self._view: Any = None
-        self._stop = threading.Event()
-        self._thread = threading.Thread(
-            target=self._server.serve, args=(self._stop.is_set,), daemon=True
-        )
-        self._thread.start()
+        self._line, other = pipe()
+        self._process = start(_serve, other, robot, world, daemon=True)
+        other.close()
+        try:
+            begun = self._line.recv()
+        except EOFError:
+            begun = InputError(f"robot {robot.name}: its simulation ended at the start")
+        if isinstance(begun, InputError):
+            self.close()
+            raise begun
+        self.path: str = begun
+        """Serial device to open."""
 
     def __enter__(self) -> Self:
         return self
@@ -58,24 +64,58 @@ class RealTimeRobot:
     ) -> None:
         self.close()
 
+    def qpos(self) -> Floats:
+        """MuJoCo's coordinates of the body now.
+
+        Raises:
+            InputError: the simulation has ended.
+
+        """
+        try:
+            self._line.send_bytes(_ASK)
+            return np.frombuffer(self._line.recv_bytes())
+        except (EOFError, OSError):
+            raise InputError(f"robot {self._robot.name}: its simulation has ended") from None
+
     def picture(self) -> Image:
         """Draw the body now, (480, 640, 3) in RGB, by a camera that follows it.
 
         Raises:
+            InputError: the simulation has ended.
             OffscreenError: neither OSMesa nor EGL works.
 
         """
         if self._view is None:
             view = simulated_views().ChaseView
             self._view = view(self._robot, self._world, build_ground(self._world))
-        picture: Image = self._view.draw(np.array(self._served.body.qpos))
+        picture: Image = self._view.draw(self.qpos())
         return picture
 
     def close(self) -> None:
-        """Stop serving; safe to call twice."""
-        self._stop.set()
-        self._thread.join(_JOIN_S)
-        self._server.close()
+        """End the simulation; safe to call twice."""
+        self._line.close()
+        self._process.terminate()
+        self._process.join()
         if self._view is not None:
             self._view.close()
         self._view = None
+
+
+def _serve(line: Connection, robot: RobotConfig, world: WorldConfig) -> None:
+    """Serve until the line is closed; the first message is the device, or an ``InputError``."""
+    try:
+        served = ServedRobot(robot, world, Place(), Serving())
+        server = PtyServer(served.line, WallClock())
+    except InputError as fault:
+        line.send(fault)
+        return
+    try:
+        with served, server, raised_priority():
+            line.send(server.path)
+            while True:
+                server.step(IDLE_S)
+                if line.poll():
+                    line.recv_bytes()
+                    line.send_bytes(np.array(served.body.qpos).tobytes())
+    except (EOFError, OSError):
+        return

@@ -9,7 +9,6 @@ from snakewalk.config.gait import GaitConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import make_gait
-from snakewalk.controller.motion.cpg_motion import CpgMotion
 from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.gait_motion import GaitMotion, GaitSequence
 from snakewalk.controller.motion.head_steering import HeadSteering, HeadTarget
@@ -86,6 +85,8 @@ class GaitRun(PathlessRun):
         if self.make_operator is not None:
             source = self.make_operator(gait, self.robot, on_event)
         elif self.config.by == "cpg":
+            from snakewalk.controller.motion.cpg_motion import CpgMotion  # noqa: PLC0415  compiled: slow to import
+
             source = CpgMotion(self.robot, GaitCycle(self.gait, self.robot).goal_rad())
             source.schedule([(0.0, self.gait), *self.changes, (self.config.duration_s, None)])
         elif self.changes:

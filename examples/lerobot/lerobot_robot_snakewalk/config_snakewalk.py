@@ -12,8 +12,8 @@ class SnakewalkConfig(RobotConfig):
     """A chain of servos on a port."""
 
     port: str
-    """Serial device, for example one that ``snakewalk bus serve`` prints; or ``sim``: simulated in
-    this process and in real time, servos on a bench or, with ``simulator_camera``, the robot."""
+    """Serial device, for example one that ``snakewalk bus serve`` prints; or ``sim``: servos on a
+    bench, simulated in this process; with ``simulator_camera``, the robot in a child process."""
     robot: str = "yaw16"
     """Name of a shipped robot, or a TOML file."""
     rate_hz: float = 50.0

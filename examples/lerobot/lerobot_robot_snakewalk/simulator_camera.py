@@ -1,4 +1,4 @@
-"""A camera of LeRobot's kind that draws a robot which this process simulates."""
+"""A camera of LeRobot's kind that draws a robot which a child process simulates."""
 
 from typing import Any
 

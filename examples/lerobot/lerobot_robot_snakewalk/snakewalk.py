@@ -37,7 +37,7 @@ class Snakewalk(Robot):
             raise ValueError(f"robot.rate_hz: {config.rate_hz} is not a rate; give a positive one")
         if config.simulator_camera and config.port != SIMULATED:
             raise ValueError(
-                "robot.simulator_camera: draws a robot that this process simulates, and "
+                "robot.simulator_camera: draws a robot that the package simulates, and "
                 f"robot.port is {config.port}; use --robot.port={SIMULATED}, or --robot.cameras"
             )
         if config.simulator_camera and CAMERA in config.cameras:

@@ -132,7 +132,7 @@ def test_the_simulator_camera_is_recorded(tmp_path: Path, monkeypatch: pytest.Mo
         "--robot.simulator_camera=true", "--dataset.repo_id=snakewalk/seen",
         f"--dataset.root={folder}", "--dataset.single_task=undulate", "--dataset.fps=10",
         "--dataset.num_episodes=1", "--dataset.episode_time_s=3", "--dataset.reset_time_s=0.5",
-        "--dataset.push_to_hub=false", "--dataset.video=false", "--play_sounds=false",
+        "--dataset.push_to_hub=false", "--dataset.vcodec=h264", "--play_sounds=false",
     )  # fmt: skip
     info = json.loads((folder / "meta" / "info.json").read_text())
     assert info["features"]["observation.images.simulator"]["shape"] == [480, 640, 3]

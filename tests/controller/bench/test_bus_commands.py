@@ -48,6 +48,14 @@ def test_scan(
     assert found["servos"][0]["model"] == "XM430-W350"
 
 
+def test_a_silent_bus_is_reported_with_the_rates_that_were_searched(
+    device: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = call(monkeypatch, capsys, "scan", "--port", device, "--baud", "57600")
+    assert code == 1
+    assert "nobody answers at 57600 baud; leave --baud out to search all rates" in out
+
+
 def test_doctor(
     device: str,
     line: OpenedLine,

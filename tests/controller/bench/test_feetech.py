@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench import torque_off as stopping
@@ -15,8 +15,10 @@ from snakewalk.controller.bench.eeprom_backup import back_up, plan_restore
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.bench.servo_settings import SettingsRequest, apply, open_servo, plan
 from snakewalk.controller.console.finding import Finding
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import ChainError
 from snakewalk.sim.ax12.ax12 import Ax12Servos
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.feetech.line import FeetechLine
@@ -52,6 +54,32 @@ def test_a_scan_finds_feetech_servos_at_their_rate(model: str) -> None:
 
 def test_a_scan_does_not_take_an_ax12_for_a_feetech_servo() -> None:
     assert scan(Ax12Line(Ax12Servos((1, 2), BenchPlant(2)))).servos == ()
+
+
+@pytest.mark.parametrize(
+    ("bus", "robot"), [("STS3215", "SCS0009"), ("SCS0009", "STS3215"), ("HLS3606", "STS3215")]
+)
+def test_servos_of_another_series_are_named(bus: str, robot: str) -> None:
+    """SCS servos have the other order of bytes: their number was shown as 2307."""
+    keys = ROBOT.model_dump(exclude={"joints"})
+    keys["servo"] |= {"model": robot, "supply_v": 6.0}
+    keys["described_models"] = ()
+    chain = ServoChain(servo_bus(a_line(f"1-12:{bus}"), robot), checked(RobotConfig, keys, "r"))
+    with pytest.raises(ChainError) as info:
+        chain.enable()
+    assert info.value.faults == (f"servos 1 to 12: are {bus}, not {robot}",)
+
+
+def test_a_bus_of_another_make_is_named_as_a_cause() -> None:
+    """A run without --robot on a Feetech bus listed 16 IDs and did not name this cause."""
+    robot = load_robot("yaw16")
+    line = a_line()
+    with pytest.raises(ChainError) as info:
+        ServoChain(DynamixelBus(line, robot.servo.model), robot).enable()
+    assert info.value.faults == (
+        f"{line.name}: no answer from any of the servos 1 to 16 at 1000000 baud: power, cable, "
+        f"baud rate or another make; snakewalk scan --port {line.name} lists the servos that reply",
+    )
 
 
 def test_the_doctor_finds_nothing_on_a_new_chain_and_names_no_dynamixel() -> None:

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import JointConfig, RobotConfig
+from snakewalk.controller.bench.calibration.chain_calibration import find_servos
 from snakewalk.controller.bench.commands import calibrate as calibrate_command
 from snakewalk.controller.cli.command_line import app
 from snakewalk.drivers.bus.feetech_bus import FeetechBus
@@ -22,6 +23,8 @@ from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.plant import Mounting
+from snakewalk.sim.serve.bench_line import bench_line
+from snakewalk.sim.serve.chain_spec import parse_chain
 from snakewalk.sim.servo.bench import BenchPlant
 
 ANSWERS = "3\nr\n1\nl\n2\nd\n"
@@ -135,3 +138,17 @@ def test_bus_identify_lists_the_servos_and_writes_a_robot_file(trio: Trio) -> No
     assert {each["state"]["torque_on"] for each in servos} == {False}
     robot = load_robot(str(trio.out))
     assert (robot.servo_ids, robot.servo.model) == ((4, 9, 30), "STS3215")
+
+
+@pytest.mark.parametrize(
+    ("servos", "feetech", "model"),
+    [("1-3:STS3215", False, "STS3215"), ("1-3:XL330-M288", True, "XL330-M288")],
+)
+def test_servos_of_another_make_than_the_robots_are_named(
+    servos: str, feetech: bool, model: str
+) -> None:
+    """The default robot on a Feetech bus: "the bus has 0 servos"."""
+    line = bench_line(parse_chain(servos))
+    with pytest.raises(InputError, match=rf"ID 1, 2, 3\) are {model}, of another make") as info:
+        find_servos(line, 0.004, 3, feetech=feetech)
+    assert f"model = '{model}'" in str(info.value)

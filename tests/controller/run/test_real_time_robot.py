@@ -1,8 +1,11 @@
-"""A simulated robot at a serial device of this process."""
+"""A simulated robot at a serial device of a child process."""
 
 import numpy as np
+import pytest
 
-from snakewalk.config.loader import load_robot, load_world
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import checked, load_robot, load_world
+from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run.external.real_time_robot import RealTimeRobot
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.port.serial_port import SerialPort
@@ -23,3 +26,19 @@ def test_the_servos_reply_and_the_body_is_drawn() -> None:
     differs = np.abs(picture - floor).max(axis=2) > 60.0
     assert 0.002 < differs.mean() < 0.5
     served.close()
+    with pytest.raises(InputError, match="has ended"):
+        served.qpos()
+
+
+def test_a_robot_that_cannot_be_served_is_rejected() -> None:
+    keys = {
+        "name": "two",
+        "joints": [
+            {"axis": "y", "id": 1},
+            {"axis": "y", "id": 2, "model": "STS3215-C018"},
+        ],
+        "ports": [{"port": "a", "ids": [1]}, {"port": "b", "ids": [2]}],
+        "servo": {"supply_v": 12.0},
+    }
+    with pytest.raises(InputError, match="different series"):
+        RealTimeRobot(checked(RobotConfig, keys, "robot two"), load_world("flat"))

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from snakewalk.config.loader import load_robot
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
-from snakewalk.drivers.bus.budget import chain_budget, check_ages, wire_budget
+from snakewalk.drivers.bus.budget import chain_budget, check_ages, robot_budget, wire_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
@@ -38,6 +39,13 @@ def test_a_rate_above_the_limit_is_refused_with_the_limit() -> None:
     budget.check(217.3)
     with pytest.raises(BudgetError, match=r"250 Hz.*4\.60 ms.*at most 217 Hz.*fast sync read"):
         budget.check(250.0)
+
+
+def test_the_remedy_names_fast_reads_only_where_the_servos_have_them() -> None:
+    for name, has_fast_reads in (("yaw16", True), ("sts3215-12", False)):
+        with pytest.raises(BudgetError) as info:
+            robot_budget(load_robot(name), 9_600, fast=False).check(50.0)
+        assert ("fast sync read" in str(info.value)) is has_fast_reads
 
 
 def test_return_delays_count_for_each_answer() -> None:
