@@ -7,8 +7,9 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.controller.capture.coil_film import COILS
 from snakewalk.controller.capture.coil_fit import Outline
+from snakewalk.controller.capture.image_file import ImageFile
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
-from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
+from snakewalk.controller.capture.small_body.crop import LONGEST_PX, CropStore
 from snakewalk.controller.capture.small_body.tip_profile import NO_ENDS, profile_ends
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import Detection
@@ -44,14 +45,20 @@ class Detections:
     """Longest light band of each body with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
     """(2, 3) by frame: where the profile of the body ends, and the doubt; NaN if not known."""
-    store: FrameStore = field(default_factory=FrameStore)
+    file: ImageFile = field(default_factory=ImageFile)
+    """The pictures that are kept."""
+    store: FrameStore = field(init=False)
     """The surroundings of the body in every frame."""
-    crops: dict[int, Crop] = field(default_factory=dict)
+    crops: CropStore = field(init=False)
     """By frame: small bodies, and where a small body was lost its last place."""
     stated_s: list[float] = field(default_factory=list)
     """Times of the frames, as the film states them."""
     _last: int = -_LOST_FRAMES - 1
     _points: Floats = field(default_factory=lambda: np.empty((0, 2)))
+
+    def __post_init__(self) -> None:
+        """Put the pictures into one file."""
+        self.store, self.crops = FrameStore(self.file), CropStore(self.file)
 
     def add(self, frame: DeepImage, detection: Detection) -> None:
         """Add the next frame (H, W[, C]); crops of small bodies are kept for their fit."""
@@ -82,11 +89,11 @@ class Detections:
         self._keep(number, frame, detection)
         if body.length_px <= LONGEST_PX and not detection.faint_parts:
             self._last, self._points = number, body.points_px
-            self.crops[number] = crop_body(frame, detection.background, self._points)
+            self.crops.put(number, frame, detection.background, self._points)
         elif body.status is FrameStatus.GOOD:
             expected = axis_px
         elif body.status is FrameStatus.BLOB and number - self._last <= _LOST_FRAMES:
-            self.crops[number] = crop_body(frame, detection.background, self._points)
+            self.crops.put(number, frame, detection.background, self._points)
         self.expected_px.append(expected)
         self.axis_error_px.append(axis_px)
         self.ends_px.append(ends_px)

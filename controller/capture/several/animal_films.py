@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from snakewalk.config.arrays import DeepImage
+from snakewalk.config.arrays import DeepImage, SignedInts
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
-from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, PartFolder
+from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
+from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.capture.several.blobs import (
     Blobs,
     blobs_of,
@@ -24,6 +25,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _PERSISTS = 0.5  # of the film: how long an animal must be followed with ``auto``
 _AROUND = 0.4  # of the body's length, around its blob
 _LEAST_AROUND_PX = 24
+_UNSEEN, _MERGED = -1, -2
+_MISSING = {_UNSEEN: FrameStatus.NOTHING, _MERGED: FrameStatus.MERGED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,9 +162,9 @@ def capture_animals(
         for plan, film, finished in zip(plans, films, before, strict=True):
             if number < finished:
                 continue
-            here = plan[number]
-            if isinstance(here, FrameStatus):
-                film.skip(here)
+            here = int(plan[number])
+            if here in _MISSING:
+                film.skip(_MISSING[here])
                 continue
             shown, detection = _detected(frame, ground, detector, blobs, here)
             film.add(shown, detection)
@@ -170,7 +173,7 @@ def capture_animals(
     out = []
     for identity, film in zip(found.identities, films, strict=True):
         try:
-            captured, _ = film.done()
+            captured = film.done()
         except InputError as error:
             out.append(CapturedAnimal(None, identity, str(error)))
         else:
@@ -178,25 +181,22 @@ def capture_animals(
     return out
 
 
-def _plan(identity: Identity, count: int) -> list[int | FrameStatus]:
-    """For each frame the animal's blob, or why it is missing."""
+def _plan(identity: Identity, count: int) -> SignedInts:
+    """(T,) the animal's blob in each frame, or why it is missing: a key of ``_MISSING``."""
     first, last = identity.tracklets[0], identity.tracklets[-1]
-    unseen = FrameStatus.NOTHING
-    out: list[int | FrameStatus] = [unseen] * count
+    out = np.full(count, _UNSEEN, dtype=np.int32)
     if first.begins_in is not None:
-        out[: first.frames[0]] = [FrameStatus.MERGED] * first.frames[0]
-    end = last.frames[-1] + 1
+        out[: first.frames[0]] = _MERGED
     if last.ends_in is not None:
-        out[end:] = [FrameStatus.MERGED] * (count - end)
+        out[last.frames[-1] + 1 :] = _MERGED
     touched = False
     at = first.frames[0]
     for one in identity.tracklets:
         touched = touched or (one is not first and one.begins_in is not None)
         if touched:
-            out[at : one.frames[0]] = [FrameStatus.MERGED] * (one.frames[0] - at)
-        for frame, blob in zip(one.frames, one.blobs, strict=True):
-            out[frame] = blob
+            out[at : one.frames[0]] = _MERGED
         at, touched = one.frames[-1] + 1, one.ends_in is not None
+        out[one.frames[0] : at] = one.blobs
     return out
 
 

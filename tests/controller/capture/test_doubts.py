@@ -14,6 +14,7 @@ from snakewalk.controller.capture.capture import Capture, UnusableFilmError, cap
 from snakewalk.controller.capture.capturing import (
     capture_recording,
     check_chance_finds,
+    in_doubt,
     warning_of,
 )
 from snakewalk.controller.capture.coil_film import CoilFilm
@@ -98,6 +99,33 @@ def test_a_large_expected_error_is_reported() -> None:
     text = warning_of(OPTIONS, captured(rough, 5.0))
     assert text is not None
     assert "off by 5.0% of the body" in text
+
+
+def test_good_frames_among_broken_outlines_are_rough() -> None:
+    good, broken = FrameStatus.GOOD, FrameStatus.PART
+    plain = captured([good] * 6 + [broken] * 4)
+    assert in_doubt(plain) is plain
+    doubtful = in_doubt(captured([good] * 4 + [broken] * 6))
+    assert not doubtful.good.any()
+    assert doubtful.used.sum() == 4
+    assert (doubtful.expected_px[:4] == 10.0).all()
+    assert np.isnan(doubtful.expected_px[4:]).all()
+    coils = captured([good] * 4 + [FrameStatus.COIL_ALONE] * 6)
+    assert in_doubt(coils) is coils
+
+
+def test_a_length_that_changes_in_a_film_with_unsolved_frames_is_in_doubt() -> None:
+    """Two animals in contact look like one long body, whose length falls as they slide."""
+    seen = captured([FrameStatus.GOOD] * 8 + [FrameStatus.COIL_ALONE] * 12)
+    joined = replace(
+        seen, length_px=seen.length_px * np.append(np.linspace(1.3, 1.0, 8), np.ones(12))
+    )
+    doubtful = in_doubt(joined)
+    assert not doubtful.good.any()
+    assert doubtful.expected_px[0] > 0.1 * joined.length_px[0]
+    larva = captured([FrameStatus.GOOD] * 20)
+    stretches = replace(larva, length_px=larva.length_px * np.linspace(1.3, 1.0, 20))
+    assert in_doubt(stretches) is stretches
 
 
 TAILS: dict[str, tuple[dict[str, Any], bool]] = {

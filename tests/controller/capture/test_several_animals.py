@@ -1,6 +1,7 @@
 """Several animals in one film: identities through contact, tracks, tables and the page."""
 
 import json
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,10 +71,7 @@ def _alone(
 ) -> Tracklet:
     one = Tracklet(begins, ends)
     for k, frame in enumerate(frames):
-        one.frames.append(frame)
-        one.blobs.append(0)
-        one.middles.append(start + k * step)
-        one.shapes.append(np.log([50.0, 4.0, 90.0]))
+        one.place(frame, 0, start + k * step, np.log([50.0, 4.0, 90.0]))
     return one
 
 
@@ -237,3 +235,31 @@ def test_an_interrupted_capture_of_several_animals_is_continued(
         both = before.used & after.used
         assert both.sum() >= before.used.sum() - 2
         assert float(np.abs(after.points_px - before.points_px)[both].max()) < 1.0
+
+
+def test_a_followed_animal_needs_a_few_bytes_a_frame() -> None:
+    one = Tracklet(None)
+    step, shape = np.array([0.5, 0.25]), np.log([50.0, 4.0, 90.0])
+    tracemalloc.start()
+    for frame in range(20_000):
+        one.place(frame, 3, frame * step, shape + frame * 1e-4)
+    assert tracemalloc.get_traced_memory()[0] < 20_000 * 16
+    tracemalloc.stop()
+    assert one.frames == range(20_000)
+    assert np.allclose(one.middles[-1], 19_999 * step)
+    assert len(one.shapes) < 2100
+    assert np.allclose(np.median(one.shapes, axis=0), shape + 1.0, atol=0.01)
+
+
+def test_a_gap_is_bridged_soon_after_it_only() -> None:
+    here, step = np.array([20.0, 20.0]), np.array([0.1, 0.0])
+    soon = [
+        _alone(range(20), here, step, None, None),
+        _alone(range(30, 50), here, step, None, None),
+    ]
+    late = [
+        _alone(range(20), here, step, None, None),
+        _alone(range(60, 80), here, step, None, None),
+    ]
+    assert len(identities_of(soon)) == 1
+    assert len(identities_of(late)) == 2
