@@ -18,6 +18,7 @@ from snakewalk.controller.capture.capturing import (
     warning_of,
 )
 from snakewalk.controller.capture.coil_film import CoilFilm
+from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.verification.film_check import goes_on_faintly
@@ -126,6 +127,16 @@ def test_a_length_that_changes_in_a_film_with_unsolved_frames_is_in_doubt() -> N
     larva = captured([FrameStatus.GOOD] * 20)
     stretches = replace(larva, length_px=larva.length_px * np.linspace(1.3, 1.0, 20))
     assert in_doubt(stretches) is stretches
+
+
+def test_few_used_frames_on_a_noisy_ground_are_unclear() -> None:
+    found = Detections()
+    assert not found.is_unclear(0)
+    found.noise = [0.5] * 10
+    assert found.is_unclear(4)
+    assert not found.is_unclear(5)
+    found.noise = [0.28] * 10
+    assert not found.is_unclear(4), "noise of 8 grey levels leaves all frames good"
 
 
 TAILS: dict[str, tuple[dict[str, Any], bool]] = {
