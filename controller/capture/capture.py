@@ -191,8 +191,7 @@ def captured_from(
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
     expected[[not one.status.has_points for one in skeletons]] = np.nan
-    used = sum(one.status.has_points for one in skeletons)
-    if goes_on_faintly(skeletons, found.store) or found.is_unclear(used):
+    if goes_on_faintly(skeletons, found.store) or found.is_unclear(skeletons):
         skeletons, expected = _without_tail(skeletons, expected)
     return Capture(
         points_px=np.stack([one.points_px for one in skeletons]),

@@ -1,5 +1,6 @@
 """Detections of a film, frame by frame, as the capture of the whole film needs them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +21,8 @@ _LOST_FRAMES = 5  # for this number of frames a lost small body is searched at i
 _FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
 _BAND = 0.6  # of the longest light band: another one may be hidden beyond a thin tail, which
 # shifts the points by half of its length in the mean; blur shortens the band that is seen
-_CLEAR_FRAMES = 0.5  # of the silhouettes
+_WITHOUT_OUTLINE = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED}
+_CLEAR_FRAMES = 0.5  # of the frames with an outline
 _NOISY = 0.35  # of half of the contrast: pattern and noise of the ground break outlines (measured)
 _HIDDEN = 0.1  # of the length: error if half of the contrast of the faint parts is only noise
 # because a tail that fades into the noise goes on beyond its visible end (measured on larvae)
@@ -35,7 +37,7 @@ class Detections:
     contrast: list[float] = field(default_factory=list)
     """Half of the contrast of the clearest region, grey levels; 0 if the frame is skipped."""
     noise: list[float] = field(default_factory=list)
-    """Noise of each silhouette over its threshold; frames without one are missing."""
+    """Noise of the silhouette over its threshold; 0 without a silhouette."""
     distractors: list[float] = field(default_factory=list)
     expected_px: list[float] = field(default_factory=list)
     """Error of long bodies, whose medial axis is kept; NaN for all others."""
@@ -71,8 +73,8 @@ class Detections:
         self.skeletons.append(body)
         self.area_px.append(silhouette.area_px)
         self.contrast.append(silhouette.threshold)
-        if silhouette.area_px > 0.0:
-            self.noise.append(silhouette.noise_level / max(silhouette.threshold, 1e-9))
+        seen = silhouette.area_px > 0.0
+        self.noise.append(silhouette.noise_level / silhouette.threshold if seen else 0.0)
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
         ends_px = NO_ENDS
@@ -104,10 +106,20 @@ class Detections:
         self.axis_error_px.append(axis_px)
         self.ends_px.append(ends_px)
 
-    def is_unclear(self, used: int) -> bool:
-        """Whether the noise is large, and fewer than half of the silhouettes are used."""
-        few = used < _CLEAR_FRAMES * len(self.noise)
-        return few and float(np.median(self.noise)) > _NOISY
+    def is_unclear(self, skeletons: Sequence[Skeleton]) -> bool:
+        """Whether the noise is large, and fewer than half of the outlines are used.
+
+        Args:
+            skeletons: of all frames, at the end.
+
+        """
+        used = sum(one.status.has_points for one in skeletons)
+        noise = [
+            level
+            for level, one in zip(self.noise, skeletons, strict=True)
+            if one.status not in _WITHOUT_OUTLINE
+        ]
+        return used < _CLEAR_FRAMES * len(noise) and float(np.median(noise)) > _NOISY
 
     @property
     def least_error_px(self) -> dict[int, float]:
@@ -119,6 +131,7 @@ class Detections:
         """Add a frame in which the animal is not searched for."""
         self.skeletons.append(no_skeleton(status))
         self.area_px.append(0.0)
+        self.noise.append(0.0)
         self.contrast.append(0.0)
         self.distractors.append(0.0)
         self.expected_px.append(np.nan)

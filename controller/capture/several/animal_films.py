@@ -22,7 +22,6 @@ from snakewalk.controller.capture.several.tracklets import TrackletBuilder
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_PERSISTS = 0.5  # of the film: how long an animal must be followed with ``auto``
 _AROUND = 0.4  # of the body's length, around its blob
 _LEAST_AROUND_PX = 24
 _UNSEEN, _MERGED = -1, -2
@@ -87,7 +86,7 @@ def find_animals(
         if on_progress is not None:
             on_progress()
     every = identities_of(builder.done())
-    kept = [one for one in every if one.span >= _PERSISTS * count]
+    kept = [one for one in every if one.is_animal(count)]
     if wanted is not None:
         kept = every[:wanted]
     if not kept or (wanted is not None and len(kept) < wanted):

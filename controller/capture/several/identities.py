@@ -28,6 +28,8 @@ _REACH = 1.0  # body lengths that it may move while it is unseen
 _FAR = 60.0  # cost of ending a tracklet that was not seen to enter a crossing
 _CROSSING = 1e4  # cost of leaving a tracklet of a crossing without a successor
 _ROUNDS = 3
+_PERSISTS = 0.5  # of the film: how long an animal must be followed
+_ALONE = 0.25  # of the film: how long one must be alone that is in contact for the rest
 _ENOUGH = 2000  # frames that show an animal's shape
 
 
@@ -50,6 +52,21 @@ class Identity:
     def span(self) -> int:
         """Frames from the first to the last one in which the animal is alone."""
         return self.tracklets[-1].frames[-1] + 1 - self.tracklets[0].frames[0]
+
+    def is_animal(self, frames: int) -> bool:
+        """Whether it is followed through half of a film of some frames, or into a last contact.
+
+        An animal that is alone in a quarter of the film and then in contact until the end (or from
+        the beginning) counts with its contact.
+        """
+        first, last = self.tracklets[0], self.tracklets[-1]
+        span = self.span
+        if span >= _ALONE * frames:
+            if last.ends_in is not None and first.begins_in is None:
+                span = frames - first.frames[0]
+            elif first.begins_in is not None and last.ends_in is None:
+                span = last.frames[-1] + 1
+        return span >= _PERSISTS * frames
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,13 +130,17 @@ def test_a_length_that_changes_in_a_film_with_unsolved_frames_is_in_doubt() -> N
 
 
 def test_few_used_frames_on_a_noisy_ground_are_unclear() -> None:
+    good = no_skeleton(FrameStatus.GOOD)
+    broken, empty_frame = (no_skeleton(one) for one in (FrameStatus.PART, FrameStatus.NOTHING))
     found = Detections()
-    assert not found.is_unclear(0)
+    assert not found.is_unclear([])
     found.noise = [0.5] * 10
-    assert found.is_unclear(4)
-    assert not found.is_unclear(5)
+    assert found.is_unclear([good] * 4 + [broken] * 6)
+    assert not found.is_unclear([good] * 5 + [broken] * 5)
+    assert not found.is_unclear([good] * 2 + [empty_frame] * 8)
     found.noise = [0.28] * 10
-    assert not found.is_unclear(4), "noise of 8 grey levels leaves all frames good"
+    noisy = [good] * 4 + [broken] * 6
+    assert not found.is_unclear(noisy), "noise of 8 grey levels leaves all frames good"
 
 
 TAILS: dict[str, tuple[dict[str, Any], bool]] = {

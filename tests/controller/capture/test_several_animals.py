@@ -251,6 +251,21 @@ def test_a_followed_animal_needs_a_few_bytes_a_frame() -> None:
     assert np.allclose(np.median(one.shapes, axis=0), shape + 1.0, atol=0.01)
 
 
+def test_an_animal_in_contact_for_the_rest_of_the_film_counts() -> None:
+    here, step = np.array([20.0, 20.0]), np.array([0.1, 0.0])
+
+    def counts(frames: range, begins: int | None, ends: int | None) -> bool:
+        (only,) = identities_of([_alone(frames, here, step, begins, ends)])
+        return only.is_animal(90)
+
+    assert counts(range(45), None, None)
+    assert not counts(range(43), None, None)
+    assert counts(range(43), None, 0)
+    assert counts(range(50, 90), 0, None)
+    assert not counts(range(10), None, 0), "alone for too short a time"
+    assert not counts(range(30, 60), 0, 1), "a part between two contacts"
+
+
 def test_a_gap_is_bridged_soon_after_it_only() -> None:
     here, step = np.array([20.0, 20.0]), np.array([0.1, 0.0])
     soon = [
