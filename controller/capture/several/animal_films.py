@@ -11,6 +11,7 @@ from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
 from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.capture.several.blobs import (
+    SMALLEST,
     Blobs,
     blobs_of,
     others_mask,
@@ -22,6 +23,7 @@ from snakewalk.controller.capture.several.tracklets import TrackletBuilder
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.track.frame_status import FrameStatus
 
+_DIRT = 0.05  # of the usual area: smaller objects are not mentioned
 _AROUND = 0.4  # of the body's length, around its blob
 _LEAST_AROUND_PX = 24
 _UNSEEN, _MERGED = -1, -2
@@ -39,6 +41,8 @@ class AnimalsFound:
     usual_px: float
     """Usual area of an animal."""
     frames: int
+    smaller: int = 0
+    """Objects in most frames that are too small for an animal of this area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,8 @@ def find_animals(
         InputError: fewer animals than wanted, or none.
 
     """
-    usual = usual_area([blobs_of(one, detector.ground_of(one), detector) for one in some])
+    seen = [blobs_of(one, detector.ground_of(one), detector) for one in some]
+    usual, sample = usual_area(seen), [one.area_px for one in seen]
     if usual <= 0.0:
         raise InputError(
             f"{name}: no contrast or no motion: nothing stands out from the background; give "
@@ -96,7 +101,10 @@ def find_animals(
             "or another number"
         )
     kept.sort(key=lambda one: float(one.tracklets[0].middles[0][0]))
-    return AnimalsFound(tuple(kept), len(every) - len(kept), usual, count)
+    small = [int(((one > _DIRT * usual) & (one < SMALLEST * usual)).sum()) for one in sample]
+    return AnimalsFound(
+        tuple(kept), len(every) - len(kept), usual, count, smaller=int(np.median(small))
+    )
 
 
 def films_of(

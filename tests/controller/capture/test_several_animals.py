@@ -17,6 +17,7 @@ from snakewalk.controller.capture.capture import capture, load_capture, save_cap
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
+from snakewalk.controller.capture.several.animal_films import find_animals
 from snakewalk.controller.capture.several.blobs import detector_of_several
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
@@ -249,6 +250,17 @@ def test_a_followed_animal_needs_a_few_bytes_a_frame() -> None:
     assert np.allclose(one.middles[-1], 19_999 * step)
     assert len(one.shapes) < 2100
     assert np.allclose(np.median(one.shapes, axis=0), shape + 1.0, atol=0.01)
+
+
+def test_objects_that_are_too_small_for_an_animal_are_counted() -> None:
+    scene = replace(PLATE, animals=3, rows=260, columns=320, frames=12, seed=3102)
+    images = list(crossing_film(scene, crossing_midlines(scene)))
+    for k, image in enumerate(images):
+        cv2.line(image, (20 + 4 * k, 12), (28 + 4 * k, 12), 70, 2)
+    detector = detector_of_several(images)
+    found = find_animals(images, images, detector, wanted=None, name="film")
+    assert len(found.identities) == 3
+    assert found.smaller == 1
 
 
 def test_an_animal_in_contact_for_the_rest_of_the_film_counts() -> None:
