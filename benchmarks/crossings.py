@@ -41,7 +41,7 @@ class Count:
 
     animals: int = 0
     found: int = 0
-    """Identities that are followed through half of the frames or more."""
+    """Identities that count as animals: ``Identity.is_animal``."""
     short: int = 0
     """Identities that are followed through less. Their contacts and frames count as well."""
     bridged: int = 0
@@ -76,7 +76,7 @@ def compare(identities: list[Identity], midlines: Floats, length_px: float) -> C
     truth = midlines.mean(axis=2)
     count = Count(animals=len(truth), frames=truth.shape[0] * truth.shape[1])
     for one in identities:
-        is_long = one.span >= 0.5 * truth.shape[1]
+        is_long = one.is_animal(truth.shape[1])
         count.found += is_long
         count.short += not is_long
         count.alone += one.frames

@@ -14,6 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.coil_film import COIL_LEAST, solve_coils
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
+from snakewalk.controller.capture.image_file import scaled
 from snakewalk.controller.capture.outlier_frames import mark_empty, mark_outliers
 from snakewalk.controller.capture.small_body.film_fit import (
     fit_film,
@@ -178,7 +179,7 @@ def captured_from(
     skeletons = [one.reversed() if score < 0.0 else one for one in aligned.skeletons]
     solved = np.isfinite(coils.expected_px)
     expected = np.where(solved, coils.expected_px, found.expected_px)
-    crops = {k: crop for k, crop in found.crops.items() if not solved[k]}
+    crops = found.crops.without(set(np.flatnonzero(solved).tolist()))
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
     fitted = with_tip_errors(fitted, found.ends_px, solved)
     fitted = with_least_errors(fitted, found.least_error_px)
@@ -190,7 +191,7 @@ def captured_from(
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
     expected[[not one.status.has_points for one in skeletons]] = np.nan
-    if goes_on_faintly(skeletons, found.store):
+    if goes_on_faintly(skeletons, found.store) or found.is_unclear(skeletons):
         skeletons, expected = _without_tail(skeletons, expected)
     return Capture(
         points_px=np.stack([one.points_px for one in skeletons]),
@@ -283,7 +284,7 @@ def save_capture(path: Path, held: CaptureFile) -> None:
     with path.open("wb") as stream:
         np.savez_compressed(
             stream,
-            points=captured.points_px * [scale, -scale],
+            points=scaled(captured.points_px, (scale, -scale), (0.0, 0.0), path.parent),
             rate_hz=captured.rate_hz,
             time_s=captured.time_s,
             rate_assumed=held.rate_assumed,

@@ -5,7 +5,7 @@ page.
 """
 
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -20,10 +20,11 @@ from snakewalk.controller.capture.capture import (
     save_capture,
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
-from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, PartFolder
+from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
 from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
+from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.plots.capture import contact_sheet, step_picture, trail_picture
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
@@ -52,6 +53,16 @@ _UNCLEAR = REJECTED | {
     FrameStatus.GHOST,
 }  # in most frames: the outline of the animal is not seen
 _FEW_ROUGH = 0.25  # of the frames in which it should be seen: rough frames are then chance finds
+_BROKEN = {
+    FrameStatus.SEVERAL,
+    FrameStatus.PART,
+    FrameStatus.GHOST,
+    FrameStatus.EMPTY,
+    FrameStatus.LENGTH,
+}  # the outline of the animal is not seen as one
+_HALF = 0.5  # of the frames with an outline
+_VARIES = 0.15  # of the length: most animals do not change their length so much (ours)
+_DOUBTFUL = 0.1  # of the length: expected error of a film with mostly broken outlines (ours)
 _INACCURATE = 0.015  # of the length: a larger expected error needs a look
 
 
@@ -199,11 +210,11 @@ def part_folder(options: CaptureOptions) -> PartFolder:
 
 
 def _parts(
-    options: CaptureOptions, film: OpenedFilm, folder: PartFolder, finished: list[Capture]
+    options: CaptureOptions, film: OpenedFilm, folder: PartFolder, finished: list[FinishedPart]
 ) -> FilmParts:
     """Return the film in parts, with those that an interrupted capture has finished."""
     for one in finished:
-        film.stated_s.extend(one.time_s.tolist())
+        film.stated_s.extend(one.time_s)
     return FilmParts(
         film.footage.rate_hz,
         film.footage.count,
@@ -238,7 +249,7 @@ def _captured_clearly(
     if few and stands_out_both_ways(film.some):
         raise fault
     check_chance_finds(options, captured)
-    return captured
+    return in_doubt(captured)
 
 
 def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
@@ -252,6 +263,28 @@ def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
             f"and these are rough; mostly: {reason}; use other light, or give --background, --roi "
             "or --threshold"
         )
+
+
+def in_doubt(captured: Capture) -> Capture:
+    """Return the capture; its frames are rough if most others contradict them.
+
+    If most outlines are broken, the used lines may be parts of a patterned body. If the length
+    varies and most other frames are not solved, two animals in contact may be taken for one.
+    """
+    used, broken = int(captured.used.sum()), sum(one in _BROKEN for one in captured.status)
+    unsolved = len(_shown(captured)) - used
+    low, usual, high = np.nanpercentile(captured.length_px, (5.0, 50.0, 95.0))
+    varies = float((high - low) / usual)
+    contradicted = broken if varies < _VARIES else unsolved
+    if used >= _HALF * (used + contradicted):
+        return captured
+    rough = {FrameStatus.GOOD: FrameStatus.ROUGH}
+    least_px = max(_DOUBTFUL, varies) * captured.length_px
+    return replace(
+        captured,
+        expected_px=np.fmax(captured.expected_px, least_px),
+        status=tuple(rough.get(one, one) for one in captured.status),
+    )
 
 
 def _shown(captured: Capture) -> list[FrameStatus]:
@@ -269,8 +302,7 @@ def _captured(
         for frame in film.frames(first):
             parts.add(frame, detector.detect(frame), film.stated_s[-1])
             bar.advance()
-    captured, _ = parts.done()
-    return captured
+    return parts.done()
 
 
 def warn_of(options: CaptureOptions, footage: Footage, facts: CaptureFacts) -> None:

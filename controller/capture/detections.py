@@ -1,5 +1,6 @@
 """Detections of a film, frame by frame, as the capture of the whole film needs them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,8 +8,9 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.controller.capture.coil_film import COILS
 from snakewalk.controller.capture.coil_fit import Outline
+from snakewalk.controller.capture.image_file import ImageFile
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
-from snakewalk.controller.capture.small_body.crop import LONGEST_PX, Crop, crop_body
+from snakewalk.controller.capture.small_body.crop import LONGEST_PX, CropStore
 from snakewalk.controller.capture.small_body.tip_profile import NO_ENDS, profile_ends
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import Detection
@@ -19,6 +21,9 @@ _LOST_FRAMES = 5  # for this number of frames a lost small body is searched at i
 _FAINT_PARTS = 2.5  # times the error of an even body; measured on rendered films
 _BAND = 0.6  # of the longest light band: another one may be hidden beyond a thin tail, which
 # shifts the points by half of its length in the mean; blur shortens the band that is seen
+_WITHOUT_OUTLINE = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED}
+_CLEAR_FRAMES = 0.5  # of the frames with an outline
+_NOISY = 0.35  # of half of the contrast: pattern and noise of the ground break outlines (measured)
 _HIDDEN = 0.1  # of the length: error if half of the contrast of the faint parts is only noise
 # because a tail that fades into the noise goes on beyond its visible end (measured on larvae)
 
@@ -31,6 +36,8 @@ class Detections:
     area_px: list[float] = field(default_factory=list)
     contrast: list[float] = field(default_factory=list)
     """Half of the contrast of the clearest region, grey levels; 0 if the frame is skipped."""
+    noise: list[float] = field(default_factory=list)
+    """Noise of the silhouette over its threshold; 0 without a silhouette."""
     distractors: list[float] = field(default_factory=list)
     expected_px: list[float] = field(default_factory=list)
     """Error of long bodies, whose medial axis is kept; NaN for all others."""
@@ -44,14 +51,20 @@ class Detections:
     """Longest light band of each body with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
     """(2, 3) by frame: where the profile of the body ends, and the doubt; NaN if not known."""
-    store: FrameStore = field(default_factory=FrameStore)
+    file: ImageFile = field(default_factory=ImageFile)
+    """The pictures that are kept."""
+    store: FrameStore = field(init=False)
     """The surroundings of the body in every frame."""
-    crops: dict[int, Crop] = field(default_factory=dict)
+    crops: CropStore = field(init=False)
     """By frame: small bodies, and where a small body was lost its last place."""
     stated_s: list[float] = field(default_factory=list)
     """Times of the frames, as the film states them."""
     _last: int = -_LOST_FRAMES - 1
     _points: Floats = field(default_factory=lambda: np.empty((0, 2)))
+
+    def __post_init__(self) -> None:
+        """Put the pictures into one file."""
+        self.store, self.crops = FrameStore(self.file), CropStore(self.file)
 
     def add(self, frame: DeepImage, detection: Detection) -> None:
         """Add the next frame (H, W[, C]); crops of small bodies are kept for their fit."""
@@ -60,6 +73,8 @@ class Detections:
         self.skeletons.append(body)
         self.area_px.append(silhouette.area_px)
         self.contrast.append(silhouette.threshold)
+        seen = silhouette.area_px > 0.0
+        self.noise.append(silhouette.noise_level / silhouette.threshold if seen else 0.0)
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
         ends_px = NO_ENDS
@@ -82,14 +97,29 @@ class Detections:
         self._keep(number, frame, detection)
         if body.length_px <= LONGEST_PX and not detection.faint_parts:
             self._last, self._points = number, body.points_px
-            self.crops[number] = crop_body(frame, detection.background, self._points)
+            self.crops.put(number, frame, detection.background, self._points)
         elif body.status is FrameStatus.GOOD:
             expected = axis_px
         elif body.status is FrameStatus.BLOB and number - self._last <= _LOST_FRAMES:
-            self.crops[number] = crop_body(frame, detection.background, self._points)
+            self.crops.put(number, frame, detection.background, self._points)
         self.expected_px.append(expected)
         self.axis_error_px.append(axis_px)
         self.ends_px.append(ends_px)
+
+    def is_unclear(self, skeletons: Sequence[Skeleton]) -> bool:
+        """Whether the noise is large, and fewer than half of the outlines are used.
+
+        Args:
+            skeletons: of all frames, at the end.
+
+        """
+        used = sum(one.status.has_points for one in skeletons)
+        noise = [
+            level
+            for level, one in zip(self.noise, skeletons, strict=True)
+            if one.status not in _WITHOUT_OUTLINE
+        ]
+        return used < _CLEAR_FRAMES * len(noise) and float(np.median(noise)) > _NOISY
 
     @property
     def least_error_px(self) -> dict[int, float]:
@@ -101,6 +131,7 @@ class Detections:
         """Add a frame in which the animal is not searched for."""
         self.skeletons.append(no_skeleton(status))
         self.area_px.append(0.0)
+        self.noise.append(0.0)
         self.contrast.append(0.0)
         self.distractors.append(0.0)
         self.expected_px.append(np.nan)

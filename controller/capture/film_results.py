@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from snakewalk.controller.capture.capture import Capture, CaptureFile
+from snakewalk.controller.capture.image_file import scaled
 from snakewalk.controller.capture.opened_film import OpenedFilm
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.plots.capture import overlay_film
@@ -16,7 +17,10 @@ from snakewalk.controller.console.result_files import atomic_write
 def in_whole_film(options: CaptureOptions, film: OpenedFilm, captured: Capture) -> Capture:
     """Return a capture with points in the whole images, and the times that the film states."""
     time_s, rate_hz = film.times(options.rate_hz, captured.time_s)
-    points_px = film.region.moved(captured.points_px)
+    corner = film.region.origin_px
+    points_px = captured.points_px
+    if corner != (0, 0):
+        points_px = scaled(points_px, (1.0, 1.0), corner, options.output.parent)
     return replace(captured, points_px=points_px, time_s=time_s, rate_hz=rate_hz)
 
 

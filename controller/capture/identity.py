@@ -5,7 +5,7 @@ thickness along the body decides as well. The user may name the head; else it is
 direction of travel, the direction of the wave, or at last the taper.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,15 +74,19 @@ def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
     return AlignedSkeletons(tuple(out), margins(out))
 
 
-def margins(skeletons: Sequence[Skeleton]) -> Floats:
+def margins(skeletons: Iterable[Skeleton]) -> Floats:
     """(T,) how much better each fits the one before as it is than reversed: ``align_ends``."""
-    margin = np.full(len(skeletons), np.nan)
+    return np.fromiter(_margins(skeletons), dtype=float)
+
+
+def _margins(skeletons: Iterable[Skeleton]) -> Iterator[float]:
     before: Skeleton | None = None
-    for k, one in enumerate(skeletons):
-        if np.isfinite(one.length_px):
-            margin[k] = 1.0 if before is None else margin_of(one, before)
-            before = one
-    return margin
+    for one in skeletons:
+        if not np.isfinite(one.length_px):
+            yield float("nan")
+            continue
+        yield 1.0 if before is None else margin_of(one, before)
+        before = one
 
 
 def _asymmetry(body: Skeleton) -> Floats:

@@ -1,5 +1,6 @@
 """A film that is opened to be captured: its frames cut to the region, some for the background."""
 
+from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -34,7 +35,7 @@ class OpenedFilm:
     """The contrast that the user knows, in the levels of 8 bit."""
     head_px: tuple[float, float] | None
     """The given place of the head in the region."""
-    stated_s: list[float] = field(default_factory=list)
+    stated_s: "array[float]" = field(default_factory=lambda: array("d"))
     """Times of the frames, as the film states them; filled by ``frames``."""
 
     def frames(self, first: int = 0) -> Iterator[DeepImage]:

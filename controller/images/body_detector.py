@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Bools, DeepImage
+from snakewalk.config.arrays import Bools, DeepImage, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.background import (
     background_candidates,
@@ -31,6 +31,7 @@ _VOTES = 9  # frames that usually decide whether the animal is dark or light
 _SURE = 0.5  # share above which a ground's body length is trusted
 _FAINT = 0.5  # of the strongest contrast: a fainter body may be a stain
 _PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
+_BESIDE_PX = 9  # side of a square: pixels next to a body, for the light of the ground under it
 _WIDTHS = 1.5  # of the body's width: half the side of the surroundings
 
 
@@ -296,9 +297,7 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
         cover = np.zeros(frame.shape[:2], dtype=np.uint8)
         cover[top : top + rows, left : left + columns] = body.mask
         cover = np.asarray(cv2.dilate(cover, np.ones((reach, reach), np.uint8)), dtype=np.uint8)
-        painted = frame.copy()
-        painted[cover > 0] = detection.background[cover > 0]
-        out.append(painted)
+        out.append(_filled(frame, detection.background, cover))
     if len(out) < max(_CALM, len(frames) // 2):
         return None
     ground = median_background(out)
@@ -308,6 +307,22 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
         background_source="the median of frames, the animal painted out of each",
         surroundings_px=0,
     )
+
+
+def _filled(frame: DeepImage, ground: DeepImage, cover: Image) -> DeepImage:
+    """The frame (H, W[, C]) with its ground where ``cover`` (H, W) is above 0.
+
+    The surroundings of a place are lighter than a patterned ground (darker for a light animal), so
+    the difference next to the cover is added.
+    """
+    beside = cv2.dilate(cover, np.ones((_BESIDE_PX, _BESIDE_PX), np.uint8)) > cover
+    difference = frame[beside].astype(float) - ground[beside]
+    filled = ground[cover > 0] + (np.median(difference, axis=0) if beside.any() else 0.0)
+    out = frame.copy()
+    if frame.dtype == np.uint8:
+        filled = np.clip(np.rint(filled), 0.0, 255.0)
+    out[cover > 0] = filled.astype(frame.dtype)
+    return out
 
 
 def usual_polarity(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from snakewalk.config.arrays import Bools, DeepImage, Floats, Indices
+from snakewalk.config.arrays import Bools, DeepImage, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.video import read_image
 
@@ -41,10 +41,6 @@ class Region:
         soft = cv2.blur(part, (_SOFT_PX, _SOFT_PX))
         part[~self.inside] = soft[self.fill]
         return part
-
-    def moved(self, points_px: Floats) -> Floats:
-        """Transform points (..., 2) of the region to the whole picture."""
-        return np.asarray(points_px + np.array(self.origin_px, dtype=float))
 
     def place(self, x: float, y: float) -> tuple[float, float]:
         """Transform a point of the whole picture to the region."""

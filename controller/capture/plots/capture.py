@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from textwrap import wrap
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _BODY, _HEAD, _TEXT, _BAD = (60, 200, 255), (80, 255, 80), (255, 255, 255), (80, 80, 255)
 _BACK = 32
 _TILE_PX = 200
+_LINE_PX, _LETTERS = 14, 32  # of the text on a tile
 _STEP_PX = 300
 _FILM_PX = 480
 """Smaller frames are enlarged to this, so that the line does not hide the animal."""
@@ -52,8 +54,11 @@ def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> NDArray[np.
     return np.asarray(line, dtype=np.int32)
 
 
-def _words(canvas: Image, text: str, good: bool) -> None:
-    place = (4, canvas.shape[0] - 5)
+def _words(canvas: Image, text: str, good: bool, line: int = 0) -> None:
+    """Write a line of text; ``line`` counts from the lower edge."""
+    low = canvas.shape[0] - _LINE_PX * line
+    canvas[low - _LINE_PX - 4 : low] = np.minimum(canvas[low - _LINE_PX - 4 : low], _BACK)
+    place = (4, low - 5)
     tint = _TEXT if good else _BAD
     cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.36, tint, 1, cv2.LINE_AA)
 
@@ -68,8 +73,9 @@ def contact_sheet(
         if number in chosen:
             status = captured.status[number]
             tile = _tile(image, captured.points_px[number], status)
-            reason = "" if status is FrameStatus.GOOD else f": {status.split(':')[-1].strip()}"
-            _words(tile, f"{number}{reason}"[:34], status is FrameStatus.GOOD)
+            reason = "" if status is FrameStatus.GOOD else f": {status}"
+            for line, text in enumerate(wrap(f"{number}{reason}", _LETTERS)[::-1]):
+                _words(tile, text, status is FrameStatus.GOOD, line)
             tiles.append(tile)
     empty = np.full((_TILE_PX, _TILE_PX, 3), _BACK, dtype=np.uint8)
     wide = min(columns, len(tiles))

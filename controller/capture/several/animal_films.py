@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from snakewalk.config.arrays import DeepImage
+from snakewalk.config.arrays import DeepImage, SignedInts
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
-from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts, PartFolder
+from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
+from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.capture.several.blobs import (
+    SMALLEST,
     Blobs,
     blobs_of,
     others_mask,
@@ -21,9 +23,11 @@ from snakewalk.controller.capture.several.tracklets import TrackletBuilder
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_PERSISTS = 0.5  # of the film: how long an animal must be followed with ``auto``
+_DIRT = 0.05  # of the usual area: smaller objects are not mentioned
 _AROUND = 0.4  # of the body's length, around its blob
 _LEAST_AROUND_PX = 24
+_UNSEEN, _MERGED = -1, -2
+_MISSING = {_UNSEEN: FrameStatus.NOTHING, _MERGED: FrameStatus.MERGED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,8 @@ class AnimalsFound:
     usual_px: float
     """Usual area of an animal."""
     frames: int
+    smaller: int = 0
+    """Objects in most frames that are too small for an animal of this area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +77,8 @@ def find_animals(
         InputError: fewer animals than wanted, or none.
 
     """
-    usual = usual_area([blobs_of(one, detector.ground_of(one), detector) for one in some])
+    seen = [blobs_of(one, detector.ground_of(one), detector) for one in some]
+    usual, sample = usual_area(seen), [one.area_px for one in seen]
     if usual <= 0.0:
         raise InputError(
             f"{name}: no contrast or no motion: nothing stands out from the background; give "
@@ -84,7 +91,7 @@ def find_animals(
         if on_progress is not None:
             on_progress()
     every = identities_of(builder.done())
-    kept = [one for one in every if one.span >= _PERSISTS * count]
+    kept = [one for one in every if one.is_animal(count)]
     if wanted is not None:
         kept = every[:wanted]
     if not kept or (wanted is not None and len(kept) < wanted):
@@ -94,7 +101,10 @@ def find_animals(
             "or another number"
         )
     kept.sort(key=lambda one: float(one.tracklets[0].middles[0][0]))
-    return AnimalsFound(tuple(kept), len(every) - len(kept), usual, count)
+    small = [int(((one > _DIRT * usual) & (one < SMALLEST * usual)).sum()) for one in sample]
+    return AnimalsFound(
+        tuple(kept), len(every) - len(kept), usual, count, smaller=int(np.median(small))
+    )
 
 
 def films_of(
@@ -159,9 +169,9 @@ def capture_animals(
         for plan, film, finished in zip(plans, films, before, strict=True):
             if number < finished:
                 continue
-            here = plan[number]
-            if isinstance(here, FrameStatus):
-                film.skip(here)
+            here = int(plan[number])
+            if here in _MISSING:
+                film.skip(_MISSING[here])
                 continue
             shown, detection = _detected(frame, ground, detector, blobs, here)
             film.add(shown, detection)
@@ -170,7 +180,7 @@ def capture_animals(
     out = []
     for identity, film in zip(found.identities, films, strict=True):
         try:
-            captured, _ = film.done()
+            captured = film.done()
         except InputError as error:
             out.append(CapturedAnimal(None, identity, str(error)))
         else:
@@ -178,25 +188,22 @@ def capture_animals(
     return out
 
 
-def _plan(identity: Identity, count: int) -> list[int | FrameStatus]:
-    """For each frame the animal's blob, or why it is missing."""
+def _plan(identity: Identity, count: int) -> SignedInts:
+    """(T,) the animal's blob in each frame, or why it is missing: a key of ``_MISSING``."""
     first, last = identity.tracklets[0], identity.tracklets[-1]
-    unseen = FrameStatus.NOTHING
-    out: list[int | FrameStatus] = [unseen] * count
+    out = np.full(count, _UNSEEN, dtype=np.int32)
     if first.begins_in is not None:
-        out[: first.frames[0]] = [FrameStatus.MERGED] * first.frames[0]
-    end = last.frames[-1] + 1
+        out[: first.frames[0]] = _MERGED
     if last.ends_in is not None:
-        out[end:] = [FrameStatus.MERGED] * (count - end)
+        out[last.frames[-1] + 1 :] = _MERGED
     touched = False
     at = first.frames[0]
     for one in identity.tracklets:
         touched = touched or (one is not first and one.begins_in is not None)
         if touched:
-            out[at : one.frames[0]] = [FrameStatus.MERGED] * (one.frames[0] - at)
-        for frame, blob in zip(one.frames, one.blobs, strict=True):
-            out[frame] = blob
+            out[at : one.frames[0]] = _MERGED
         at, touched = one.frames[-1] + 1, one.ends_in is not None
+        out[one.frames[0] : at] = one.blobs
     return out
 
 

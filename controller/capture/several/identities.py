@@ -6,13 +6,13 @@ the gap, and the shape: length, width and contrast. An assignment is uncertain i
 another animal costs hardly more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.several.tracklets import Tracklet
 
 SURE = 10.0
@@ -28,6 +28,9 @@ _REACH = 1.0  # body lengths that it may move while it is unseen
 _FAR = 60.0  # cost of ending a tracklet that was not seen to enter a crossing
 _CROSSING = 1e4  # cost of leaving a tracklet of a crossing without a successor
 _ROUNDS = 3
+_PERSISTS = 0.5  # of the film: how long an animal must be followed
+_ALONE = 0.25  # of the film: how long one must be alone that is in contact for the rest
+_ENOUGH = 2000  # frames that show an animal's shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,21 @@ class Identity:
         """Frames from the first to the last one in which the animal is alone."""
         return self.tracklets[-1].frames[-1] + 1 - self.tracklets[0].frames[0]
 
+    def is_animal(self, frames: int) -> bool:
+        """Whether it is followed through half of a film of some frames, or into a last contact.
+
+        An animal that is alone in a quarter of the film and then in contact until the end (or from
+        the beginning) counts with its contact.
+        """
+        first, last = self.tracklets[0], self.tracklets[-1]
+        span = self.span
+        if span >= _ALONE * frames:
+            if last.ends_in is not None and first.begins_in is None:
+                span = frames - first.frames[0]
+            elif first.begins_in is not None and last.ends_in is None:
+                span = last.frames[-1] + 1
+        return span >= _PERSISTS * frames
+
 
 @dataclass(frozen=True, slots=True)
 class _Link:
@@ -57,6 +75,10 @@ class _Link:
     after: int
     margin: float
     """Additional cost of the best exchange; infinite without another possibility."""
+
+
+_Costs = dict[int, dict[int, float]]
+"""By end and later start, numbers of tracklets; a missing pair cannot be the same animal."""
 
 
 def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:
@@ -83,17 +105,12 @@ def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:
 
 def _links(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> list[_Link]:
     """Assign ends to starts; shapes are those of all tracklets that certain links join."""
-    ends = [k for k, one in enumerate(tracklets) if one.frames]
     cost = _costs(tracklets, known)
     out = []
-    for olds, news in _groups(np.isfinite(cost)):
-        some = cost[np.ix_(olds, news)]
-        if not some.size:
-            continue
+    for olds, news in _groups(cost):
+        some = np.array([[cost[old].get(new, np.inf) for new in news] for old in olds])
         least = min(_FAR, _CROSSING)
-        alone = np.array(
-            [_CROSSING if tracklets[ends[k]].ends_in is not None else least for k in olds]
-        )
+        alone = np.array([_CROSSING if tracklets[k].ends_in is not None else least for k in olds])
         for row, column in _assigned(some, alone):
             margin = _margin(some, row, column, _assigned(some, alone), alone)
             out.append(_Link(int(olds[row]), int(news[column]), margin))
@@ -129,26 +146,48 @@ def _margin(
     return best
 
 
-def _groups(possible: Bools) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns that belong together, as (rows, columns)."""
-    out = []
-    free = set(np.flatnonzero(possible.any(axis=1)).tolist())
+def _groups(cost: _Costs) -> list[tuple[list[int], list[int]]]:
+    """Ends and starts that belong together, as (ends, starts)."""
+    ends_of: dict[int, list[int]] = {}
+    for end, starts in cost.items():
+        for start in starts:
+            ends_of.setdefault(start, []).append(end)
+    out, free = [], set(cost)
     while free:
-        rows, columns, fresh = set(), set(), {free.pop()}
+        ends: set[int] = set()
+        starts_seen: set[int] = set()
+        fresh = {free.pop()}
         while fresh:
-            rows |= fresh
-            columns |= set(np.flatnonzero(possible[sorted(fresh)].any(axis=0)).tolist())
-            fresh = set(np.flatnonzero(possible[:, sorted(columns)].any(axis=1)).tolist()) - rows
-        free -= rows
-        out.append((sorted(rows), sorted(columns)))
+            ends |= fresh
+            more = {start for end in fresh for start in cost[end]} - starts_seen
+            starts_seen |= more
+            fresh = {end for start in more for end in ends_of[start]} - ends
+        free -= ends
+        out.append((sorted(ends), sorted(starts_seen)))
     return out
 
 
-def _costs(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> Floats:
-    """(n, n) cost of each start (column) as the continuation of an end (row); infinite: none."""
-    count = len(tracklets)
-    cost = np.full((count, count), np.inf)
-    if not count:
+def _later_starts(tracklets: Sequence[Tracklet]) -> Iterator[tuple[int, int]]:
+    """Pairs of an end and a later start in the same crossing or soon after."""
+    begins: dict[int | None, list[int]] = {}
+    for k, one in enumerate(tracklets):
+        begins.setdefault(one.begins_in, []).append(k)
+    first = np.array([one.frames[0] for one in tracklets])
+    order = np.argsort(first, kind="stable")
+    for k, one in enumerate(tracklets):
+        last = one.frames[-1]
+        low, high = np.searchsorted(first[order], (last + 1, last + _MOST_GAP + 1)).tolist()
+        near = set(order[low:high].tolist())
+        if one.ends_in is not None:
+            near |= {j for j in begins.get(one.ends_in, ()) if first[j] > last}
+        for j in sorted(near):
+            yield k, j
+
+
+def _costs(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> _Costs:
+    """Cost of each start as the continuation of an end."""
+    cost: _Costs = {}
+    if not tracklets:
         return cost
     spread = _spread(tracklets)
     length = float(np.exp(np.median([np.median(one.shapes, axis=0)[0] for one in tracklets])))
@@ -156,23 +195,23 @@ def _costs(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> Floats:
     out = [_motion(one, last=True) for one in tracklets]
     into = [_motion(one, last=False) for one in tracklets]
     speed = float(np.median([np.hypot(*velocity) for _, velocity in (*out, *into)]))
-    for i, old in enumerate(tracklets):
-        for j, new in enumerate(tracklets):
-            gap = new.frames[0] - old.frames[-1]
-            if gap <= 0 or not _may_follow(old, new, gap, out[i][0], into[j][0], length):
-                continue
-            (place, velocity), (later, velocity_later) = out[i], into[j]
-            moved = max(speed, 0.5 * float(np.hypot(*velocity) + np.hypot(*velocity_later)))
-            error = _PLACE * length + _TURNS * moved * gap
-            off = (
-                np.sum((place + gap * velocity - later) ** 2)
-                + np.sum((later - gap * velocity_later - place) ** 2)
-            ) / 2.0
-            (mean, number), (mean_later, number_later) = before[i], after[j]
-            variance = spread**2 * _CORRELATED * (1.0 / number + 1.0 / number_later)
-            variance = np.minimum(variance, 4.0 * spread**2) + np.square(_LEAST_SPREAD)
-            shape = float(np.sum((mean - mean_later) ** 2 / variance))
-            cost[i, j] = float(off) / error**2 + shape
+    for i, j in _later_starts(tracklets):
+        old, new = tracklets[i], tracklets[j]
+        gap = new.frames[0] - old.frames[-1]
+        if not _may_follow(old, new, gap, out[i][0], into[j][0], length):
+            continue
+        (place, velocity), (later, velocity_later) = out[i], into[j]
+        moved = max(speed, 0.5 * float(np.hypot(*velocity) + np.hypot(*velocity_later)))
+        error = _PLACE * length + _TURNS * moved * gap
+        off = (
+            np.sum((place + gap * velocity - later) ** 2)
+            + np.sum((later - gap * velocity_later - place) ** 2)
+        ) / 2.0
+        (mean, number), (mean_later, number_later) = before[i], after[j]
+        variance = spread**2 * _CORRELATED * (1.0 / number + 1.0 / number_later)
+        variance = np.minimum(variance, 4.0 * spread**2) + np.square(_LEAST_SPREAD)
+        shape = float(np.sum((mean - mean_later) ** 2 / variance))
+        cost.setdefault(i, {})[j] = float(off) / error**2 + shape
     return cost
 
 
@@ -188,7 +227,7 @@ def _may_follow(
 def _spread(tracklets: Sequence[Tracklet]) -> Floats:
     """(3,) usual spread of an animal's shape from frame to frame."""
     apart = [
-        np.abs(np.array(one.shapes) - np.median(one.shapes, axis=0))
+        np.abs(one.shapes - np.median(one.shapes, axis=0))
         for one in tracklets
         if len(one.frames) >= _MOTION_FRAMES
     ]
@@ -212,17 +251,18 @@ def _shapes(
 def _shape_along(
     tracklets: Sequence[Tracklet], k: int, following: dict[int, int]
 ) -> tuple[Floats, int]:
-    shapes = list(tracklets[k].shapes)
-    while k in following and len(shapes) < 2000:
+    shapes, number = [tracklets[k].shapes], len(tracklets[k].frames)
+    while k in following and number < _ENOUGH:
         k = following[k]
-        shapes += tracklets[k].shapes
-    return np.median(shapes, axis=0), len(shapes)
+        shapes.append(tracklets[k].shapes)
+        number += len(tracklets[k].frames)
+    return np.median(np.concatenate(shapes), axis=0), number
 
 
 def _motion(one: Tracklet, *, last: bool) -> tuple[Floats, Floats]:
     """Place at the end or start of a tracklet, px, and velocity there, px a frame."""
     some = slice(-_MOTION_FRAMES, None) if last else slice(None, _MOTION_FRAMES)
-    places = np.array(one.middles[some])
+    places = one.middles[some]
     end = places[-1] if last else places[0]
     if len(places) < 2:
         return end, np.zeros(2)

@@ -27,7 +27,7 @@ from snakewalk.controller.capture.several.animal_films import (
     films_of,
     find_animals,
 )
-from snakewalk.controller.capture.several.blobs import detector_of_several
+from snakewalk.controller.capture.several.blobs import SMALLEST, detector_of_several
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
@@ -61,6 +61,8 @@ class AnimalsFacts:
     animals: tuple[AnimalFacts, ...]
     left_out: int
     """Objects that were followed for too short a time to be one of the animals."""
+    smaller_objects: int
+    """Objects in most frames whose area is less than 0.3 of the usual one; they have no track."""
     background: str
 
 
@@ -204,12 +206,21 @@ def _facts(
         frames=found.frames,
         animals=tuple(listed),
         left_out=found.left_out,
+        smaller_objects=found.smaller,
         background=detector.background_source,
     )
 
 
 def _warn(options: CaptureOptions, facts: AnimalsFacts) -> None:
     """Warn of animals without a track, of doubtful identities and of doubtful heads."""
+    if facts.smaller_objects:
+        LOGGER.warning(
+            "%s: %d smaller objects, of less than %g of the usual area, are not captured; if they "
+            "are animals, capture them alone with --roi",
+            options.recording,
+            facts.smaller_objects,
+            SMALLEST,
+        )
     for one in facts.animals:
         if one.fault is not None:
             LOGGER.warning("%s", one.fault)

@@ -5,6 +5,7 @@ becomes several, a crossing lies between the tracklets, and only ``identities`` 
 tracklets belong to the same animal.
 """
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -20,6 +21,7 @@ _ALONE = (0.65, 1.5)  # of the tracklet's area: the blob is still that animal al
 _JOINED = 1.6  # of the usual area: the blob is more than one animal
 _PART = 0.6  # of the usual area: the blob is a part of an animal
 _REACH = 0.6  # of the body's length: how far a blob without shared pixels may have moved
+_MOST_SHAPES = 2000  # of a tracklet that are kept
 _FEWEST = 3  # frames; shorter tracklets between crossings belong to the crossing
 
 
@@ -31,22 +33,49 @@ class Tracklet:
     """The crossing that it comes from; None: it appears."""
     ends_in: int | None = None
     """The crossing that it goes to; None: it vanishes."""
-    frames: list[int] = field(default_factory=list)
-    blobs: list[int] = field(default_factory=list)
+    first: int = 0
+    """The first of its frames, which have no gap."""
+    blobs: "array[int]" = field(default_factory=lambda: array("H"))
     """Number of the blob in each of these frames, from 0."""
-    middles: list[Floats] = field(default_factory=list)
-    shapes: list[Floats] = field(default_factory=list)
     area_px: float = 0.0
     """Running mean of the blob's area."""
+    _middles: "array[float]" = field(default_factory=lambda: array("f"))
+    _shapes: "array[float]" = field(default_factory=lambda: array("f"))
+    _step: int = 1
+    """Frames between two shapes that are kept."""
 
     def add(self, frame: int, blobs: Blobs, number: int) -> None:
         """Add the blob of the next frame."""
-        self.frames.append(frame)
-        self.blobs.append(number)
-        self.middles.append(blobs.middle_px[number])
-        self.shapes.append(blobs.shape[number])
-        weight = 1.0 / min(len(self.frames), 20)
+        self.place(frame, number, blobs.middle_px[number], blobs.shape[number])
+        weight = 1.0 / min(len(self.blobs), 20)
         self.area_px += weight * (float(blobs.area_px[number]) - self.area_px)
+
+    def place(self, frame: int, number: int, middle_px: Floats, shape: Floats) -> None:
+        """Add the place (2,) and the shape (3,) of the blob of the next frame."""
+        if not self.blobs:
+            self.first = frame
+        if len(self.blobs) % self._step == 0:
+            self._shapes.extend(shape)
+        self.blobs.append(number)
+        self._middles.extend(middle_px)
+        if len(self._shapes) > _MOST_SHAPES * len(shape):
+            self._shapes = array("f", self.shapes[::2].ravel())
+            self._step *= 2
+
+    @property
+    def frames(self) -> range:
+        """Numbers of its frames."""
+        return range(self.first, self.first + len(self.blobs))
+
+    @property
+    def middles(self) -> Floats:
+        """(frames, 2) centroids, px."""
+        return np.array(self._middles, dtype=float).reshape(-1, 2)
+
+    @property
+    def shapes(self) -> Floats:
+        """(n, 3) ``Blobs.shape`` of frames at equal steps; of all frames of a short tracklet."""
+        return np.array(self._shapes, dtype=float).reshape(-1, 3)
 
 
 @dataclass(slots=True)

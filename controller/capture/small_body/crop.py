@@ -1,12 +1,13 @@
 """The part of a frame that shows a small body: its crop, and the view that is fitted."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
+from snakewalk.controller.capture.image_file import ImageFile, StoredImage
 from snakewalk.controller.capture.small_body.ribbon import BENDS, bend_basis
 
 LONGEST_PX = 120.0
@@ -36,13 +37,59 @@ class Crop:
 
 
 def crop_body(image: DeepImage, ground: DeepImage, points_px: Floats) -> Crop:
-    """Cut the body of (P, 2) points out."""
+    """Cut the body of (P, 2) points out; the crop contains views of both images."""
     length = float(np.hypot(*np.diff(points_px, axis=0).T).sum())
     reach = max(_AROUND * length, _LEAST_AROUND_PX)
     left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
     right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
     window = (slice(int(top), int(bottom)), slice(int(left), int(right)))
-    return Crop(image[window].copy(), ground[window].copy(), (int(left), int(top)))
+    return Crop(image[window], ground[window], (int(left), int(top)))
+
+
+@dataclass(frozen=True, slots=True)
+class _StoredCrop:
+    image: StoredImage
+    ground: StoredImage | DeepImage
+    """An image if it is a part of the shared ground."""
+    origin_px: tuple[int, int]
+
+
+@dataclass(slots=True)
+class CropStore(Mapping[int, Crop]):
+    """Crops by frame number; their pictures lie in a file."""
+
+    file: ImageFile = field(default_factory=ImageFile)
+    _crops: dict[int, _StoredCrop] = field(default_factory=dict)
+    _ground: DeepImage | None = None
+    """Ground of the first frame: that of all frames if the camera stands still."""
+
+    def put(self, number: int, image: DeepImage, ground: DeepImage, points_px: Floats) -> None:
+        """Keep the crop of a frame: ``crop_body``."""
+        self._ground = ground if self._ground is None else self._ground
+        crop = crop_body(image, ground, points_px)
+        if not crop.image.size:
+            return
+        own = crop.ground if ground is self._ground else self.file.add(crop.ground)
+        self._crops[number] = _StoredCrop(self.file.add(crop.image), own, crop.origin_px)
+
+    def without(self, frames: Collection[int]) -> "CropStore":
+        """Return the crops of all other frames."""
+        kept = {k: one for k, one in self._crops.items() if k not in frames}
+        return CropStore(self.file, kept)
+
+    def __getitem__(self, number: int) -> Crop:
+        """Read a crop."""
+        one = self._crops[number]
+        ground = self.file.read(one.ground) if isinstance(one.ground, StoredImage) else one.ground
+        return Crop(self.file.read(one.image), ground, one.origin_px)
+
+    def __iter__(self) -> Iterator[int]:
+        """Numbers of the frames, in the order in which they were put."""
+        return iter(self._crops)
+
+    def __len__(self) -> int:
+        """Count of the crops."""
+        return len(self._crops)
 
 
 @dataclass(frozen=True, slots=True)

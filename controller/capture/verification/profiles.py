@@ -76,11 +76,18 @@ def _own(places: Floats, line: Floats, half: Floats) -> Floats:
     """(P, A) whether places next to the line lie on another part of the same body."""
     chord = float(np.hypot(*np.diff(line, axis=0).T).mean())
     away = max(2, int(np.ceil(_APART * float(half.max()) / max(chord, 1e-9))) + 4)
-    square = ((places[:, :, None] - line[None, None]) ** 2).sum(axis=-1)
+    square = _squares(places, line)
     number = np.arange(len(line))
     other = np.abs(number[:, None] - number) >= away
     near = square < (half + _OWN_PX) ** 2
     return np.asarray((near & other[:, None]).any(axis=-1))
+
+
+def _squares(places: Floats, line: Floats) -> Floats:
+    """(P, A, Q) squared distances of places (P, A, 2) from the points of a line (Q, 2)."""
+    x = places[..., 0, None] - line[:, 0]
+    y = places[..., 1, None] - line[:, 1]
+    return np.asarray(x * x + y * y)
 
 
 def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floats) -> Floats:
@@ -92,13 +99,13 @@ def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floa
     unit = np.column_stack([np.cos(angle), np.sin(angle)])
     places = line[0] + away[:, None, None] * unit
     seen = _seen(image, places)
-    square = ((places[:, :, None] - line[_AT_TIP.stop :][None, None]) ** 2).sum(axis=-1)
+    square = _squares(places, line[_AT_TIP.stop :])
     seen[(square < (half[_AT_TIP.stop :] + _OWN_PX) ** 2).any(axis=-1)] = np.nan
     known = np.asarray(np.isfinite(seen).all(axis=-1))
     out = np.full(seen.shape, np.nan)
     for k, ring in enumerate(seen):
         if known[k].sum() > len(_FAN) // 2:
-            usual = np.nanmedian(ring, axis=0)
+            usual = np.median(ring[known[k]], axis=0)
             whole = np.where(known[k][:, None], ring, usual)
             out[k] = usual - uniform_filter1d(whole, 3, axis=0, mode="nearest")
     return out

@@ -90,7 +90,8 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
             number = np.rint(track.time_s * track.rate_hz).astype(int).tolist()
             words = [one.name.lower() for one in track.status] or [""] * len(number)
             sure = ["" if track.head_sure is None else track.head_sure] if has_sure else []
-            for frame, body, word in zip(number, track.points.tolist(), words, strict=True):
+            bodies = (body.tolist() for body in track.points)
+            for frame, body, word in zip(number, bodies, words, strict=True):
                 first = [frame / track.rate_hz, frame, *([track.name] if several else [])]
                 last = [*([word] if has_status else []), *sure]
                 if wide:
@@ -102,7 +103,7 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
 
 
 def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
-    """Write a WCON; bodies without a scale have unit 1.
+    """Write a WCON frame by frame; bodies without a scale have unit 1.
 
     ``@snakewalk`` of a record states the status of each frame, ``head_sure`` and its source.
     """
@@ -119,23 +120,22 @@ def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
         "notes": list(dict.fromkeys(note for one in tracks for note in one.notes)),
         "places_recorded": all(one.places_recorded for one in tracks),
     }
-    held = {
-        "units": {"t": "s"} | dict.fromkeys("xy", "m" if unit == "m" else "1"),
-        "metadata": about,
-        "data": [
-            {
-                "id": one.name,
-                "t": one.time_s.tolist(),
-                "x": one.points[..., 0].tolist(),
-                "y": one.points[..., 1].tolist(),
-                "head": "L",
-                "@snakewalk": {
-                    "status": [status.name.lower() for status in one.status],
-                    "head_sure": one.head_sure,
-                    "source": one.source,
-                },
+    units = {"t": "s"} | dict.fromkeys("xy", "m" if unit == "m" else "1")
+    with path.open("w", encoding="utf-8") as stream:
+        stream.write(f'{{"units": {json.dumps(units)}, "metadata": {json.dumps(about)}, "data": [')
+        for number, one in enumerate(tracks):
+            own = {
+                "status": [status.name.lower() for status in one.status],
+                "head_sure": one.head_sure,
+                "source": one.source,
             }
-            for one in tracks
-        ],
-    }
-    path.write_text(json.dumps(held), encoding="utf-8")
+            stream.write(", " if number else "")
+            stream.write(f'{{"id": {json.dumps(one.name)}, "t": {json.dumps(one.time_s.tolist())}')
+            for axis, name in enumerate("xy"):
+                stream.write(f', "{name}": [')
+                for frame, body in enumerate(one.points):
+                    stream.write(", " if frame else "")
+                    stream.write(json.dumps(body[:, axis].tolist()))
+                stream.write("]")
+            stream.write(f', "head": "L", "@snakewalk": {json.dumps(own)}}}')
+        stream.write("]}")

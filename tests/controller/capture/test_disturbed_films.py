@@ -11,7 +11,11 @@ from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.capture.identity import head_end, travel_score
 from snakewalk.controller.capture.small_body.crop import crop_body
 from snakewalk.controller.images.background import median_background, surrounding_ground
-from snakewalk.controller.images.body_detector import BodyDetector, make_detector
+from snakewalk.controller.images.body_detector import (
+    BodyDetector,
+    _painted_out,
+    make_detector,
+)
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
@@ -117,6 +121,24 @@ def test_the_surroundings_keep_shades_and_drop_what_is_narrow() -> None:
         np.abs((255 - ground) - surrounding_ground(light, Polarity.LIGHT, 21).astype(int)).max()
         <= 1
     )
+
+
+def test_a_painted_animal_leaves_the_light_of_a_patterned_ground() -> None:
+    """The surroundings of a place are lighter than a pattern; painted in, they widen the body."""
+    scene = replace(
+        SCENE, rows=240, columns=320, length_px=35.0, frames=30, noise=6.0, blur_px=1.2, light=0.3,
+        shadow=0.25, texture=5.0,
+    )  # fmt: skip
+    frames, bare = list(film(scene))[::3], empty(scene).astype(float)
+    around = BodyDetector(None, Polarity.DARK, "", 49)
+    painted = _painted_out(around, frames)
+    assert painted is not None
+    assert painted.background is not None
+    covered = np.zeros(bare.shape, bool)
+    for line in true_midlines(scene):
+        x, y = np.rint(line).astype(int).T
+        covered[y, x] = True
+    assert abs(float((painted.background - bare)[covered].mean())) < 3.0
 
 
 def test_a_body_is_not_searched_outside_its_crop() -> None:

@@ -14,9 +14,11 @@ from snakewalk.controller.capture.capture import Capture, UnusableFilmError, cap
 from snakewalk.controller.capture.capturing import (
     capture_recording,
     check_chance_finds,
+    in_doubt,
     warning_of,
 )
 from snakewalk.controller.capture.coil_film import CoilFilm
+from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.verification.film_check import goes_on_faintly
@@ -98,6 +100,47 @@ def test_a_large_expected_error_is_reported() -> None:
     text = warning_of(OPTIONS, captured(rough, 5.0))
     assert text is not None
     assert "off by 5.0% of the body" in text
+
+
+def test_good_frames_among_broken_outlines_are_rough() -> None:
+    good, broken = FrameStatus.GOOD, FrameStatus.PART
+    plain = captured([good] * 6 + [broken] * 4)
+    assert in_doubt(plain) is plain
+    doubtful = in_doubt(captured([good] * 4 + [broken] * 6))
+    assert not doubtful.good.any()
+    assert doubtful.used.sum() == 4
+    assert (doubtful.expected_px[:4] == 10.0).all()
+    assert np.isnan(doubtful.expected_px[4:]).all()
+    coils = captured([good] * 4 + [FrameStatus.COIL_ALONE] * 6)
+    assert in_doubt(coils) is coils
+
+
+def test_a_length_that_changes_in_a_film_with_unsolved_frames_is_in_doubt() -> None:
+    """Two animals in contact look like one long body, whose length falls as they slide."""
+    seen = captured([FrameStatus.GOOD] * 8 + [FrameStatus.COIL_ALONE] * 12)
+    joined = replace(
+        seen, length_px=seen.length_px * np.append(np.linspace(1.3, 1.0, 8), np.ones(12))
+    )
+    doubtful = in_doubt(joined)
+    assert not doubtful.good.any()
+    assert doubtful.expected_px[0] > 0.1 * joined.length_px[0]
+    larva = captured([FrameStatus.GOOD] * 20)
+    stretches = replace(larva, length_px=larva.length_px * np.linspace(1.3, 1.0, 20))
+    assert in_doubt(stretches) is stretches
+
+
+def test_few_used_frames_on_a_noisy_ground_are_unclear() -> None:
+    good = no_skeleton(FrameStatus.GOOD)
+    broken, empty_frame = (no_skeleton(one) for one in (FrameStatus.PART, FrameStatus.NOTHING))
+    found = Detections()
+    assert not found.is_unclear([])
+    found.noise = [0.5] * 10
+    assert found.is_unclear([good] * 4 + [broken] * 6)
+    assert not found.is_unclear([good] * 5 + [broken] * 5)
+    assert not found.is_unclear([good] * 2 + [empty_frame] * 8)
+    found.noise = [0.28] * 10
+    noisy = [good] * 4 + [broken] * 6
+    assert not found.is_unclear(noisy), "noise of 8 grey levels leaves all frames good"
 
 
 TAILS: dict[str, tuple[dict[str, Any], bool]] = {

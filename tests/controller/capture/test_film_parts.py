@@ -1,5 +1,6 @@
 """Long films: captured in parts, with bounded memory, and continued after an interruption."""
 
+import tracemalloc
 import weakref
 from dataclasses import replace
 from pathlib import Path
@@ -10,13 +11,17 @@ import pytest
 
 from snakewalk.config.arrays import DeepImage
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture import capturing
-from snakewalk.controller.capture.capture import load_capture
+from snakewalk.controller.capture import capturing, film_parts, image_file
+from snakewalk.controller.capture.capture import Capture, CaptureFile, load_capture, save_capture
 from snakewalk.controller.capture.capturing import capture_recording
+from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.film_parts import FilmParts
+from snakewalk.controller.capture.image_file import ImageFile, large_array, scaled
 from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.images.body_detector import Detection, make_detector
 from snakewalk.controller.images.silhouette import Polarity
+from snakewalk.controller.track.frame_status import FrameStatus
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -106,7 +111,7 @@ def test_a_part_without_the_animal_has_no_points() -> None:
     for k, image in enumerate(film(SCENE)):
         shown = ground if 10 <= k < 28 else image
         parts.add(shown, replace(detector, polarity=Polarity.DARK).detect(shown))
-    captured, _ = parts.done()
+    captured = parts.done()
     assert len(captured.status) == 36
     assert captured.used[:10].all()
     assert captured.used[28:].all()
@@ -130,3 +135,75 @@ def test_frames_of_finished_parts_do_not_stay_in_memory() -> None:
     half = len(alive) // 2
     assert max(alive[half:]) <= max(alive[:half]) <= 8
     assert len(parts.finished) >= 3
+
+
+def test_a_finished_part_leaves_no_points_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each further frame needs less memory than a fifth of its points."""
+
+    def part_of(found: Detections, rate_hz: float, **_: object) -> Capture:
+        count = len(found.skeletons)
+        shifted = np.arange(101.0)[:, None] + np.arange(count, dtype=float)[:, None, None]
+        return Capture(
+            points_px=np.repeat(shifted, 2, axis=2),
+            radius_px=np.full((count, 101), 3.0),
+            length_px=np.full(count, 141.4),
+            status=(FrameStatus.GOOD,) * count,
+            expected_px=np.full(count, 0.5),
+            distractors=np.zeros(count),
+            margin=np.ones(count),
+            rate_hz=rate_hz,
+            time_s=np.arange(count) / rate_hz,
+            head_by="travel",
+            head_sure=0.9,
+        )
+
+    monkeypatch.setattr(film_parts, "captured_from", part_of)
+
+    def peak_bytes(frames: int) -> int:
+        folder = PartFolder(tmp_path / f"{frames}.part", {})
+        parts = FilmParts(30.0, frames, "film", folder=folder, part_frames=500)
+        tracemalloc.start()
+        for _ in range(frames):
+            parts.skip(FrameStatus.NOTHING)
+        captured = parts.done()
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        save_capture(tmp_path / "film.npz", CaptureFile(captured, "film", m_per_px=0.5))
+        held = load_capture(tmp_path / "film.npz").captured
+        assert (held.points_px[:, 3, 0] - 3.0 == np.arange(frames) % 1500).all()
+        return peak
+
+    more = (peak_bytes(6000) - peak_bytes(3000)) / 3000
+    assert more < 101 * 2 * 8 / 5
+
+
+def test_large_arrays_lie_in_a_file_and_keep_their_values(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = np.random.default_rng(1).normal(size=(1100, 3, 2))
+    wanted = points * [2.0, -2.0] + [0.0, 5.0]
+    assert (scaled(points, (2.0, -2.0), (0.0, 5.0), None) == wanted).all()
+    monkeypatch.setattr(image_file, "IN_MEMORY_BYTES", 0)
+    tracemalloc.start()
+    large = large_array((200_000, 2), tmp_path)
+    assert tracemalloc.get_traced_memory()[1] < 200_000
+    tracemalloc.stop()
+    large[:] = 1.5
+    assert large.sum() == 600_000.0
+    assert (scaled(points, (2.0, -2.0), (0.0, 5.0), tmp_path) == wanted).all()
+    assert not list(tmp_path.iterdir()), "the file has no name"
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3)])
+def test_an_image_file_keeps_every_bit(dtype: type, shape: tuple[int, ...]) -> None:
+    chance = np.random.default_rng(2)
+    images = [(chance.random(shape) * 250.0).astype(dtype) for _ in range(3)]
+    file = ImageFile()
+    stored = [file.add(one) for one in images]
+    for one, image in zip(stored[::-1], images[::-1], strict=True):
+        read = file.read(one)
+        assert read.dtype == image.dtype
+        assert (read == image).all()

@@ -1,6 +1,7 @@
 """Several animals in one film: identities through contact, tracks, tables and the page."""
 
 import json
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from snakewalk.controller.capture.capture import capture, load_capture, save_cap
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
+from snakewalk.controller.capture.several.animal_films import find_animals
 from snakewalk.controller.capture.several.blobs import detector_of_several
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
@@ -70,10 +72,7 @@ def _alone(
 ) -> Tracklet:
     one = Tracklet(begins, ends)
     for k, frame in enumerate(frames):
-        one.frames.append(frame)
-        one.blobs.append(0)
-        one.middles.append(start + k * step)
-        one.shapes.append(np.log([50.0, 4.0, 90.0]))
+        one.place(frame, 0, start + k * step, np.log([50.0, 4.0, 90.0]))
     return one
 
 
@@ -237,3 +236,57 @@ def test_an_interrupted_capture_of_several_animals_is_continued(
         both = before.used & after.used
         assert both.sum() >= before.used.sum() - 2
         assert float(np.abs(after.points_px - before.points_px)[both].max()) < 1.0
+
+
+def test_a_followed_animal_needs_a_few_bytes_a_frame() -> None:
+    one = Tracklet(None)
+    step, shape = np.array([0.5, 0.25]), np.log([50.0, 4.0, 90.0])
+    tracemalloc.start()
+    for frame in range(20_000):
+        one.place(frame, 3, frame * step, shape + frame * 1e-4)
+    assert tracemalloc.get_traced_memory()[0] < 20_000 * 16
+    tracemalloc.stop()
+    assert one.frames == range(20_000)
+    assert np.allclose(one.middles[-1], 19_999 * step)
+    assert len(one.shapes) < 2100
+    assert np.allclose(np.median(one.shapes, axis=0), shape + 1.0, atol=0.01)
+
+
+def test_objects_that_are_too_small_for_an_animal_are_counted() -> None:
+    scene = replace(PLATE, animals=3, rows=260, columns=320, frames=12, seed=3102)
+    images = list(crossing_film(scene, crossing_midlines(scene)))
+    for k, image in enumerate(images):
+        cv2.line(image, (20 + 4 * k, 12), (28 + 4 * k, 12), 70, 2)
+    detector = detector_of_several(images)
+    found = find_animals(images, images, detector, wanted=None, name="film")
+    assert len(found.identities) == 3
+    assert found.smaller == 1
+
+
+def test_an_animal_in_contact_for_the_rest_of_the_film_counts() -> None:
+    here, step = np.array([20.0, 20.0]), np.array([0.1, 0.0])
+
+    def counts(frames: range, begins: int | None, ends: int | None) -> bool:
+        (only,) = identities_of([_alone(frames, here, step, begins, ends)])
+        return only.is_animal(90)
+
+    assert counts(range(45), None, None)
+    assert not counts(range(43), None, None)
+    assert counts(range(43), None, 0)
+    assert counts(range(50, 90), 0, None)
+    assert not counts(range(10), None, 0), "alone for too short a time"
+    assert not counts(range(30, 60), 0, 1), "a part between two contacts"
+
+
+def test_a_gap_is_bridged_soon_after_it_only() -> None:
+    here, step = np.array([20.0, 20.0]), np.array([0.1, 0.0])
+    soon = [
+        _alone(range(20), here, step, None, None),
+        _alone(range(30, 50), here, step, None, None),
+    ]
+    late = [
+        _alone(range(20), here, step, None, None),
+        _alone(range(60, 80), here, step, None, None),
+    ]
+    assert len(identities_of(soon)) == 1
+    assert len(identities_of(late)) == 2
