@@ -1,6 +1,6 @@
 """Energy of the motors, integrated and sampled, and what smoother goals would save.
 
-    python benchmarks/energy.py
+    python -m benchmarks.energy --write
 
 Each motion runs three times: with a goal held from cycle to cycle at 50 Hz and at 100 Hz, and with
 the servos' own time-based profile, which runs to each goal in the 20 ms until the next one. Printed
@@ -9,6 +9,7 @@ and speed that each cycle reads, over the integrated one; the highest current of
 and of all physics steps; and the lag of the joints.
 """
 
+import argparse
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,6 +19,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from benchmarks.provenance import PAGES, provenance, write_tables
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.effort import energy_track, sampled_energy
@@ -38,11 +40,15 @@ TIME_BASED = 0x04
 
 
 def main() -> None:
-    """Run all gaits, and walk and serpenoid on the square."""
-    print(
-        "motion | cost | sampled | peak A, read | true | lag ms | 100 Hz: cost | lag ms "
-        "| profile: cost | lag ms"
-    )
+    """Run all gaits, and walk and serpenoid on the square; print or write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help="replace the table of the page")
+    write = parser.parse_args().write
+    lines = [
+        "| motion | cost | by samples | peak A, read | true | lag, ms | 100 Hz: cost | lag "
+        "| profile of 20 ms: cost | lag |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
     for name, prepared in jobs():
         with currents() as peak_a:
             held = finish(prepared)
@@ -55,7 +61,12 @@ def main() -> None:
         )
         cells = [name, cost(held), f"{share:.2f}"]
         cells += [f"{held.summary.peak_current_a:.2f}", f"{peak_a[0]:.2f}", lag_ms(held)]
-        print(" | ".join([*cells, cost(often), lag_ms(often), cost(smooth), lag_ms(smooth)]))
+        cells += [cost(often), lag_ms(often), cost(smooth), lag_ms(smooth)]
+        lines.append(f"| {' | '.join(cells)} |")
+        print(lines[-1], flush=True)
+    if write:
+        table = "\n".join([*lines, "", provenance("python -m benchmarks.energy --write")])
+        write_tables(PAGES / "gait-energy.md", "energy", table)
 
 
 def jobs() -> Iterator[tuple[str, PreparedRun]]:
