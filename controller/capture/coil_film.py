@@ -1,9 +1,9 @@
 """Frames of a film in which the body lies on itself, solved from the good frames on both sides.
 
-Each stretch of such frames is followed from its first frame on and from its last frame back, with
-the body that the film's good frames show. Both solutions are then fitted to all frames of the
-stretch at once. Where they agree, and explain the silhouette, the frame is solved; where they do
-not, no picture says which strand goes where, and the frame says so.
+Each stretch of such frames is followed forward from its first frame and back from its last one,
+with the body of the good frames. Both solutions are then fitted to all frames of the stretch at
+once. A frame is solved where they agree and explain the silhouette; else no picture shows which
+strand goes where, and the status says so.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,23 +32,23 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _SAMPLE = 40  # good frames from which the body and its usual residual are learnt
 _FEWEST = 5  # good frames
-_BETWEEN = 4  # good frames between two coils that are looked at as well
+_BETWEEN = 4  # good frames between two coils that are also solved
 _LONGEST = 400  # frames of a stretch
 _CHANGE = 2.0  # times the usual change from frame to frame, while a body coils
 _LEAST_CHANGE = (0.3, 0.3, 0.004, *[0.05] * COIL_BENDS)  # working px, log, rad
 _ROUNDS = 10
-_AGREE = 0.02  # of the length: solutions that are further apart are two
-_RIVAL = 150.0  # squares of the usual residual: a dearer solution is rejected
-_OF_FIT, _OF_MODEL = 3.0, 2.5  # how the fit's own error and that of its body count
-_STEP = 100.0  # the same of a step from frame to frame: a body does not jump
-_BESIDE = 3  # frames on both sides of one that is solved in two ways, which are as doubtful
+_AGREE = 0.02  # of the length: solutions further apart are two
+_RIVAL = 150.0  # squares of the usual residual: a solution of higher cost is rejected
+_OF_FIT, _OF_MODEL = 3.0, 2.5  # weight of the fit's own error and of its body's error
+_STEP = 100.0  # the same of a step from frame to frame
+_BESIDE = 3  # frames on both sides of a frame with two solutions, equally doubtful
 _LEFT_OVER = 0.015  # of the body's area, or
 _OF_USUAL = 3.0  # times what good frames leave
 COIL_LEAST = 1.4
-"""Times the usual expected error of the other frames: a coil is not surer than that."""
+"""Least error, relative to the usual expected error of the other frames."""
 _OTHERS = {FrameStatus.BLOB, FrameStatus.LARGER, FrameStatus.PART, FrameStatus.GHOST}  # or else
 COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *_OTHERS}
-"""Result of the medial axis and of the comparison with the film for a coil."""
+"""Statuses that a coil may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class CoilFilm:
 
     skeletons: tuple[Skeleton, ...]
     expected_px: Floats
-    """(T,) expected mean error of a point in the frames that were solved; NaN in others."""
+    """(T,) expected mean error of a point in solved frames; NaN in others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +71,9 @@ class _Solution:
     error: Floats
     """(K,) expected mean error of a point by the fit alone, working px."""
     cost: float
-    """Cost of all frames, and of the steps between them, in squares of the usual residual."""
+    """Cost of all frames and of the steps between them, in squares of the usual residual."""
     apart: Floats
-    """(K,) how far another solution of about the same cost is, working px."""
+    """(K,) distance of another solution of about the same cost, working px."""
     steps: Floats
     """(K + 1,) of the steps alone."""
 
@@ -86,7 +86,7 @@ def solve_coils(
     Args:
         skeletons: (T) the same end first in all.
         outlines: silhouettes by frame, of coils and good frames.
-        expected_px: (T,) of the good frames; NaN where it is not known.
+        expected_px: (T,) of the good frames; NaN where unknown.
 
     """
     out = list(skeletons)
@@ -102,7 +102,7 @@ def solve_coils(
         if len(stretch) > _LONGEST:
             continue
         solved = film.solved(stretch, out, own_px)
-        if solved.turned:  # the later frames were ordered by the wrong end before
+        if solved.turned:  # the later frames have the other end first
             out[stretch[-1] + 1 :] = [one.reversed() for one in out[stretch[-1] + 1 :]]
         for k, body, error in zip(stretch, solved.skeletons, solved.expected_px, strict=True):
             out[k], expected[k] = body, error
@@ -146,7 +146,7 @@ class _Solved:
     expected_px: list[float]
     """NaN where the frame is not solved, or was good before."""
     turned: bool
-    """Whether the ends changed places from before the stretch to after it."""
+    """Whether the ends changed places in the stretch."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +158,11 @@ class _Film:
     squares: float
     """Usual mean square of the residual."""
     left: float
-    """Residual of good frames, nine of ten of them."""
+    """Residual that nine of ten good frames do not exceed."""
     misfit: float
-    """How far fits of good frames are from their skeletons, nine of ten of them, working px."""
+    """Distance of fits from skeletons that nine of ten good frames do not exceed, working px."""
     change: Floats
-    """(PARAMETERS, PARAMETERS) information of one frame about the next one."""
+    """(PARAMETERS, PARAMETERS) information of one frame about the next."""
 
     @classmethod
     def of(
@@ -194,7 +194,6 @@ class _Film:
         )
 
     def solved(self, stretch: list[int], skeletons: Sequence[Skeleton], own_px: float) -> "_Solved":
-        """Result for the frames of a stretch."""
         shapes = [Shape.of(self.outlines[k], self.body.scale) for k in stretch]
         before, after = (self._end(k, skeletons) for k in (stretch[0] - 1, stretch[-1] + 1))
         if before is None or after is None:
@@ -220,7 +219,6 @@ class _Film:
         return out
 
     def _end(self, k: int, skeletons: Sequence[Skeleton]) -> "_End | None":
-        """The good frame next to the stretch."""
         if not 0 <= k < len(skeletons) or skeletons[k].status is not FrameStatus.GOOD:
             return None
         shape = Shape.of(self.outlines[k], self.body.scale)
@@ -232,7 +230,7 @@ class _Film:
     def _solution(
         self, shapes: Sequence[Shape], before: "_End", after: "_End"
     ) -> tuple[_Solution, bool]:
-        """The stretch from both sides, and whether it shows that the ends changed places in it."""
+        """The stretch from both sides, and whether the ends changed places in it."""
         first, last = before.values, after.values
         ahead = self._followed(shapes, first)
         turned = False
@@ -258,7 +256,7 @@ class _Film:
     def _rivals(
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> Floats:
-        """(K,) how far another way of about the same cost is from the first one, working px."""
+        """(K,) distance of another solution of about the same cost, working px."""
         ways = self._ways(chains, shapes, ends)
         out = np.zeros(len(shapes))
         for n, row in enumerate(ways):
@@ -270,7 +268,7 @@ class _Film:
     def _ways(
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> Floats:
-        """(K, chains) the least cost of the stretch if a frame has its value from that chain.
+        """(K, chains) least cost of the stretch if a frame has its value from that chain.
 
         A chain that took a wrong way at some frame is right before it.
         """
@@ -298,7 +296,7 @@ class _Film:
         return float(step @ self.change @ step)
 
     def _distance(self, one: Floats, other: Floats) -> float:
-        """Mean distance of two bodies about the middles of their silhouettes."""
+        """Mean distance of two bodies, relative to the middles of their silhouettes."""
         at = np.zeros(2)
         lines = [curve(values, self.body.length, at) for values in (one, other)]
         return float(np.hypot(*(lines[0] - lines[1]).T).mean())
@@ -360,8 +358,8 @@ class _Film:
     ) -> tuple[Floats, Floats]:
         """Newton's step (K, PARAMETERS) of a chain of frames, and each frame's covariance.
 
-        The frames are eliminated one after the other from both ends: each frame's own information
-        then holds that of all frames before it, and of all after it.
+        The frames are eliminated from both ends: a frame's information then contains that of all
+        others.
         """
         count = len(values)
         own = [one.information + damp * np.diag(np.diag(one.information)) for one in normals]
@@ -387,7 +385,7 @@ class _Film:
     def _eliminated(
         self, own: Sequence[Floats], push: Sequence[Floats]
     ) -> list[tuple[Floats, Floats]]:
-        """For each frame, the information and push that the frames before it add."""
+        """Information and push that the frames before each frame add."""
         tie = self.change
         nothing = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
         out = [nothing]
@@ -403,7 +401,7 @@ class _Film:
         return float(np.sqrt(np.maximum(square, 0.0)).mean())
 
     def _check(self, n: int, best: _Solution) -> tuple[FrameStatus, float]:
-        """Whether all solutions of a frame agree, and how far they may be off, working px."""
+        """Whether all solutions of a frame agree, and their possible error, working px."""
         strange = best.left > max(_LEFT_OVER, _OF_USUAL * self.left)
         if strange[n]:
             return FrameStatus.COIL_UNLIKE, np.nan
@@ -428,7 +426,7 @@ class _Film:
 
 
 def _unsolved(own: Skeleton, status: FrameStatus) -> Skeleton:
-    """Skeleton of a frame that is not solved: its own reason if it may not be a coil."""
+    """Skeleton of a frame that is not solved, with its own reason if it may not be a coil."""
     return own if own.status in _OTHERS else no_skeleton(status)
 
 
@@ -438,7 +436,7 @@ def _apart(one: Skeleton, other: Skeleton) -> float:
 
 
 def _near(values: Floats, reference: Floats) -> Floats:
-    """The same body, its angles by whole turns as near as can be to those of another."""
+    """The same body, its angles nearest to those of another by whole turns."""
     turns = np.rint((values[3:] - reference[3:]).mean() / (2.0 * np.pi))
     out = values.copy()
     out[3:] -= 2.0 * np.pi * turns

@@ -1,8 +1,8 @@
-"""The body of one frame as a film knows it, fitted to a silhouette in which it may lie on itself.
+"""The body of a film, fitted to a silhouette in which it may lie on itself.
 
 A medial axis needs two free sides along the whole body. The union of the discs of a body of known
-length and widths does not need sides: its distances to the boundary are compared with those of the
-silhouette. The method is damped least squares over the bends and the place.
+length and widths does not: its distances to the boundary are compared with those of the silhouette.
+The method is damped least squares over the bends and the place.
 """
 
 from collections.abc import Sequence
@@ -19,29 +19,29 @@ from snakewalk.controller.images.silhouette import Silhouette
 from snakewalk.drivers.compiling import compiled
 
 COIL_BENDS = 14
-"""Coefficients of the tangent angle: four more than of a body that does not coil."""
+"""Coefficients of the tangent angle: four more than without coils."""
 PARAMETERS = 3 + COIL_BENDS
 """Parameters of a frame: x, y of the middle of the body against that of the silhouette, log of the
 length over the usual one, bends."""
 WIDTH_PX = 8.0
-"""Greatest width of the body while it is fitted, working px."""
+"""Greatest width of the body during the fit, working px."""
 _DISCS = 60
 _MARGIN_PX = 14  # working px around a silhouette
 _HALF = 127.5  # of a packed silhouette: its boundary
-_HOLE = 0.1  # squares of the width: a smaller hole is a light spot of the body
-_COARSE, _FINE = (1.5, 0.3), (0.4, 0.2)  # of the width: distances outside and inside that count
+_HOLE = 0.1  # squares of the width: a smaller hole is a light spot
+_COARSE, _FINE = (1.5, 0.3), (0.4, 0.2)  # of the width: largest distance outside and inside
 _ROUNDS = 12
 _SETTLED = 1e-3  # of the cost
-_TOGETHER = 9.0  # neighbouring pixels whose residuals are about the same
+_TOGETHER = 9.0  # neighbouring pixels with nearly the same residual
 _LEAST_PX = 0.25  # working px: the residual of a silhouette of pixels
 _LENGTH = 0.015  # prior standard deviation of the log of a frame's length
 _STIFF = 2.0  # rad, of second differences of the bends
-_APART_PX = 1.25  # working px on both sides of the boundary: a larger residual is more than edge
+_APART_PX = 1.25  # working px on both sides of the boundary: the edge
 
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """A silhouette kept for the fit: small enough to be kept for every frame of a film."""
+    """A silhouette, reduced so that every frame of a film can keep one."""
 
     packed: NDArray[np.uint8]
     """A PNG of the mask."""
@@ -51,7 +51,7 @@ class Outline:
 
     @classmethod
     def of(cls, silhouette: Silhouette, width_px: float) -> "Outline":
-        """Keep a silhouette; ``width_px`` of the body where it is known, 0 where not."""
+        """Keep a silhouette; ``width_px`` of the body, 0 if unknown."""
         scale = 1.0 if width_px == 0.0 else min(1.0, 2.0 * WIDTH_PX / width_px)
         level = silhouette.level
         if scale < 1.0:
@@ -62,7 +62,7 @@ class Outline:
 
 
 def _resized(level: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
-    """The picture enlarged or shrunk; pixel centres at ``(x + 0.5) scale - 0.5``."""
+    """The resized picture; pixel centres at ``(x + 0.5) scale - 0.5``."""
     if scale < 1.0:
         level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
     rows, columns = (max(1, int(np.ceil(side * scale))) for side in level.shape)
@@ -106,11 +106,11 @@ class Shape:
         return cls(depth, np.array([x.mean(), y.mean()]), first, scale)
 
     def to_px(self, line: Floats) -> Floats:
-        """Places of the image of places (P, 2) on the working grid."""
+        """Places in the image, of places (P, 2) on the working grid."""
         return np.asarray(line / self.scale + self.first_px)
 
     def from_px(self, line_px: Floats) -> Floats:
-        """Places on the working grid of places (P, 2) of the image."""
+        """Places on the working grid, of places (P, 2) in the image."""
         return np.asarray((line_px - self.first_px) * self.scale)
 
 
@@ -126,7 +126,7 @@ class CoilBody:
 
     @classmethod
     def of(cls, skeletons: Sequence[Skeleton]) -> "CoilBody":
-        """The median length and widths of good skeletons, the same end first in all."""
+        """Median length and widths of good skeletons, the same end first in all."""
         radius = np.median(np.stack([one.radius_px for one in skeletons]), axis=0)
         scale = WIDTH_PX / (2.0 * float(np.percentile(radius, 95.0)))
         length = float(np.median([one.length_px for one in skeletons]))
@@ -171,7 +171,7 @@ def curve(values: Floats, length: float, middle: Floats, pieces: int = _DISCS - 
 
 
 def line_slopes(values: Floats, length: float) -> Floats:
-    """(_DISCS, 2, PARAMETERS) of the places of the discs by the values of a frame."""
+    """(_DISCS, 2, PARAMETERS) derivatives of the discs' places by the values of a frame."""
     angle = _BASIS @ values[3:]
     size = length * float(np.exp(values[2])) / len(angle)
     turned = np.stack([-np.sin(angle), np.cos(angle)], axis=1)[:, :, None] * _BASIS[:, None, :]
@@ -198,7 +198,7 @@ class Normal:
 def _draw_discs(
     line: Floats, half_width: Floats, reach: float, depth: Floats, nearest: NDArray[np.int64]
 ) -> None:
-    """Write the greatest depth in any disc (h, w), and which disc, up to ``reach`` outside."""
+    """Write the greatest depth in any disc (h, w), and its disc, up to ``reach`` outside."""
     rows, columns = depth.shape
     for k in range(len(line)):
         x, y, wide = line[k, 0], line[k, 1], half_width[k]
@@ -218,7 +218,7 @@ def body_depth(
 ) -> tuple[Floats, NDArray[np.int64]]:
     """(h, w) distances from the boundary of the union of discs, and each pixel's disc.
 
-    Further off than ``reach`` they are minus ``reach``.
+    Beyond ``reach`` they are minus ``reach``.
     """
     depth = np.full(shape.depth.shape, -reach)
     nearest = np.zeros(shape.depth.shape, dtype=np.int64)
@@ -236,7 +236,7 @@ def normal_of(
         body: of the film.
         shape: the silhouette.
         squares: usual mean square of the residual of a good frame.
-        coarse: whether boundaries far apart count by their distance.
+        coarse: boundaries far apart count by their distance.
 
     """
     line = body.line(values, shape)
@@ -261,7 +261,7 @@ def normal_of(
 
 
 def _own_prior(values: Floats) -> tuple[Floats, Floats]:
-    """Rows of the prior knowledge about any frame, and their residuals."""
+    """Rows of the prior of any frame, and their residuals."""
     rows = np.zeros((COIL_BENDS - 1, PARAMETERS))
     rows[0, 2] = 1.0 / _LENGTH
     rows[1:, 3:] = np.diff(np.eye(COIL_BENDS), 2, axis=0) / _STIFF
@@ -279,7 +279,7 @@ def fit_coil(
 ) -> tuple[Floats, Normal]:
     """Fit one frame from ``start`` (PARAMETERS,); damped least squares.
 
-    ``prior`` is the prediction of the next frame: expected values and their information.
+    ``prior`` is the prediction for the frame: expected values and their information.
     """
     kept = start
     normal = normal_of(start, body, shape, squares, coarse=coarse)
@@ -310,7 +310,7 @@ def fit_coil(
 
 
 def left_over(values: Floats, body: CoilBody, shape: Shape) -> float:
-    """Area that only the body or only the silhouette covers, beyond their edges, of the body's."""
+    """Area that only the body or only the silhouette covers, beyond the edges, of the body's."""
     line = body.line(values, shape)
     depth, _ = body_depth(line, body.half_width, shape, 2.0 * _APART_PX)
     alone = (depth > _APART_PX) & (shape.depth < -_APART_PX)

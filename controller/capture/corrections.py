@@ -1,7 +1,7 @@
 """A person's corrections of a captured recording: heads flipped, frames left out or redrawn.
 
-The page of ``snakewalk capture --review`` writes them as JSON, and ``apply_corrections`` makes the
-corrected recording of them. The file names the track that it belongs to by its fingerprint.
+The page of ``snakewalk capture --review`` writes them as JSON; ``apply_corrections`` applies them.
+The file names its track by a fingerprint.
 """
 
 from collections import Counter
@@ -24,8 +24,7 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skele
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _LONGEST: Final = 4.0
-"""Longest line, as a multiple of the film's usual length (ours): a longer one is a slip of the
-hand."""
+"""Longest line, as a multiple of the film's usual length (ours)."""
 
 
 class RedrawnFrame(Strict):
@@ -40,22 +39,22 @@ class Corrections(Strict):
     """Corrections by the user; frames count from 0."""
 
     track: str
-    """``CaptureFile.fingerprint`` of the track that was looked at."""
+    """``CaptureFile.fingerprint`` of the reviewed track."""
     frames: int = Field(ge=1)
     """Number of frames of that track."""
     flipped: tuple[int, ...] = ()
     """Frames whose head is at the other end."""
     left_out: tuple[int, ...] = ()
-    """Frames that are not to be used."""
+    """Unused frames."""
     redrawn: tuple[RedrawnFrame, ...] = ()
-    """Frames with points of their own, head first whether or not they are among ``flipped``."""
+    """Frames with points of their own, head first even if ``flipped``."""
 
 
 def read_corrections(path: Path) -> Corrections:
     """Read a file that the page of a review has saved.
 
     Raises:
-        InputError: the file is not there, or holds something else.
+        InputError: the file is missing or invalid.
 
     """
     data = read_json_object(path, "the corrections that a review page saves, a JSON object")
@@ -63,16 +62,16 @@ def read_corrections(path: Path) -> Corrections:
 
 
 def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:
-    """The recording with a person's corrections; frames left out beat all others.
+    """Return the recording with corrections; frames left out override all others.
 
     Args:
         held: as it was captured.
         corrections: of this recording.
-        name: of the corrections, for faults.
+        name: of the corrections, for errors.
 
     Raises:
-        InputError: they belong to another track, or were applied already; a frame that does not
-            exist; a line that cannot be a body; fewer than two frames stay.
+        InputError: corrections of another track or applied already; a missing frame; a line that
+            cannot be a body; fewer than two frames left.
 
     """
     captured = held.captured
@@ -133,7 +132,7 @@ def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) ->
 
 
 def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats) -> Skeleton:
-    """The line that a person drew, at equal chords; as thick as the body usually is."""
+    """The drawn line at equal chords, with the usual thickness."""
     line = np.array(drawn.points_px, dtype=float)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum()) if np.isfinite(line).all() else 0.0
     if not 1.0 < length < _LONGEST * usual_px:

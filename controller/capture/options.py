@@ -1,4 +1,4 @@
-"""Options of ``snakewalk capture``, and their checks before any work is done."""
+"""Options of ``snakewalk capture``, and their checks before any work."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +52,7 @@ def check_options(options: CaptureOptions) -> None:
     """Check the options that need no film.
 
     Raises:
-        InputError: an option that cannot be used, or a result that exists.
+        InputError: an unusable option, or an existing result.
 
     """
     if options.cropped and options.background is not None:
@@ -132,7 +132,7 @@ def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool |
 
 
 def track_files(options: CaptureOptions, count: int) -> list[Path]:
-    """Return the files of the tracks of some animals: one each, or one table of all."""
+    """Return the files of the tracks: one per animal, or one table of all."""
     if options.output.suffix.lower() != ".npz":
         return [options.output]
     return [

@@ -1,7 +1,7 @@
 """Outlier frames: their body differs from the others, as it touches itself or another animal.
 
-A coil that leaves no hole and a small animal that touches the body have no side branch. But they
-make the body shorter, longer or locally thicker than in most frames, or change its area.
+A coil without a hole, or a small animal that touches the body, has no side branch. But it makes the
+body shorter, longer or locally thicker than in most frames, or changes its area.
 """
 
 from collections.abc import Sequence
@@ -14,18 +14,18 @@ from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _SPREADS = 6.0  # standard deviations, estimated from the median deviation
-_LENGTH = 0.06  # of the median: a smaller deviation does not count
+_LENGTH = 0.06  # of the median: smaller deviations are ignored
 _AREA = 0.08
 _THICK = 0.3
 _LEAST_PX = 0.3
 _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
-_FAINT = 0.25  # of the usual contrast: compression and noise of an empty frame, not an animal
-_FEWEST = 5  # frames from which outliers can be found
+_FAINT = 0.25  # of the usual contrast: below, compression and noise of an empty frame
+_FEWEST = 5  # least number of frames to find outliers
 
 
 def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton]:
-    """Give frames whose regions are far fainter than the film's animal the status ``NOTHING``.
+    """Give frames far fainter than the film's animal the status ``NOTHING``.
 
     Blocks of a compressed frame without an animal would otherwise be several animals.
 
@@ -44,7 +44,7 @@ def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton
 
 
 def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:
-    """Drop the skeletons of bodies that differ from the film's; their status says how.
+    """Drop the skeletons of bodies that differ from the film's; their status gives the difference.
 
     Args:
         skeletons: (T) the same end first in all.
@@ -62,7 +62,7 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     median = np.maximum(np.median(radius, axis=0), _LEAST_PX)
     spread = 1.4826 * np.median(np.abs(radius / median - 1.0), axis=0)
     most = np.maximum(_THICK, _SPREADS * spread)
-    # after a coil the other end may be first: that makes no body thick
+    # after a coil the other end may be first, which makes no body thick
     ways = [((way / median - 1.0) / most).max(axis=1) for way in (radius, radius[:, ::-1])]
     thick = np.minimum(*ways)
     for n, k in enumerate(good):
@@ -74,6 +74,6 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
 
 
 def _deviation(values: Floats, least: float) -> Floats:
-    """Deviation of each from the median; an outlier is beyond 1 or -1."""
+    """Deviation from the median; an outlier is beyond 1 or -1."""
     off = values / np.median(values) - 1.0
     return np.asarray(off / max(least, _SPREADS * 1.4826 * float(np.median(np.abs(off)))))

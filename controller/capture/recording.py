@@ -21,7 +21,7 @@ from snakewalk.sim.servo.motor import known_motors
 
 @dataclass(frozen=True, slots=True)
 class PaceFacts:
-    """Joint speed at the animal's pace, and how much slower a robot must be."""
+    """Joint speed at the animal's pace, and slowing that a robot needs."""
 
     joint_speed_rad_s: float
     joint_speed_95_rad_s: float
@@ -29,7 +29,7 @@ class PaceFacts:
     joint_acceleration_rad_s2: float
     joint_speed_limit_rad_s: float
     times_no_load_speed: float | None
-    """None where the servo's motor is not known."""
+    """None if the servo's motor is unknown."""
     slowed_by: float
     slowed_by_for_speed: float
     slowed_by_for_acceleration: float
@@ -38,7 +38,7 @@ class PaceFacts:
 
 @dataclass(frozen=True, slots=True)
 class RecordingFacts:
-    """A recording measured for one robot on one ground, rounded for a reader."""
+    """A recording measured for one robot on one ground, rounded."""
 
     recording: str
     source: str
@@ -46,14 +46,14 @@ class RecordingFacts:
     frames: int
     frames_left_out: int
     frames_missing: int
-    """Frames between the first and the last for which the file has no row."""
+    """Frames between the first and the last without a row in the file."""
     frames_bridged: int
-    """Frames in which a missing keypoint was set on the curve through the others."""
+    """Frames with a missing keypoint set on the curve through the others."""
     head_and_tail_swapped: int
     rate_hz: float
     rate_assumed: bool
     times_uneven: bool
-    """Whether the frames came at uneven times; ``rate_hz`` is then that of bodies put between."""
+    """Whether the frames came at uneven times; ``rate_hz`` is then that of interpolated bodies."""
     length_mm: float | None
     waves_on_body: float | None
     wave_hz: float | None
@@ -67,19 +67,19 @@ class RecordingFacts:
     robot: str
     states_kept: int
     states_refused: dict[str, int]
-    """Shapes refused, by reason, each counted for the first reason only."""
+    """Rejected shapes by their first reason."""
     places_recorded: bool
-    """False where the images were cropped to the animal: they contain no travel."""
+    """False where the images were cropped to the animal and contain no travel."""
     head_sure: float | None
-    """How surely the first point is the head, 0 to 1; None where the file does not say."""
+    """Certainty that the first point is the head, 0 to 1; None if the file does not contain it."""
     pace: PaceFacts
     every_nth_frame: int = 1
-    """Frames of the camera from one row of the file to the next."""
+    """Camera frames from one row of the file to the next."""
     notes: tuple[str, ...] = ()
     """Lines about parts that the reader left out or changed."""
 
     def to_dict(self) -> dict[str, object]:
-        """Return all facts, those of the pace among the others, for JSON."""
+        """Return all facts for JSON, those of the pace included."""
         own = {name: getattr(self, name) for name in RecordingFacts.__slots__ if name != "pace"}
         return own | {name: getattr(self.pace, name) for name in PaceFacts.__slots__}
 

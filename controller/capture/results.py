@@ -13,10 +13,10 @@ from snakewalk.controller.track.track import Track
 
 
 def write_captures(path: Path, animals: Sequence[CaptureFile], *, wide: bool = False) -> None:
-    """Write one captured animal as a track, or any number of them as a .csv or .wcon.
+    """Write one captured animal as a track, or any number as a .csv or .wcon.
 
     Args:
-        path: of the result; its suffix says the format.
+        path: of the result; its suffix gives the format.
         animals: one for an .npz.
         wide: one row of a .csv a frame, instead of one a point.
 
@@ -32,7 +32,7 @@ def write_captures(path: Path, animals: Sequence[CaptureFile], *, wide: bool = F
 
 
 def _track(held: CaptureFile) -> Track:
-    """The track that the reader makes of a captured animal; in pixels without a scale."""
+    """The track of a captured animal; in pixels without a scale."""
     if held.m_per_px is None:
         held = replace(held, m_per_px=1.0)
     with tempfile.TemporaryDirectory() as folder:

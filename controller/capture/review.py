@@ -1,7 +1,7 @@
 """The page on which a person reviews a capture: frames, skeletons, status over time; one file.
 
-It needs no server and no network. The corrections on it are saved as a file that
-``controller.capture.corrections`` reads.
+It needs no server and no network. It saves corrections as a file for
+``controller.capture.corrections``.
 """
 
 import base64
@@ -33,15 +33,15 @@ _WORDS: Final = [str(one) for one in FrameStatus]
 
 
 def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
-    """How much smaller the frames are drawn, so that the page stays one that a browser opens.
+    """Reduction of the frames that keeps the page below its limit.
 
     Args:
         some: frames spread over the recording.
         count: of all frames.
-        name: of the recording, for the fault.
+        name: of the recording, for errors.
 
     Raises:
-        InputError: the frames are so numerous that even small pictures would be too much.
+        InputError: too many frames even for the smallest pictures.
 
     """
     longest: int = max(max(frame.shape[:2]) for frame in some)
@@ -70,9 +70,9 @@ def review_page(
 
     Args:
         animals: of one recording.
-        frames: all of them, (H, W[, C]), as they were captured.
+        frames: all of them, (H, W[, C]), as captured.
         scale: of their pictures: ``picture_scale``.
-        tracks: the file of each animal, which the page names.
+        tracks: the file of each animal, for the page.
         origin_px: x, y of the frames' first pixel in the whole picture.
         on_progress: called after each frame.
 
@@ -100,7 +100,6 @@ def review_page(
 
 
 def _of_animal(held: CaptureFile, track: Path) -> dict[str, Any]:
-    """One animal on the page."""
     captured = held.captured
     corrections = f"{track.stem}-corrections.json"
     corrected = track.with_name(f"{track.stem}-corrected.npz")
@@ -123,7 +122,6 @@ def _of_animal(held: CaptureFile, track: Path) -> dict[str, Any]:
 
 
 def _packed(frame: DeepImage, scale: float) -> bytes:
-    """A frame as JPEG."""
     if scale < 1.0:
         size = tuple(max(1, round(side * scale)) for side in frame.shape[1::-1])
         frame = as_deep_as(frame, cv2.resize(frame, size, interpolation=cv2.INTER_AREA))

@@ -16,7 +16,7 @@ _FAMILIES = (
 
 
 def scale_of_length(length_m: float, length_px: Floats) -> float:
-    """Metres a pixel of an animal that is ``length_m`` long, from its length in every frame.
+    """Metres a pixel, from the animal's ``length_m`` and its length in every frame.
 
     Raises:
         InputError: not a length.
@@ -31,8 +31,8 @@ def scale_of_marker(marker: str, image: Image) -> float:
     """Metres a pixel from a marker of known size.
 
     Args:
-        marker: ``SIDE``, m, of a square ArUco or AprilTag marker that is in the image; or
-            ``X0,Y0,X1,Y1,METRES``: two places in the image and how far apart they are.
+        marker: ``SIDE``, m, of a square ArUco or AprilTag marker in the image; or
+            ``X0,Y0,X1,Y1,METRES``: two places in the image and their distance.
         image: a frame or the background, (H, W[, 3]).
 
     Raises:
@@ -60,7 +60,7 @@ def scale_of_marker(marker: str, image: Image) -> float:
 
 
 def _sides(image: Image) -> list[float]:
-    """Lengths in pixels of the sides of all markers of the first family that is found."""
+    """Side lengths, px, of all markers of the first family found."""
     for family in _FAMILIES:
         settings = cv2.aruco.DetectorParameters()
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX

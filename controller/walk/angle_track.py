@@ -1,8 +1,8 @@
 """The angle track: tangent angles along the path of the head, extended piece by piece.
 
-[PT] 2.6.4 interpolates the angles repeatedly, which blurs them. Here the samples stay as they are
-and one accumulated shift places the head on them. Without slip every point of the body passes
-through the angles of the head exactly.
+[PT] 2.6.4 interpolates the angles repeatedly, which blurs them. Here one accumulated shift places
+the head on unchanged samples. Without slip every point of the body passes through the angles of the
+head exactly.
 """
 
 import copy
@@ -55,7 +55,7 @@ class AngleTrack:
         self.append(body_rad[::-1])
 
     def body_rad(self, head: float) -> Floats:
-        """Angles (N,), head first, of a body whose head has travelled ``head`` segments.
+        """Angles (N,), head first, of a body with its head at ``head`` segments.
 
         Raises:
             ValueError: the head would be beyond the end, or the tail before the start.
@@ -80,7 +80,7 @@ class AngleTrack:
         return np.asarray(np.interp(sample, np.arange(self.end), self._samples))
 
     def displacement(self, start: int, stop: int, rotation_rad: float = 0.0) -> Floats:
-        """Displacement (2,), in segments, of a head that follows the samples without slip."""
+        """Displacement (2,), segments, of a head that follows the samples without slip."""
         angles = self._samples[start:stop] + rotation_rad
         return np.array([np.cos(angles).sum(), np.sin(angles).sum()])
 

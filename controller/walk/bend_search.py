@@ -1,4 +1,4 @@
-"""Bend search: bends of the mean line over two half bodies at which a piece of track costs least.
+"""Bend search: the cheapest bends of the mean line over two half bodies, for a piece of track.
 
 Bends are relative to their limit, in [-1, 1]. A hexagon about the best bends is judged, then the
 minimum of the parabola through these seven costs.
@@ -19,7 +19,7 @@ UNLIKE = np.array([[0, 0], [-1, 0], [1, 0], [-1, 1], [1, -1]], dtype=float)
 _HEXAGON = np.array([(1, 0), (-1, 0), (0.5, 1), (-0.5, -1), (-0.5, 1), (0.5, -1)], dtype=float)
 """Pairs that lie opposite each other, along three axes."""
 _STEP = np.array([0.25, 0.5])
-"""From the best so far to the hexagon about it (ours); the second bend counts half as much."""
+"""From the best bends to the hexagon about them (ours); the second bend counts half as much."""
 
 
 class Vertex(NamedTuple):
@@ -40,7 +40,7 @@ def vertex(bends: Floats, cost: float, costs: list[float]) -> Vertex:
     """Vertex of the parabola through ``cost`` at ``bends`` (2,) and ``costs`` at its hexagon.
 
     The vertex is at most a step away, and at ``bends`` if the parabola has no minimum. A hexagon
-    that the limit cuts off is used as if it were complete: the result is judged like all others.
+    that the limit cuts off is used as if it were complete.
     """
     pairs = list(zip(costs[::2], costs[1::2], strict=True))
     slopes = [0.5 * (ahead - back) for ahead, back in pairs]

@@ -1,9 +1,9 @@
-"""The course: the path in force through the waypoints, and the body's progress on it.
+"""The course: the path through the waypoints, and the body's progress on it.
 
 A waypoint counts when the body's centre is near it. Another path is planned from the head if the
 body passes by a waypoint, is 0.75 body lengths off the path, or stalls. That path avoids the places
-of earlier stalls. The planning is spread over control cycles; until it ends, the body follows the
-old path. The waypoints may change during the motion.
+of earlier stalls. The planning is spread over control cycles, in which the body follows the old
+path. The waypoints may change during the motion.
 """
 
 import math
@@ -26,19 +26,17 @@ _REPLAN_AFTER_BODIES = 2.0
 _STALL_BODIES = 0.25
 _STALL_AFTER_BODIES = 5.0
 _KEPT_M = 0.3
-"""Length of the path before the head that stays when the rest is renewed: the body is on it by
-then."""
+"""Length of the path before the head that a renewal keeps: the body is on it by then."""
 _BEND_RAD = 0.8
-"""By which a renewed path may bend where it goes on (ours)."""
+"""Largest bend of a renewed path where it continues (ours)."""
 _BEYOND = 1.5
-"""Metres of path for a straight metre that none leads along yet (ours)."""
+"""Weight of a straight metre that no path covers yet, metres of path (ours)."""
 
 
 def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -> float:
     """Direction from a point to the carrot ``carrot_m`` beyond ``along_m`` on the path.
 
-    The path continues straight beyond its end, so that the last carrot does not turn the body
-    around.
+    The path continues straight beyond its end: the last carrot does not turn the body around.
     """
     at = along_m + carrot_m
     carrot = path.position(min(at, path.length_m))
@@ -55,11 +53,11 @@ class _Onward:
     passed_m: list[float]
     """Arc lengths at the waypoints."""
     length_m: float
-    """Its own, and what is left from its end to the last waypoint, straight but weighted."""
+    """Its own, and the weighted straight rest from its end to the last waypoint."""
 
 
 class OnCourse:
-    """Progress that a motion along a course reports: part of ``PathProgress``."""
+    """Progress of a motion along a course: part of ``PathProgress``."""
 
     def __init__(self, course: "Course") -> None:
         self.course = course
@@ -77,7 +75,7 @@ class OnCourse:
 
     @property
     def missed(self) -> int:
-        """Number of paths planned again because the body missed a waypoint."""
+        """Number of paths planned again after a missed waypoint."""
         return self.course.missed
 
     @property
@@ -110,7 +108,7 @@ class Course:
         travel: float = 0.0,
         feedback: bool = True,
     ) -> None:
-        """Plan the first path from ``start_m`` (2,), the head, through the waypoints in order.
+        """Plan the first path from the head ``start_m`` (2,) through the waypoints in order.
 
         A centre within ``radius_m`` counts. ``travel`` and ``travel_per_body`` (a body length) have
         the motion's own unit. ``feedback``: a failed path is replaced.
@@ -138,11 +136,11 @@ class Course:
         self.missed = 0
         """How often another path was laid to a waypoint."""
         self.replanned: str | None = None
-        """Why another path was laid in the last step, if one was."""
+        """Reason for another path in the last step, or None."""
         self.path: SplinePath
         """In force."""
         self._passed_m: list[float]
-        """Arc lengths at which it passes the waypoints; infinite where it does not lead to one."""
+        """Arc lengths of the waypoints; infinite where the path does not lead to one."""
         self._lay(np.asarray(start_m, float), None)
 
     @property
@@ -195,7 +193,7 @@ class Course:
         head_m: Floats,
         fall_back: Callable[[bool], None] = lambda lost: None,
     ) -> bool:
-        """Update the progress; count a waypoint and return True if the centre is near it.
+        """Update the progress; count a waypoint near the centre, and return whether there is one.
 
         Arguments as in ``follow``.
         """
@@ -220,7 +218,7 @@ class Course:
         travel: float,
         fall_back: Callable[[bool], None] = lambda lost: None,
     ) -> None:
-        """Count a waypoint when the centre is near it; request another path if this one failed.
+        """Count a waypoint near the centre; request another path if this one failed.
 
         ``heading_rad`` is called only for another path. ``travel`` counts whether or not the body
         advanced. ``fall_back`` is called with False when a waypoint is reached.
@@ -249,7 +247,7 @@ class Course:
     def continue_planning(self, fall_back: Callable[[bool], None] = lambda lost: None) -> None:
         """Do one cycle's work on the requested path; put it in force when it is complete.
 
-        If no safe path is found, the old one stays. ``fall_back`` is called with whether the same
+        Without a safe path the old one stays. ``fall_back`` is called with whether the same
         waypoint was missed again.
         """
         replanning = self._replanning
@@ -275,7 +273,7 @@ class Course:
         """Plan the path again beyond its next piece, because more of the ground is known.
 
         If that piece is not clear (test of points (n, 2)), the new path begins at the head, in the
-        body's direction. If no path is found, the old one stays.
+        body's direction. Without a new path the old one stays.
         """
         path, along_m = self.path, float(self._along_m[1])
         join_m = min(along_m + _KEPT_M, path.length_m)
@@ -308,7 +306,7 @@ class Course:
         """Replace the remaining waypoints by (k, 2) others; none end the course here.
 
         If the new ones begin with the remaining ones, the path is extended from its end; else it
-        begins at the head. ``heading_rad`` is called only then.
+        begins at the head, and ``heading_rad`` is called.
 
         Raises:
             InputError: as the planner; then nothing has changed.
@@ -338,7 +336,7 @@ class Course:
     def _onward(self, join_m: float) -> "_Onward":
         """Keep the path up to ``join_m``, and plan from there.
 
-        The new part keeps the path's direction, unless the path ends there and the bend is small.
+        The new part keeps the direction, unless the path ends there and the bend is small.
 
         Raises:
             InputError: as the planner.
@@ -384,7 +382,7 @@ class Course:
         return (self._travel - self._gained_at) / self._per_body > _STALL_AFTER_BODIES
 
     def _has_passed(self, centre_m: Floats) -> bool:
-        """Whether the body is beyond the next waypoint on the path without having come near it."""
+        """Whether the body is beyond the next waypoint on the path, which it did not come near."""
         path, end_m = self.path, self.path.length_m
         along_m = float(self._along_m[0])
         if (
@@ -418,7 +416,7 @@ class Course:
         self._passed_m = [0.0] * self.reached + self._passes(self.path, left_m)
 
     def _passes(self, path: SplinePath, waypoints_m: Floats) -> list[float]:
-        """Arc lengths of a path at waypoints (k, 2); infinite from the first beyond its reach.
+        """Arc lengths of a path at waypoints (k, 2); infinite from the first out of reach.
 
         A path on a partial map may end before a waypoint.
         """

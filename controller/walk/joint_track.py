@@ -1,8 +1,7 @@
 """Joint track: joint goals along the path of the head, with a continuous first derivative.
 
-Joint angles are known at whole heads, where the skeleton falls on the samples. A quadratic B-spline
-connects them, so the second derivative is known everywhere and a time law can limit joint speed
-*and* acceleration.
+A quadratic B-spline connects the joint angles at whole heads, where the skeleton falls on the
+samples. So its second derivative is known, and a time law can limit joint speed *and* acceleration.
 """
 
 import copy
@@ -34,7 +33,7 @@ class JointTrack:
         self._limit_rad = np.asarray(limit_rad, dtype=float)
         self._joints = joints_of
         self.first = track.points
-        """The head at which the first sample of the tables stands."""
+        """Head at the first sample of the tables."""
         self._q = self._joints_of(track.body_rad(float(track.points)))[None]
 
     def _joints_of(self, body_rad: Floats) -> Floats:
@@ -43,7 +42,7 @@ class JointTrack:
         return np.asarray(clipped)
 
     def on(self, track: AngleTrack) -> "JointTrack":
-        """Return a copy on a track that begins like its own."""
+        """Return a copy on a track that begins like this one."""
         other = copy.copy(self)
         other.track = track
         return other
@@ -66,7 +65,7 @@ class JointTrack:
 
     @property
     def last(self) -> int:
-        """Largest head at which the goal does not depend on future samples, plus one."""
+        """Largest head whose goal does not depend on future samples, plus one."""
         return self.first + len(self._q) - 1
 
     def grow(self) -> bool:
@@ -78,7 +77,7 @@ class JointTrack:
         return True
 
     def goal_rad(self, head: float) -> Floats:
-        """(J,) joint angles; beyond the ends of the known track the spline continues straight."""
+        """(J,) joint angles; beyond the known track the spline continues straight."""
         goal = np.empty(self._q.shape[1])
         _spline(self._q, head - self.first, goal)
         return goal
@@ -103,7 +102,7 @@ class JointTrack:
 
 @compiled("void(float64[:, ::1], float64[::1], float64[::1])")
 def _bends(q: Floats, slope: Floats, turn: Floats) -> None:
-    """Largest |dq/dS| and |d2q/dS2| of rows ``q`` (n, J) within one row to either side, (n,)."""
+    """Largest |dq/dS| and |d2q/dS2| of ``q`` (n, J) within one row to either side, (n,)."""
     last = len(q) - 1
     for k in range(last + 1):
         slope[k] = turn[k] = 0.0

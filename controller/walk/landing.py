@@ -1,8 +1,7 @@
 """Landing: a body swims along its course until it meets the ground, then walks.
 
-Only the measured pose shows the ground: a swimming body advances equally in every cycle, and hardly
-at all once its head lies on the beach. The change of gait is one join without a step
-(``controller.motion.source_switch``).
+Only the measured pose shows the ground: a swimming body hardly advances once its head lies on the
+beach. The change of gait has no step (``controller.motion.source_switch``).
 """
 
 from collections.abc import Callable
@@ -34,13 +33,8 @@ class Landing(MotionWrapper, OnCourse):
     ) -> None:
         """Begin to swim.
 
-        Args:
-            swim: the gait in the water.
-            make_walk: makes the gait on land, on the same course, from the number of cycles so far.
-            robot: the robot of both gaits.
-            headway: share of the best advance per cycle; a cycle below it ends the swim.
-            on_ashore: called with a text when the body meets the ground.
-
+        ``make_walk`` makes the gait on land, on the same course, from the number of cycles so far.
+        The swim ends if a cycle advances less than the share ``headway`` of the best one.
         """
         OnCourse.__init__(self, swim.course)
         self._swim: SteeredGait | None = swim

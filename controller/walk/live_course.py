@@ -1,7 +1,6 @@
 """A live course: an operator sets the waypoints of a motion while it runs.
 
-The motion rests at the last waypoint, holds its shape and waits for another. It is done when the
-operator ends it.
+The motion rests at the last waypoint and waits for another. It is done when the operator ends it.
 """
 
 import math
@@ -27,11 +26,11 @@ NEXT: Final = "next"
 CLEAR: Final = "clear"
 """Leave out those that are left."""
 END: Final = "end"
-"""Leave them out, and end the run where the motion comes to rest."""
+"""End the run at rest, without the remaining waypoints."""
 WAYPOINTS_MAX: Final = 1000
 """Most waypoints that a run accepts (ours)."""
 _COMMANDS_MAX: Final = 10
-"""Commands that are carried out in a step (ours): a person clicks less often."""
+"""Largest number of commands in a step (ours): a person clicks less often."""
 _APART_M: Final = 0.05
 """Between where a path begins and where it leads (ours)."""
 
@@ -59,8 +58,8 @@ class LiveCourse(MotionWrapper, OnCourse):
 
         Args:
             motion: along a course.
-            commands: returns those set since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``.
-                Other values are reported as rejected.
+            commands: returns those since the last call: ``ADD``, ``NEXT``, ``CLEAR``, ``END``;
+                others are rejected.
             check: raises ``InputError`` for a point (2,) that cannot be a waypoint on any path.
             on_event: called with ("operator", text) for an action, ("refused", text) for a
                 rejection.

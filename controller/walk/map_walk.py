@@ -1,7 +1,7 @@
 """A walk over unknown ground, on a map that grows as the snake moves.
 
-The map replaces the ground in all parts of the walk: path, predictions, and pitch. Unknown places
-use the map's filled-in heights, and no path leads over them.
+The map replaces the ground in path, predictions, and pitch. Unknown places use the map's filled-in
+heights, and no path leads over them.
 """
 
 from collections.abc import Callable
@@ -31,8 +31,8 @@ class MapWalk(MotionWrapper, OnCourse):
     ) -> None:
         """Begin with the current map, to which the caller adds pictures.
 
-        ``planner`` is the course's. ``change_ground`` sets the ground of the pilot's predictions
-        and pitch. A path that ends before a waypoint is planned again after ``replan_m`` of travel.
+        ``planner`` is the course's. ``change_ground`` sets the ground of predictions and pitch. A
+        path that ends before a waypoint is planned again after ``replan_m`` of travel.
         """
         OnCourse.__init__(self, pilot.course)
         MotionWrapper.__init__(self, pilot)
@@ -70,7 +70,7 @@ class MapWalk(MotionWrapper, OnCourse):
         return goal_rad
 
     def _renew(self, view: BodyView) -> None:
-        """Plan again if the path is now seen to be unsafe, or can lead farther."""
+        """Plan again if the path is now known to be unsafe, or can lead farther."""
         course = self.course
         ahead_m = course.path.piece_m(course.head_along_m, course.path.length_m)
         if not self._planner.clear(ahead_m):

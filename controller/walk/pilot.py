@@ -1,9 +1,8 @@
 """The pilot: the snake walk along a path, as a motion source with path progress.
 
 It reads the measured body, returns joint goals and counts waypoints. It requests the next shape
-before the track ends.
-With ``feedback`` off it assumes that the body follows the track without slip. This is the printed
-method, kept to show its effect on a body with friction.
+before the track ends. With ``feedback`` off it assumes no slip: the printed method, kept to show
+its effect on a body with friction.
 """
 
 import copy
@@ -40,9 +39,9 @@ from snakewalk.controller.walk.twin_rollout import LENGTH_BODIES, TwinRollout
 # Segments of track left when the next piece is decided: the time law looks ahead.
 _LOOKAHEAD_SEGMENTS = 6.0
 _THINK_SEGMENTS = 9.0
-"""Track on which a decision is thought about, a little in each cycle, before it is needed."""
+"""Length of track, before a decision, in which it is prepared over several cycles."""
 _RECENT_SEGMENTS = 30
-"""Track behind the head, besides the body, that a twin elsewhere is sent."""
+"""Length of track behind the head, besides the body, for a twin in another process."""
 _PITCH_SMOOTHING_S = 0.1
 
 # Shorter steps are accumulated: they are too short to measure a speed.
@@ -55,7 +54,7 @@ class ShapeChooser(Protocol):
     track: AngleTrack
 
     def think(self, look: Callable[[], PathPose]) -> bool:
-        """Spend a cycle on the next decision; only the first call after a decision calls ``look``.
+        """Prepare the next decision for a cycle; only the first call after one calls ``look``.
 
         Returns:
             Whether more thinking is useful.
@@ -110,10 +109,7 @@ class AsksAboutPieces(Protocol):
 
 
 class Pilot(OnCourse):
-    """Steers a chooser of shapes along a path through waypoints.
-
-    The time law keeps the joints within the robot's limits.
-    """
+    """Steers a chooser of shapes along a path, within the limits of the joints."""
 
     needs = Needs(yaw=True, wheels=True)
 
@@ -167,7 +163,7 @@ class Pilot(OnCourse):
 
     @property
     def done(self) -> bool:
-        """Whether every waypoint has been reached and the shape has come to rest."""
+        """Whether every waypoint has been reached and the shape is at rest."""
         return self.course.complete and self._time_law.speed_segments_s == 0.0
 
     @property
@@ -177,15 +173,15 @@ class Pilot(OnCourse):
 
     @property
     def pulse_m_s(self) -> float:
-        """Speed of the shape along the body, from the time law."""
+        """Speed of the shape along the body."""
         return self._time_law.speed_segments_s * self._segment_m
 
     def goal_rad(self) -> Floats:
-        """(J,) current joint targets; before the first step, those of the initial shape."""
+        """(J,) current joint targets, at first those of the initial shape."""
         return self._goal_rad
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) from the last steps: the speed half a step ago, extrapolated by its change."""
+        """(J,) speed half a step ago, extrapolated by its change."""
         if self._last_s == 0.0:
             return np.zeros(len(self._goal_rad))
         speed = (self._goal_rad - self._last_rad) / self._last_s
@@ -198,7 +194,7 @@ class Pilot(OnCourse):
         return self._pace
 
     def begin(self, view: BodyView) -> Floats:
-        """Fit the first shape to the ground under the body; return the first targets (J,)."""
+        """Fit the first shape to the ground; return the first targets (J,)."""
         self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
         self._last_rad = self._earlier_rad = self._goal_rad
         return self._goal_rad
@@ -225,7 +221,7 @@ class Pilot(OnCourse):
         self.decision = None
 
     def restart(self, view: BodyView, restart: Callable[[Floats], None]) -> None:
-        """Start again from rest with the measured body (N,); ``restart`` of the chooser gets it."""
+        """Start again from rest with the measured body (N,); calls ``restart`` of the chooser."""
         points = self._chooser.track.points
         at = (np.arange(points) + 0.5) * self._links / points - 0.5
         restart(np.interp(at, np.arange(self._links), view.headings_rad))
@@ -273,10 +269,10 @@ class Pilot(OnCourse):
         return self._move(dt_s, view)
 
     def _think(self, view: BodyView) -> bool:
-        """Think about the next piece of track, or decide; return whether that fills the cycle.
+        """Prepare the next piece of track, or decide; return whether that fills the cycle.
 
-        While a path is planned, at least every second cycle is left for that. At rest the path
-        comes first, because the piece depends on it.
+        While a path is planned, it gets at least every second cycle. At rest it comes first,
+        because the piece depends on it.
         """
         if not self._decides or (self._at_rest and self.course.is_planning):
             return False
@@ -358,7 +354,7 @@ class Pilot(OnCourse):
         return self._twin.roll(pose, lambda: other.head >= end, other._move)
 
     def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
-        """Add to yaw goals (J,) the pitch that fits the body to the ground under it.
+        """Add to yaw goals (J,) the pitch that fits the body to the ground.
 
         The pitch is smoothed over ``_PITCH_SMOOTHING_S``, because the ground consists of facets.
         """
@@ -376,7 +372,7 @@ class Pilot(OnCourse):
     def _ahead(self, view: BodyView) -> tuple[Floats, Floats]:
         """Head (2,) and headings (L,) of the links ``_pitch_lead_s`` ahead on the track.
 
-        The pitch is fitted there because goals for the ground under the body now would be late.
+        Goals for the ground under the body now would be late.
         """
         track, head_m = self._time_law.joints.track, view.link_m[0, :2]
         headings_rad = view.headings_rad
@@ -410,7 +406,7 @@ class Pilot(OnCourse):
         return self._table
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
-        """Offset from track to world, and the world direction of the aim."""
+        """Offset from track to world, and the aim's direction in the world."""
         headings_rad, head_m, centre_m = view.headings_rad, view.link_m[0, :2], view.centre_m[:2]
         believed_rad = self._at_links(self._chooser.track.body_rad(self.head))
         offset = offset_rad(headings_rad, believed_rad)
@@ -425,7 +421,7 @@ class Pilot(OnCourse):
             head_m = self._dead_reckoned(self._start[0], offset)
             along_m = self.path.nearest(head_m, self.along_m)
             return offset, aim_rad(self.path, head_m, along_m, self._carrot_m)
-        # The piece begins at the end of the track: aim from the position of the head by then.
+        # The piece begins at the end of the track: aim from the head's position by then.
         lead_m = (self._chooser.track.end - self.head) * self._segment_m
         heading = headings_rad.mean()
         ahead_m = head_m + lead_m * np.array([np.cos(heading), np.sin(heading)])

@@ -1,9 +1,8 @@
 """The predictive snake walk: W proposes shapes, and a rollout predicts where each carries the body.
 
 [PT] 2.6.2 with additions for slopes. A state is walked for a part of its length. Every tenth of a
-body the part that the head has not reached is bent again. ``Steering`` judges states and bends. W
-orders the states, so that the walk never repeats itself; the rollout chooses among the first of
-them.
+body the part ahead of the head is bent again. W orders the states, so the walk never repeats
+itself; the rollout (``Steering``) chooses among the first of them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,7 +32,7 @@ CLIMBING = (
     SerpenoidParameters(amplitude_rad=1.3, waves=1.0),
 )
 """Carriers of states uphill. On paper a slope of 15 degrees leaves the first 0.27 of the progress
-without slip, one of 18 degrees the second 0.17; a fifth of a state costs 0.02 of that."""
+without slip, one of 18 degrees the second 0.17."""
 SERPENOIDS = (SerpenoidParameters(), *CLIMBING)
 """Carriers that the walk falls back on."""
 _JOIN = 0.1
@@ -43,9 +42,9 @@ _REST = 20
 _BATCH = 6
 """Rollouts in a cycle: 1 to 3 ms of a processor of 2020."""
 _ASTRAY_M2 = 0.08
-"""Cost from which on bends all over are judged (ours): 0.2 m off the path at both ends."""
+"""Cost from which bends all over are judged (ours): 0.2 m off the path at both ends."""
 _TROUBLE_M2 = 0.2
-"""Cost on a simulated body from which on other pieces are tried: 0.3 m off the path at the end."""
+"""Cost on a simulated body from which other pieces are tried: 0.3 m off the path at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +53,13 @@ class _Option:
 
     state: int
     near: int
-    """States within tolerance of the aim, of which it was one."""
+    """States within tolerance of the aim, including this one."""
     base_rad: float
     """Angle of its mean line at its begin."""
     wave_rad: Floats
-    """(n,) what comes, oldest first, about the mean line; a body length of it is rolled out."""
+    """(n,) the continuation about the mean line, oldest first; a body length is rolled out."""
     carrier: SerpenoidParameters | None = None
-    """Wide wave on which the state rides uphill; None on easier ground."""
+    """Wide wave under the state uphill; None on easier ground."""
     carrier_at: int = 0
     """Sample of the carrier at the begin."""
 
@@ -73,7 +72,7 @@ class _Tried(NamedTuple):
     """Over that at the wanted pulse without slip."""
     option: _Option
     bends: Floats
-    """(2,) of the mean line over the first and the second half body, over the limit."""
+    """(2,) of the mean line over the first and second half body, relative to the limit."""
     piece_rad: Floats
 
 
@@ -90,13 +89,8 @@ class PredictiveWalker:
     ) -> None:
         """Start on the first shape of the library, whose means are zero.
 
-        Args:
-            shapes_rad: the library.
-            walk: limits of the proposed states.
-            make_steering: called with this walker's track.
-            joints: number of yaw joints.
-            accept: whether a body (N,) is within joint limits and does not touch itself.
-
+        ``walk`` limits the proposed states. ``make_steering`` is called with this walker's track.
+        ``accept`` returns whether a body (N,) is within joint limits and does not touch itself.
         """
         if len(shapes_rad) == 0:
             raise ValueError("the walk needs at least one shape")
@@ -119,13 +113,13 @@ class PredictiveWalker:
         self.try_piece: Callable[[PathPose, Floats], Rolled] | None = None
         """Tries a piece (n,) on a simulated body; None without a twin."""
         self.ask: Callable[[PathPose, Sequence[Floats]], None] | None = None
-        """Asks a simulated body elsewhere about pieces (n,); None without one."""
+        """Asks a simulated body elsewhere about pieces (n,), or None."""
         self.answers: Callable[[], Mapping[int, Rolled | None]] = dict
         """Returns the results that have arrived, by the number of the piece."""
         self._asked: list[_Tried] = []
         self._in_trouble = False
         self.outlook = 1.0
-        """Predicted of the last decision: progress over that at the wanted pulse without slip.
+        """Predicted progress of the last decision, relative to the wanted pulse without slip.
 
         Where the piece was tried on a simulated body, it is that body's.
         """
@@ -146,13 +140,13 @@ class PredictiveWalker:
         self.steering.use_friction(friction)
 
     def fall_back(self, lost: bool) -> None:
-        """Set whether to continue as a serpenoid, the last resort, steered the same way."""
+        """Set whether to continue as a steered serpenoid, the last resort."""
         if lost != self._lost:
             self._lost = lost
             self.think_anew()
 
     def think(self, look: Callable[[], PathPose]) -> bool:
-        """Spend a cycle on the next decision; only the first call calls ``look``.
+        """Prepare the next decision for a cycle; only the first call calls ``look``.
 
         Returns:
             Whether more thinking is useful.
@@ -166,7 +160,7 @@ class PredictiveWalker:
         return next(self._thinking, False)
 
     def decide(self, pose: PathPose) -> Decision:
-        """Append the best piece judged so far; at rest, the best of all."""
+        """Append the best piece so far; at rest, the best of all."""
         if self._thinking is None:
             self.think(lambda: pose)
         while self.track.end == self.track.points and self.think(lambda: pose):
@@ -196,7 +190,7 @@ class PredictiveWalker:
         return self._at >= self._until
 
     def _best(self) -> _Tried:
-        """Cheapest piece with an accepted body; the cheapest of all if no body is accepted."""
+        """Cheapest piece with an accepted body; else the cheapest of all."""
         ranked = sorted(self._tried, key=lambda each: each.cost_m2)
         return next(filter(self._may_be_made, ranked), ranked[0])
 
@@ -226,7 +220,7 @@ class PredictiveWalker:
         return piece._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
 
     def _answered_best(self, best: _Tried) -> _Tried:
-        """Return the best piece of those that the remote twin has answered in time.
+        """Return the best piece among the answers of the remote twin.
 
         Without an answer about the best piece on paper, another one must be good.
         """
@@ -274,7 +268,7 @@ class PredictiveWalker:
         return self._unlike(best)
 
     def _unlike(self, best: _Tried) -> list[_Tried]:
-        """Return judged pieces that differ from the best and each other, cheapest first."""
+        """Judged pieces that differ from the best and each other, cheapest first."""
         chosen = [best]
         for each in sorted(self._tried, key=lambda each: each.cost_m2):
             if len(chosen) == self._walk.tries:
@@ -289,7 +283,7 @@ class PredictiveWalker:
         return chosen[1:]
 
     def _judge(self, pose: PathPose) -> Iterator[bool]:
-        """Judge options and bends in batches, the most likely ones first."""
+        """Judge options and bends in batches, the most likely first."""
         bends = self._bends[None]
         if self._is_new:
             bends = np.append(SCREEN, bends, axis=0)
@@ -311,7 +305,7 @@ class PredictiveWalker:
     def _narrow(self, pose: PathPose) -> Iterator[bool]:
         """Judge bends about the best, and the minimum of a parabola through them.
 
-        If the minimum may lie outside, repeat about the best of them.
+        If the minimum may lie outside, repeat.
         """
         for _ in range(2):
             middle = self._best_so_far()
@@ -359,7 +353,7 @@ class PredictiveWalker:
     def _new_options(
         self, pose: PathPose, carrier: SerpenoidParameters | None = None
     ) -> list[_Option]:
-        """Other states: the smoothest of the first of W; as a fallback, serpenoids."""
+        """Other states: the smoothest of the first of W; serpenoids as a fallback."""
         points, walk = self.track.points, self._walk
         if self._lost:
             return [self._serpenoid(each) for each in SERPENOIDS]
@@ -401,7 +395,7 @@ class PredictiveWalker:
         return np.take(whole, np.arange(1, count + 1), axis=1, mode="wrap")
 
     def _roughness(self, angles_rad: Floats) -> Floats:
-        """Mean square (n,) of the joints' accelerations on angles (n, m), in arbitrary units."""
+        """Mean square (n,) of the joints' accelerations on angles (n, m), arbitrary units."""
         tail_rad = self.track.samples(self.track.end - 2 * self._span)
         rough = np.empty(len(angles_rad))
         _roughness(tail_rad, angles_rad, self._span, rough)

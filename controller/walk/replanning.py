@@ -9,8 +9,7 @@ from snakewalk.controller.terrain.in_steps import Steps, Unfinished
 from snakewalk.controller.terrain.path import SplinePath
 
 UNITS_PER_CYCLE = 1000
-"""Work on a path in a control cycle (ours): about a millisecond of a processor of 2020, as long as
-a batch of the walk's rollouts."""
+"""Work on a path in a control cycle (ours): about a millisecond of a processor of 2020."""
 
 
 class PathPlanner(Protocol):
@@ -21,8 +20,8 @@ class PathPlanner(Protocol):
     ) -> SplinePath:
         """Plan through (n, 2) points in order, from a heading if one is given.
 
-        The path avoids places ``avoid_m`` (k, 2) if possible. ``number`` is that of the second
-        point, a waypoint, for messages.
+        The path avoids places ``avoid_m`` (k, 2) if possible. ``number`` is the second point's, for
+        messages.
         """
         ...
 
@@ -40,7 +39,7 @@ class PlansInSteps(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PathRequest:
-    """A requested path, from the body's position at the time of the request."""
+    """A requested path, from the body's position at that time."""
 
     why: str
     points_m: Floats

@@ -12,23 +12,23 @@ from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.steering import PathPose
 
 ARCS_RAD = np.array([-2.4, -2.0, -1.6, 1.6, 2.0, 2.4])
-"""Bends of the whole body, of which one is chosen to roll in (ours)."""
+"""Bends of the whole body (ours)."""
 FREQUENCY_HZ = 1.0
 """Turns a second (ours); joints at their limit slow it."""
 MOST_TURNS = 16
 JOIN_S = 1.5
 """Cost of joining, there and back."""
 _UPHILL = 0.7
-"""Cosine between a roll and the way straight up, at least."""
+"""Least cosine between a roll and the slope's direction."""
 _LEAST_SLOPE = 0.07
 _TURNS_RAD = np.array([1.2, 2.4])
-"""Turns of the walk away from the arc, before it, of which one is chosen (ours)."""
+"""Turns of the walk away from the arc, before it (ours)."""
 _AT_ONCE_RAD = np.array([-2.6, -2.0, -1.4, 1.4, 2.0, 2.6])
 """Bends that the joints make at once, without a piece of track (ours)."""
 _TRIES = 6
-"""Plans that are tried on a twin, those first that are fastest on paper (ours)."""
+"""Plans that are tried on a twin, the fastest on paper first (ours)."""
 _STEPS_M = 0.05 * np.eye(2)
-"""Steps in x and in y, to either side: the slope under the body is computed from them."""
+"""Steps in x and in y, to either side, for the slope under the body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class RollPlan:
     """An arc to lie in, and whole turns in it."""
 
     bend_rad: float
-    """Bend of the whole body, positive to the left; it rolls to the side to which it bends."""
+    """Bend of the whole body, positive to the left; it rolls to that side."""
     piece_rad: Floats
     """(n,) the walk's last piece of track; empty where the joints bend at once."""
     turns: int
@@ -71,12 +71,12 @@ class RollPlanner:
         """Way of one turn, without slip."""
 
     def best(self, pose: PathPose, walker: PredictiveWalker, target_m: Floats) -> RollPlan | None:
-        """Return the roll that approaches the target fastest; None if no roll does."""
+        """Return the roll that approaches the target fastest, or None."""
         plans = list(self._plans(pose, walker, target_m))
         return max(plans, key=lambda plan: plan.speed_m_s, default=None)
 
     def to_go_m(self, target_m: Floats, links_m: Floats, heading_rad: float, side: float) -> Floats:
-        """Distances (k + 1,) from the target (2,) now and after each of k whole turns.
+        """Distances (k + 1,) from the target (2,) now and after each whole turn.
 
         They end before a turn that climbs too little or comes to unsafe ground. ``links_m`` is (L,
         2), the heading is that of the body's mean line, and ``side`` is 1 (left) or -1.
@@ -100,10 +100,9 @@ class RollPlanner:
     def tried(
         self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, heading_rad: float
     ) -> list[RollPlan]:
-        """Return plans worth a try towards a target (2,), the fastest on paper first.
+        """Return plans for rolls towards a target (2,), the fastest on paper first.
 
-        An arc is laid by the track, at once or after a turn to the other side, or made by the
-        joints at once.
+        The track lays an arc, maybe after a turn to the other side; or the joints make it at once.
         """
         plans = self._plans(pose, walker, target_m)
         for turn in _TURNS_RAD.tolist():
@@ -138,7 +137,7 @@ class RollPlanner:
         heading_rad: float,
         laid_s: float,
     ) -> list[RollPlan]:
-        """Return the plan to roll in an arc that is complete after ``laid_s``; or no plan.
+        """Return the plan to roll in an arc that is complete after ``laid_s``, or None.
 
         The arc's centre (2,) and heading are those of its mean line.
         """

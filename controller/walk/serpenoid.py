@@ -60,7 +60,7 @@ SERPENOID = -1
 
 
 def phase_at_end(track: AngleTrack, parameters: SerpenoidParameters) -> tuple[float, int]:
-    """Join a serpenoid to another track: at its last angle, bending the same way.
+    """Join a serpenoid to a track: at its last angle, bending the same way.
 
     Returns:
         Angle of the mean line, and the next sample of the wave.

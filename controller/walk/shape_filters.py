@@ -14,7 +14,7 @@ from snakewalk.controller.shape.crossing import self_touches
 from snakewalk.controller.shape.library import ShapeFilter
 
 MADE = ("joint limits", "self-contact")
-"""Tests of the robot's limits; the others say which shapes are worth making."""
+"""Tests of the robot's limits; the others select useful shapes."""
 
 
 def shape_filters(
@@ -22,8 +22,7 @@ def shape_filters(
 ) -> dict[str, ShapeFilter]:
     """Tests by reason, cheapest first: each maps shapes (S, points) to a mask (S,) of bad ones.
 
-    - The turn exceeds ``states.turn_limit_rad``. A walk decides again after part of a shape, so it
-      never completes a coil's turn as aimed.
+    - The turn exceeds ``states.turn_limit_rad``. A walk never completes a coil's turn.
     - Joints exceed their limits after retargeting.
     - Parts of the body touch.
     - The quasi-static gain is below the limit (docs/method.md).

@@ -1,9 +1,9 @@
 """Side rolls: a body rolls like a log up a slope that its walk does not climb.
 
 An arc with its ends uphill rolls up 20 degrees by its girth per turn; one that opens downhill tips
-over. The best wave makes 0.05 m/s straight up 18 degrees, and nothing from rest at the foot.
-After a missed waypoint each decision compares two predicted speeds towards it: of the best rollout
-and of a roll. The walk's last piece of track is then the arc. The joins have no step in speed.
+over. The best wave makes 0.05 m/s straight up 18 degrees, and nothing from rest at the foot. After
+a missed waypoint each decision compares the predicted speeds of the best rollout and of a roll. The
+walk's last piece of track is then the arc. The joins have no step in speed.
 """
 
 from collections.abc import Callable
@@ -39,31 +39,31 @@ from snakewalk.controller.walk.twin_answers import TwinAsker
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
 LEAST_SPEED_M_S = 0.04
-"""At which a roll has to bring the body nearer to its target (ours): the walk climbs so fast."""
+"""Least speed of a roll towards its target (ours): the walk climbs at that speed."""
 _TARGET_M = 2.5
 """Farthest target on the path."""
 _UPRIGHT_RAD = 0.6
-"""A body that has rolled by more does not lie as the arc is meant."""
+"""Largest roll of a body that lies as the arc needs."""
 _DROP_M = 0.1
-"""A body that has come down by so much since it was highest rolls down: it stops."""
+"""Height lost since the highest place, at which a roll stops."""
 _EARLY_RAD = 0.3
-"""Angle of the last turn that is left to the join."""
+"""Angle of the last turn that the join makes."""
 _AGAIN_BODIES = 0.5
 """Travel of the walk between two rolls."""
 _SLOW = 0.3
-"""Progress of the walk from which on nothing is tried on a twin (ours)."""
+"""Progress of the walk from which nothing is tried on a twin (ours)."""
 _TRY_AGAIN_BODIES = 0.4
-"""Travel of the walk between two times that rolls are tried."""
+"""Travel of the walk between two trials of rolls."""
 _LAID_S = 12.0
 """Longest time until the walk's last piece ends."""
 _WALK_ON_S = 1.5
 """Cost of walking again after a roll."""
 _LOST_M = 0.15
-"""A body that is so much farther from its target than it was rolls away: it stops."""
+"""Increase of the distance to the target at which a roll stops."""
 _GAIN_M, _GAIN_S = 0.03, 3.0
-"""A body that has come nearer by less for this time rolls on the spot: it stops (ours)."""
+"""A roll stops if it gains less distance in this time (ours)."""
 _OFF_PATH_M = 0.2
-"""A body that a roll has left so far off its path goes on by another (ours)."""
+"""Distance from the path after a roll from which another path is planned (ours)."""
 
 
 class SideRolls(MotionWrapper, OnCourse):
@@ -83,17 +83,10 @@ class SideRolls(MotionWrapper, OnCourse):
         pulse_m_s: float,
         on_event: Callable[[str, str], None] = lambda kind, text: None,
     ) -> None:
-        """Begin with the walk.
+        """Begin with the walk of ``pilot``, whose chooser is ``walker``.
 
-        Args:
-            pilot: of the walk.
-            walker: the pilot's chooser.
-            robot: round, with yaw and pitch joints.
-            planner: of rolls, for the same robot.
-            climb_progress: predicted progress above which the walk needs no roll.
-            pulse_m_s: wanted speed of the walk, the unit of its progress.
-            on_event: called with the kind of an event, and a line of text.
-
+        The walk needs no roll above the predicted progress ``climb_progress``, in units of
+        ``pulse_m_s``. ``on_event`` is called with the kind of an event, and a line of text.
         """
         OnCourse.__init__(self, pilot.course)
         self._pilot, self._walker, self._robot, self._planner = pilot, walker, robot, planner
@@ -124,7 +117,7 @@ class SideRolls(MotionWrapper, OnCourse):
 
     @property
     def pulse_m_s(self) -> float:
-        """Speed of the shape along the body; 0 while it rolls or begins to walk again."""
+        """Speed of the shape along the body; 0 in a roll or when the walk begins again."""
         return 0.0 if self.rolling or self._switch.blending else self._pilot.pulse_m_s
 
     def pace(self) -> Pace:
@@ -305,7 +298,7 @@ class _Rolling:
         self._turned_rad = self._time_s = 0.0
 
     def is_over(self, dt_s: float, view: BodyView, planner: RollPlanner) -> bool:
-        """Whether to stop: turns done, time over, rolling down or away, or no gain left."""
+        """Whether to stop: turns done, time over, rolling down or away, or no gain."""
         roll_rad = body_roll_rad(view)
         self._turned_rad -= self._plan.side * float(wrap(roll_rad - self._roll_rad))
         self._roll_rad = roll_rad

@@ -28,12 +28,12 @@ from snakewalk.controller.motion.turned_gait import (
 from snakewalk.controller.walk.course import Course, OnCourse, aim_rad
 
 TURN_LIMIT = 1.4
-"""Limit of the gait's turn (ours): with it a trot turns on an arc of 0.4 m; a spine that swims is
-bent by as many radians."""
+"""Limit of the gait's turn (ours): a trot turns on an arc of 0.4 m; a swimming spine bends by as
+many radians."""
 TURN_PER_RAD = 3.0
 """Turn per error of the heading (ours)."""
 CYCLES_PER_BODY = 4.0
-"""Cycles that go by while a body goes its length: a trot makes 0.24 to 0.42 lengths a cycle."""
+"""Cycles per body length of travel: a trot makes 0.24 to 0.42 lengths a cycle."""
 
 
 class SteeredGait(OnCourse):
@@ -53,8 +53,7 @@ class SteeredGait(OnCourse):
     ) -> None:
         """Begin at phase 0, straight.
 
-        A body length of the course is ``CYCLES_PER_BODY``; it has seen ``cycles`` before. The body
-        aims ``carrot_m`` ahead on the path.
+        The course has seen ``cycles`` before. The body aims ``carrot_m`` ahead on the path.
 
         Raises:
             InputError: as ``check_turns``.
@@ -80,7 +79,7 @@ class SteeredGait(OnCourse):
 
     @property
     def done(self) -> bool:
-        """Whether every waypoint has been reached and the gait has come to rest."""
+        """Whether every waypoint has been reached and the gait is at rest."""
         return self._stop_profile.over
 
     @property
@@ -90,7 +89,7 @@ class SteeredGait(OnCourse):
 
     @property
     def frequency_hz(self) -> float:
-        """Cycles per second at full rate: as configured, or limited by the joints while turning."""
+        """Cycles per second at full rate: as configured, or as the joints allow in a turn."""
         return float(self._rate_rad_s / TURN)
 
     def begin(self, view: BodyView) -> Floats:
@@ -142,8 +141,8 @@ def check_turns(gait: Gait, robot: RobotConfig) -> None:
     """Reject a gait that its turn cannot steer on this robot.
 
     Raises:
-        InputError: the gait cannot be steered, its turn is set, joints are missing or do not bend
-            far enough at the largest turn.
+        InputError: no steerable gait, its turn is set, or joints are missing or bend too little for
+            the largest turn.
 
     """
     if gait.steered_by is None:

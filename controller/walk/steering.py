@@ -62,23 +62,22 @@ class SteeringWeights:
     head: float = 0.5
     """The head's."""
     heading_m: float = 0.3
-    """Lever on which the heading error at the end counts as a distance."""
+    """Lever that converts the heading error at the end to a distance."""
     pass_by: float = 4.0
-    """Weight of the square of the distance beyond ``near_m`` at which the next waypoint is
-    passed."""
+    """Weight of the squared distance beyond ``near_m`` at which the next waypoint is passed."""
     near_m: float = 0.2
     """Within this a waypoint is passed well."""
     delay_m2: float = 0.1
-    """For standing still; in proportion less for progress at up to the wanted pulse."""
+    """Cost of no progress; it falls linearly to 0 at the wanted pulse."""
 
 
 _STEEP = 0.14
 """Slope from which weight rests on few links of a body: 8 degrees."""
 _AHEAD_POINTS = 100
-"""Points of the path ahead whose slope counts: a metre, the body's length of pulse and a little."""
+"""Points of the path ahead whose slope counts: a metre."""
 _SPAN_SEGMENTS = 40.0
 _UPDATE = 0.25
-"""Share of a new measurement in the drift: its memory is four decisions, 0.4 body lengths."""
+"""Share of a new measurement in the drift: a memory of four decisions, 0.4 body lengths."""
 
 
 class Steering:
@@ -139,7 +138,7 @@ class Steering:
         return self._rollout.steepest(points_m + pose.centre_m - points_m[0]) > _STEEP
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        """Roll out with this friction from the next decision; the remainder is drift."""
+        """Use this friction from the next decision; the remainder is drift."""
         self._rollout.use_friction(friction)
 
     def forget(self) -> None:

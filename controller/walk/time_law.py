@@ -1,4 +1,4 @@
-"""Time law: how fast the head may travel along the track within joint speed and acceleration.
+"""Time law: limits the head's speed along the track by joint speed and acceleration.
 
 A speed limit alone, ``u = min(u0, limit / max |dq/dS|)``, lets the head's speed jump. Here half of
 the acceleration limit is for bending (``q'' u^2``), half for speeding up and braking (``q'
@@ -152,10 +152,7 @@ def _allow(
     cruise: float,
     allowed: Floats,
 ) -> None:
-    """Write the speed allowed at each place: the least of it and its neighbours.
-
-    This respects the limits between two places, without steps.
-    """
+    """Write the speed allowed at each place: the least of it and its neighbours, without steps."""
     for k in range(len(slope)):
         allowed[k] = cruise
     for k in range(len(slope)):

@@ -15,7 +15,7 @@ class Twin(Protocol):
     def begin(
         self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
     ) -> None:
-        """Place it at the robot's pose, moving as the robot did since ``dt_s`` ago."""
+        """Place it at the robot's pose, with the motion of the last ``dt_s``."""
         ...
 
     def use_friction(self, friction: FrictionConfig) -> None:
@@ -23,7 +23,7 @@ class Twin(Protocol):
         ...
 
     def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
-        """Hold goals (J,) for ``dt_s``; return the head's pose and the joints (J,) then."""
+        """Hold goals (J,) for ``dt_s``; return the final pose of the head and joints (J,)."""
         ...
 
 

@@ -32,7 +32,7 @@ class TwinQuestion:
 
     number: int
     bodies: tuple[tuple[BodyPose, Floats], ...]
-    """Pose and joints (J,) of the robot in the last cycle but one, and in the last."""
+    """Pose and joints (J,) of the robot in the last two cycles."""
     cycle_s: float
     friction: FrictionConfig
     pose: PathPose

@@ -1,7 +1,7 @@
 """A rollout on a twin: a piece of track is tried on a simulated body.
 
-It includes weight that rests on few links on rough ground, which the balance of forces on paper
-does not. It costs a hundred times as much.
+Unlike the balance of forces on paper, it includes weight that rests on few links on rough ground.
+It costs a hundred times as much.
 """
 
 from collections.abc import Callable, Iterator
@@ -53,7 +53,7 @@ class TwinRollout:
         self._dt_s = dt_s
 
     def forget(self) -> None:
-        """Discard observed bodies: the next one will not follow them by one cycle."""
+        """Discard observed bodies: the next one does not follow them by one cycle."""
         self._seen = []
 
     def roll(

@@ -33,8 +33,7 @@ class Walker:
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
         """Choose the next shape and append its tail part.
 
-        ``offset_rad`` rotates the track's angles to the world, in which ``aim_rad`` is the wanted
-        heading.
+        ``offset_rad`` rotates the track's angles to the world, the frame of ``aim_rad``.
         """
         walk, track = self._walk, self.track
         placed = self._shapes + (track.last_rad - self._shapes[:, -1])[:, None]
@@ -47,7 +46,7 @@ class Walker:
         return Decision(state, float(error[state]), ramp, near, self._star.distinct)
 
     def _choose(self, ranks: Iterator[int], placed_rad: Floats, error_rad: Floats) -> int:
-        """First state in the order of W whose body is accepted; the first of all if none is."""
+        """First state in the order of W whose body is accepted, else the first of all."""
         first = -1
         for state in ranks:
             if self._fits(self._piece(placed_rad[state], error_rad[state])):

@@ -19,11 +19,6 @@ Picture = Annotated[Path | None, typer.Option(help="draw the result here (.png, 
 
 
 def check_npz(path: Path) -> None:
-    """Reject a result file of another kind.
-
-    Raises:
-        InputError: its name does not end in .npz.
-
-    """
+    """Reject a result file whose name does not end in .npz."""
     if path.suffix.lower() != ".npz":
         raise InputError(f"{path}: the result is an .npz; change the ending")

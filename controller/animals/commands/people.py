@@ -199,7 +199,7 @@ def _lowest_m(person: Person, made: PersonMotion) -> float:
 
 
 def _difference_m(person: Person, made: PersonMotion) -> float:
-    """Largest distance of the played skin from the surface that is solved again, at a quarter."""
+    """Largest distance of the played skin from the solved surface, at a quarter of the cycle."""
     k, bones = FRAMES // 4, made.bones
     solved = person.solved_m(bones.front_m[k], bones.rotation[k])
     return float(np.linalg.norm(posed_m(person.rig, bones, k) - solved, axis=1).max())

@@ -59,7 +59,7 @@ def shots_of(images: Sequence[str], frames: Sequence[int]) -> tuple[Shot, ...]:
 
 
 def posed_frame(shots: Sequence[Shot], frames: Sequence[int]) -> int:
-    """Frame of ``--posed``: the one of the first photograph from above, or from below."""
+    """Frame of ``--posed``: that of the first photograph from above, or from below."""
     of_top = [one.frame for one in shots if one.view in _OF_TOP]
     return of_top[0] if of_top else 0 if shots or not frames else frames[0]
 
@@ -76,7 +76,7 @@ def _view(text: str) -> tuple[str, Path]:
 def skin_picture(
     shots: Sequence[Shot], top: Silhouettes, side: Silhouettes | None, body: BodyModel
 ) -> SkinPicture:
-    """Make the texture: of one photograph from above, mirrored; else around the whole body.
+    """Make the texture: one photograph from above is mirrored; others go around the whole body.
 
     Raises:
         InputError: a file is not a picture, or does not hold its skeleton.

@@ -20,7 +20,7 @@ from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _SHOWN = 1.2
-"""Length that the camera frames over the body's: legs and horns stand above and below the spine."""
+"""Length in the camera's frame over the body's: legs and horns add to it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """The body of an animal with legs: its skin on the spine, skinned legs, tapered ornaments.
 
-[KP] 4.1 builds a goat of eleven parts and a lizard of five, each of ellipses across it.
+[KP] 4.1 builds a goat of eleven parts and a lizard of five, each of ellipses.
 """
 
 import numpy as np
@@ -32,11 +32,7 @@ _DARK_V = 0.5
 def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
     """Hang the parts of an animal on its bones, which are in the order of ``animal_bones``.
 
-    Args:
-        animal: its figures.
-        skin: of the body, of the animal's length.
-        bands: of the skin: dark ornaments wear their colour.
-
+    ``skin`` has the animal's length; ``bands`` is the number of its bands, for dark ornaments.
     """
     length_m = animal.length_m
     base = spine_rig(skin, np.full(SEGMENTS, length_m / SEGMENTS))
@@ -69,7 +65,7 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
 
 
 def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
-    """Bones over time: of the spine, of the segments of each leg, of each ornament that swings."""
+    """Bones over time: spine, segments of each leg, each ornament that swings."""
     length_m = animal.length_m
     front = [motion.spine_m[:, k] for k in range(SEGMENTS)]
     turns = [
@@ -113,7 +109,7 @@ def _turned(one: OrnamentConfig) -> Floats:
 
 
 def _facing(forward: Floats, up: Floats) -> Floats:
-    """(T, 3, 3) turns whose x is along ``forward`` and whose z is as near to ``up`` as may be."""
+    """(T, 3, 3) turns whose x is along ``forward`` and whose z is as near to ``up`` as possible."""
     x = forward / np.linalg.norm(forward, axis=1, keepdims=True)
     y = np.cross(np.broadcast_to(up, x.shape), x)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
@@ -127,7 +123,6 @@ def _beside(forward: Floats, y: Floats) -> Floats:
 
 
 def _carrier(at: float) -> int:
-    """Index of the spine's bone at a place along the body."""
     return min(int(at * SEGMENTS), SEGMENTS - 1)
 
 

@@ -103,11 +103,11 @@ def measure_animal(
     """Measure the stride of a tracked animal.
 
     Args:
-        keypoints: all of one animal's.
-        names: which of them are what.
-        like: animal whose other figures are taken.
-        name: of the new one.
-        length_m: of the spine; None: by the file's scale, else as long as the other one.
+        keypoints: of one animal.
+        names: roles of the keypoints.
+        like: animal that gives the other figures.
+        name: of the new animal.
+        length_m: of the spine; None: by the file's scale, else that of ``like``.
         view: above or side.
 
     Raises:

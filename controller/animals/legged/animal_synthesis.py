@@ -36,7 +36,7 @@ class SynthesisedAnimal:
     ground: HeightField | None
 
     def reached_s(self) -> list[float]:
-        """When the middle of the trunk was within the waypoints' radius, in their order."""
+        """When the middle of the trunk came within the radius of each waypoint."""
         at, middle = 0, self.middle_m
         found = []
         for point in self.waypoints_m:
@@ -59,14 +59,14 @@ class SynthesisedAnimal:
 
     @property
     def slip_m(self) -> float:
-        """Furthest way of a foot while it stood on the ground."""
+        """Largest distance that a foot moved while it was on the ground."""
         foot, on = self.motion.foot_m, self.motion.on_ground
         stays = on[1:] & on[:-1]
         return float(np.linalg.norm(np.diff(foot, axis=0), axis=-1)[stays].max(initial=0.0))
 
     @property
     def stance_slip_m(self) -> float:
-        """Longest way of a foot on the ground between coming down and leaving."""
+        """Largest distance between the places where a foot came down and where it left."""
         foot, on = self.motion.foot_m, self.motion.on_ground
         way = np.linalg.norm(np.diff(foot, axis=0), axis=-1) * (on[1:] & on[:-1])
         total = np.concatenate([np.zeros((1, way.shape[1])), np.cumsum(way, axis=0)])
@@ -155,8 +155,7 @@ def synthesise_animal(
 ) -> SynthesisedAnimal:
     """Lead an animal along a run's path until its trunk is at the end, or for a number of frames.
 
-    A number of frames can lead beyond the path. The motion then ends when the head leaves the
-    ground of the world.
+    Beyond the path, the motion ends when the head leaves the ground of the world.
 
     Raises:
         InputError: the path bends more sharply than the animal is wide.
@@ -187,7 +186,7 @@ def synthesise_animal(
 
 
 def as_long_robot(robot: RobotConfig, length_m: float) -> RobotConfig:
-    """Size a robot for a film, whose camera and shade look at a length and a thickness."""
+    """Size a robot for a film: the camera and the shade use its length and thickness."""
     link_m = length_m / robot.link_count
     plain = {"joints": (), "links": (), "limbs": (), "body_profile": None}
     thick_m = robot.body_radius_m * length_m / robot.length_m

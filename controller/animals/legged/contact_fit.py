@@ -1,11 +1,10 @@
-"""When the feet of a tracked animal are on the ground: a motion model fitted to all feet at once.
+"""Contacts of a tracked animal's feet: a motion model fitted to all feet at once.
 
 On the ground a foot goes back at the speed of the trunk. In the air it goes forward by one stride
 over the ground, as a share ``I(p, q)`` of the time in the air, the regularised incomplete beta
-function. ``p = q = 2`` is the cubic of ``footfall.swing``, ``p = q = 3`` that of least jerk; other
-values leave sooner or land later. A model with one fixed shape counts the slow start of another
-shape as contact: up to 0.14 of a cycle. All feet share one shape, because a single foot of a
-noisy track hardly determines it.
+function. ``p = q = 2`` is the cubic of ``footfall.swing``, ``p = q = 3`` that of least jerk. A
+model with one fixed shape counts the slow start of another shape as contact: up to 0.14 of a cycle.
+All feet share one shape, because a single foot of a noisy track hardly determines it.
 """
 
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ _PLACES = 16
 _SHAPES = (1.8, 3.0)
 _SHAPE_LIMITS = (1.2, 5.0)
 _SHAPE, _SHAPE_SPREAD = np.log(2.3), 0.5
-"""Logarithm of the expected p and q and its standard deviation (ours): holds where data are few."""
+"""Logarithm of the expected p and q and its standard deviation (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ def fit_contacts(
     Args:
         phases: (T,) of each foot, cycles.
         ahead: (T,) of each foot along the direction of travel.
-        stride: way of the trunk in a cycle, in the same unit.
+        stride: way of the trunk in a cycle, same unit.
 
     """
     starts = [_start(phase, way, stride) for phase, way in zip(phases, ahead, strict=True)]

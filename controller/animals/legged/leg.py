@@ -1,10 +1,9 @@
 """Joints of a leg of up to five segments, from its root and its foot.
 
 The first and the third segment of a mammal's leg move in parallel, as in a pantograph (M. S.
-Fischer and R. Blickhan, J. Exp. Zool. A 305, 2006, 935). So these two are one rigid part, and the
-segment between them closes the triangle to the foot. If a leg has a blade, these two are the blade,
-and forearm with cannon; else they are thigh and cannon. A leg of two segments is the same triangle
-without a third one.
+Fischer and R. Blickhan, J. Exp. Zool. A 305, 2006, 935). So they are one rigid part: blade and
+forearm with cannon, or thigh and cannon. The segment between them closes the triangle to the foot.
+A leg of two segments has no third one.
 """
 
 from dataclasses import dataclass
@@ -41,7 +40,7 @@ def leg_joints_m(
         length_m: of the body.
         root_m: (T, 3) of the hip, or of the pivot of the blade.
         toe_m: (T, 3) of the foot's tip.
-        air: (T,) share of its time in the air that has passed, 0 on the ground.
+        air: (T,) elapsed share of its time in the air, 0 on the ground.
         frame: of the body.
         side: 1 of a left leg, -1 of a right one.
 

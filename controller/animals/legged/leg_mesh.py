@@ -1,7 +1,7 @@
 """The skin of a leg at rest: one tube over its straight segments, then a hoof or toes.
 
-The bones of a leg lie one behind the other along -x, as all bones at rest do. In a bone, x points
-to the joint above, y to the right and z forward. Corners near a joint are carried by both bones.
+The bones of a leg lie along -x. In a bone, x points to the joint above, y to the right and z
+forward. Corners near a joint are carried by both bones.
 """
 
 from dataclasses import dataclass
@@ -46,13 +46,7 @@ def leg_parts(
 ) -> list[Part]:
     """Return the tube of one leg, and the end of its foot.
 
-    Args:
-        pair: its lengths.
-        length_m: of the body.
-        first: index of its first bone.
-        side: 1 of a left leg, -1 of a right one.
-        colours: hooves are dark.
-
+    ``first`` is the index of its first bone; ``side`` is 1 of a left leg, -1 of a right one.
     """
     long_m = length_m * np.array(pair.segments)
     parts = [_tube(pair, length_m, long_m, first, colours.skin)]

@@ -1,9 +1,9 @@
 """The prototype bent along a path and stood on the ground ([KP] 4.4).
 
 A point of the prototype at x along its line moves to the path's normal at arc length x, at the same
-distance to the left. A foot on the ground so stays where it is on any path. The body is then turned
-upright on the plane that fits the ground below it. The feet stand on the ground itself, although
-the paper leaves them on that plane, and the legs reach for them.
+distance to the left. So a foot on the ground stays where it is on any path. The body is then turned
+upright on the plane that fits the ground below it. The feet stand on the ground itself; the paper
+leaves them on that plane.
 """
 
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ class AnimalMotion:
 
 
 class PathNormals:
-    """A path as a smooth curve with normals; before and after its ends it goes on straight."""
+    """A path as a smooth curve with normals; it continues straight beyond its ends."""
 
     def __init__(self, path: SplinePath) -> None:
         self.length_m = path.length_m

@@ -1,9 +1,8 @@
-"""The prototype: an animal with legs that goes along a straight line on level ground ([KP] 4.2.2).
+"""The prototype: an animal with legs on a straight line over level ground ([KP] 4.2.2).
 
 The body bends in a standing wave with its nodes at the girdles, each turned furthest when its legs
-are; the head keeps its heading. A foot on the ground stays where it is, and each foot has a phase
-of its own (``feet = "footfall"``). The feet of [GC] Eq. 9-10 as printed are ``printed_feet``. The
-height of the body follows from the legs.
+are; the head keeps its heading. A foot on the ground stays where it is. The feet of [GC] Eq. 9-10
+as printed are ``printed_feet``. The height of the body follows from the legs.
 """
 
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ SEGMENTS = 24
 LEGS = ("front left", "front right", "hind left", "hind right")
 _SIDES = np.array([1.0, -1.0])
 _STRAIGHTENS = 0.06
-"""Share of the body's length over which the head's heading returns to that of the body."""
+"""Share of the body's length over which the heading changes from the head's to the body's."""
 _TAIL_WAVES = 0.5
 """On the tail, where it swings."""
 
@@ -44,13 +43,7 @@ class Prototype:
 
 
 def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
-    """Move an animal along a line; its head's tip is at x = 0 at t = 0.
-
-    Args:
-        animal: its figures.
-        time_s: (T,) of the frames.
-
-    """
+    """Move an animal along a line for frames (T,); its head's tip is at x = 0 at t = 0."""
     length_m = animal.length_m
     cycles = time_s / animal.cycle_s
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
@@ -85,11 +78,7 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
 def footfall(animal: AnimalConfig, pair: LegPairConfig, at: Floats) -> tuple[Floats, Floats, Bools]:
     """Feet ahead of the middle of their steps (...), above the ground (...), and on it (...).
 
-    Args:
-        animal: its stride.
-        pair: one pair of its legs.
-        at: (...) cycles since the foot came down, 0 to 1.
-
+    ``at`` (...) are cycles since the foot came down, 0 to 1.
     """
     ahead_m = 0.5 * animal.stride * animal.length_m * pair.duty * swing(at, pair.duty)
     return ahead_m, animal.length_m * pair.lift * lift(at, pair.duty), at < pair.duty
@@ -98,13 +87,13 @@ def footfall(animal: AnimalConfig, pair: LegPairConfig, at: Floats) -> tuple[Flo
 def printed_feet(
     animal: AnimalConfig, pair: LegPairConfig, cycles: Floats
 ) -> tuple[Floats, Floats, Bools]:
-    """Left and right foot (T, 2) of a pair by [GC] Eq. 9-10 as printed, as ``footfall`` gives them.
+    """Left and right foot (T, 2) of a pair by [GC] Eq. 9-10 as printed.
 
     ``R_Fy = T_y (H + H_R) + H_RF`` and ``R_Fz = -T_z (L + L_R)``; the left foot has no minus sign.
     ``T_y = sin(omega t)`` is the same for both feet, so one of them goes forward while it is low.
     The paper leaves L and H open. Here L makes the right foot stand still at its lowest point, 2 H
-    is the height of a step, and ``H_RF = H`` puts that point on the ground. The fine parameters H_R
-    and L_R are 0. A foot counts as on the ground in the lower quarter of its height.
+    is the height of a step, and ``H_RF = H`` puts that point on the ground. H_R and L_R are 0. A
+    foot counts as on the ground in the lower quarter of its height.
     """
     lowest = pair.right + 0.5 * pair.duty
     turn = TURN * (cycles - lowest) - 0.25 * TURN
@@ -162,7 +151,7 @@ def _girdle_shares(at: tuple[float, float], along: Floats) -> Floats:
 def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
     """(T, S) headings of the spine at places along it.
 
-    A girdle is turned to the right by all of its turn when its left foot comes down.
+    A girdle is turned to the right furthest when its left foot comes down.
     """
     front, hind = animal.leg_pairs
     turned = np.stack(
@@ -178,7 +167,7 @@ def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
 
 
 def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, at: Floats) -> Floats:
-    """(T,) height of the body over a pair: that of the feet's pendulums that bear it, by vault.
+    """(T,) height of the body over a pair: that of the feet that bear it, by vault.
 
     A foot that comes down or leaves supports little. When one foot replaces the other, both are
     equally far from the hip, so the height has no step.

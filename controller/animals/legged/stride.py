@@ -1,8 +1,7 @@
 """The stride of a tracked animal: statistics of its joints over one cycle ([KP] 4.2.2).
 
-Every figure is that of a motion model fitted to the tracks. ``contact_fit`` finds contacts without
-a threshold on a foot's speed. A girdle's turn is the wave, at the frequency of the feet, that the
-headings of the spine's segments share.
+``contact_fit`` finds contacts without a threshold on a foot's speed. A girdle's turn is the wave,
+at the frequency of the feet, that the headings of the spine's segments share.
 """
 
 from dataclasses import dataclass
@@ -27,7 +26,7 @@ FEWEST_CYCLES = 2.0
 _FEWEST_FRAMES = 6
 """Fewest frames of a cycle."""
 _MOST_HZ = 0.3
-"""Share of the frame rate: the highest frequency of the search."""
+"""Highest frequency of the search, as a share of the frame rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,11 +112,11 @@ def measure_stride(
     """Measure the stride of an animal seen from above, or from its side on level ground.
 
     Args:
-        spine: (T, P, 2) points along it, head first, to the right and upwards, in any unit.
-        feet: (T, 4, 2) in the order of ``LEGS``; NaN where one was not seen, as of the spine.
+        spine: (T, P, 2) points, head first, to the right and upwards, in any unit.
+        feet: (T, 4, 2) in the order of ``LEGS``; NaN where not seen, as in ``spine``.
         girdles: indices of the spine's points at the front and the hind legs.
         rate_hz: frames a second.
-        view: above; or side, which shows heights of steps, and no turns and places to the side.
+        view: above; or side, which shows heights of steps but no turns.
 
     Raises:
         InputError: fewer than two cycles, too few frames in one, or an animal that does not walk.
@@ -217,7 +216,7 @@ def model_ahead(stride: Stride, foot: int, phase: Floats) -> Floats:
 
 
 def _bridged(points: Floats, time_s: Floats) -> Floats:
-    """Points (T, P, 2) with missing ones put between their neighbours in time."""
+    """Points (T, P, 2); missing ones are interpolated in time."""
     filled = np.array(points, float)
     for k in range(filled.shape[1]):
         seen = np.isfinite(filled[:, k]).all(axis=1)
@@ -229,7 +228,7 @@ def _bridged(points: Floats, time_s: Floats) -> Floats:
 
 
 def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
-    """Frequency of the feet: that of a wave which explains most of all their ways."""
+    """Frequency of the feet: that of the wave that explains most of their ways."""
     seen = np.isfinite(ahead)
     time_s = np.arange(len(ahead)) / rate_hz
 
@@ -258,7 +257,7 @@ def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
 def _spread(
     phase: Floats, ahead: Floats, stride: float, like: Contact, shape: tuple[float, float]
 ) -> float:
-    """Standard deviation of the duty of single cycles, each begun when the foot comes down."""
+    """Standard deviation of the duty of single cycles, each from touch-down."""
     each = []
     for cycle in range(int(np.ceil(phase[0] - like.down)), int(np.floor(phase[-1] - like.down))):
         one = (phase - like.down >= cycle) & (phase - like.down < cycle + 1) & np.isfinite(ahead)
@@ -292,7 +291,7 @@ def _whole(phase: Floats) -> Bools:
 
 
 def _smoothed(points: Floats, window: int) -> Floats:
-    """Mean (T, 2) over a window of frames; at the ends over what there is, as far to both sides."""
+    """Mean (T, 2) over a window of frames; the window is smaller at the ends."""
     total = np.concatenate([np.zeros((1, 2)), np.cumsum(points, axis=0)])
     k = np.arange(len(points))
     half = np.minimum(np.minimum(k, len(points) - 1 - k), window // 2)

@@ -53,8 +53,8 @@ def skin_look(look: str, header: Header) -> SkinLook:
     """Make the skin of a run's film.
 
     Args:
-        look: ``animal``, which is the run's own recording if it contains widths, else a plain
-            snake; or a value that ``body_skin`` accepts.
+        look: ``animal``, the run's own recording if it contains widths, else a plain snake; or a
+            value that ``body_skin`` accepts.
         header: of the run.
 
     Raises:
@@ -75,8 +75,8 @@ def rig_look(rig: Rig, texture: Image | None, *, free: bool = True, spine: int =
 
     Args:
         rig: its size is the motion's.
-        texture: the texture of the skin; None is one colour.
-        free: whether its bones float, for a motion that no robot makes.
+        texture: None is one colour.
+        free: its bones float, for a motion that no robot makes.
         spine: number of its bones that are the spine; 0: all.
 
     """
@@ -94,7 +94,7 @@ def rig_look(rig: Rig, texture: Image | None, *, free: bool = True, spine: int =
 
 
 def animal(track: str) -> str:
-    """Name of the body that a motion was captured from: the recording's, or a plain snake."""
+    """Name of the body of the recording, or of a plain snake."""
     try:
         read_silhouettes(Path(track))
     except InputError:

@@ -1,7 +1,7 @@
 """The body model: an ellipse at each skeleton point ([PT] 2.2).
 
-Its half width is the distance from the skeleton to the silhouette's boundary in the top view. Its
-half height follows from a constant ratio, or is measured the same way in a view from the side.
+Its half width is the distance to the silhouette's boundary in the top view. Its half height follows
+from a constant ratio, or from a side view.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.track.resample import SEGMENTS, equal_arc_length
 
 ASPECT = 0.85
-"""Height over width where nobody measured it: a snake is a little flatter than round."""
+"""Default height over width: a snake is a little flatter than round."""
 THICKEST = 0.025
-"""Half width over length of a body of which no widths are known."""
+"""Default half width over length."""
 _PAIRS = (("points_px", "radius_px"), ("points", "radius_m"), ("skeletons", "radius_px"))
 
 
@@ -38,7 +38,7 @@ class BodyModel:
     def profile(self) -> tuple[float, ...]:
         """Nine relative half widths, largest 1: ``body_profile`` of a robot's file.
 
-        Means over an eighth of the body each, as a skeleton's tips have no width at all.
+        Means over an eighth of the body each: a skeleton's tips have no width.
         """
         along = np.linspace(0.0, 1.0, len(self.half_width))
         near = np.abs(along[None] - np.linspace(0.0, 1.0, 9)[:, None]) <= 1.0 / 16.0
@@ -56,7 +56,7 @@ class Silhouettes:
     """(T, P) in the same unit."""
     length_m: float | None
     pixels: bool
-    """Whether the points are places in images, rows downwards."""
+    """Whether the points are pixels, rows downwards."""
 
 
 def spindle(length_m: float | None = None) -> BodyModel:
@@ -71,12 +71,12 @@ def spindle(length_m: float | None = None) -> BodyModel:
 def read_silhouettes(file: Path) -> Silhouettes:
     """Read skeletons and radii from an .npz.
 
-    Held are points and radii of one unit: ``points_px`` and ``radius_px``, ``points`` and
-    ``radius_m``, or ``skeletons`` and ``radius_px`` or ``width`` (whole widths); radii are (T, P),
+    It contains points and radii of one unit: ``points_px`` and ``radius_px``, ``points`` and
+    ``radius_m``, or ``skeletons`` and ``radius_px`` or ``width`` (whole widths). Radii are (T, P),
     (P,) or, of the segments, one fewer.
 
     Raises:
-        InputError: no such file or arrays, or none that fit each other.
+        InputError: no such file or arrays, or their shapes do not match.
 
     """
     try:
@@ -117,8 +117,8 @@ def body_model(
     """Median cross sections of all frames that hold a whole body.
 
     Args:
-        top: seen from above.
-        side: the same body seen from the side; None uses ``aspect``.
+        top: view from above.
+        side: view from the side; None uses ``aspect``.
         aspect: height over width.
 
     Raises:
@@ -151,7 +151,7 @@ def _median_radius(body: Silhouettes) -> Floats:
 
 
 def pose(points: Floats) -> Floats:
-    """Skeleton (101, 2) of one frame at equal arcs, in body lengths, the head's tip at the origin.
+    """Skeleton (101, 2) of one frame at equal arcs, body lengths, head's tip at the origin.
 
     Raises:
         ValueError: fewer than 4 distinct points.

@@ -30,7 +30,7 @@ from snakewalk.controller.track.readers.load import load_track
 from snakewalk.drivers.types import BodyPose
 
 LOG_FPS = 25.0
-"""Frames a second that are taken of a log, which holds more."""
+"""Frames a second that are used of a log."""
 
 
 def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, BoneMotion]:
@@ -40,8 +40,7 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
         skin: at rest.
         source: a gait of ``SPINE_GAITS``; a log (``.mcap``, ``.mcap.part``, or a run's folder); or
             what ``load_track`` reads.
-        fps: frames a second, of the recorded ones; None uses all frames of a recording and 25 of a
-            log.
+        fps: frames a second; None uses all frames of a recording and 25 of a log.
 
     Raises:
         InputError: the source cannot be used, or holds fewer than two frames.
@@ -74,7 +73,7 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
     """Times (T,) and spines (T, P, 3) of a recording.
 
     A fish is where it swam, with its lowest place on the ground. A track of ``synthesise`` has its
-    own heights. All others are level and lie on the ground.
+    own heights. All others lie level on the ground.
     """
     path = Path(source)
     if holds_postures(path):

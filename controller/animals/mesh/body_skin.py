@@ -59,12 +59,12 @@ class BodySkin:
     skin: Skin
     texture: Image | None
     both_sides: bool
-    """Whether the inside is drawn, too: of a mesh that may have holes."""
+    """Whether the inside is drawn, too: a mesh may have holes."""
     facts: dict[str, object]
 
 
 def is_skin(name: str) -> bool:
-    """Whether ``body_skin`` makes a skin of this alone: a shipped one, a mesh, a matched fish."""
+    """Whether ``body_skin`` accepts this alone: a shipped skin, a mesh, a matched fish."""
     path = Path(name)
     return name in SKINS or path.suffix.lower() in (*MESH_ENDINGS, ".toml") or holds_fish(path)
 
@@ -123,8 +123,7 @@ def shipped_skin(config: SkinConfig, how: Cut) -> BodySkin:
 def fish_skin(file: Path) -> SkinConfig:
     """Skin of a matched fish: its widths and height, and the fins of its build ([TH] 3.2.2).
 
-    Pectoral fins that were seen from above are as long as there; how the others stand is not
-    searched, as in the paper.
+    Pectoral fins have the length seen from above; their angle is not searched, as in the paper.
     """
     fish = load_postures(file).model
     if fish is None:

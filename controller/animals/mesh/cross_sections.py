@@ -19,7 +19,7 @@ from snakewalk.controller.animals.mesh.pde_surface import TURN
 from snakewalk.controller.track.resample import SEGMENTS
 
 CURVES = 37
-"""Number of curves that [GC] Fig. 3 cuts from its dolphin."""
+"""Number of curves cut from the dolphin of [GC] Fig. 3."""
 AROUND = 32
 """Points of a curve."""
 _TIP = 5
@@ -54,13 +54,10 @@ def skin_model(config: SkinConfig) -> tuple[BodyModel, Floats]:
 
 
 def ellipses(model: BodyModel, lift: Floats | None = None, curves: int = CURVES) -> CrossSections:
-    """Sections of a body model as curves.
+    """Sections of a body model as curves, which are closer around the tips.
 
-    Args:
-        model: half widths and heights.
-        lift: (101,) height of the middles over the axis, body lengths; None puts every belly on the
-            ground, z = 0, and the axis at the height of the highest middle.
-        curves: how many; more around the tips than between.
+    ``lift`` (101,) is the height of the middles over the axis, body lengths. None puts every belly
+    on the ground, z = 0, and the axis at the height of the highest middle.
 
     Raises:
         InputError: too few curves to round both tips.
@@ -97,15 +94,14 @@ def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
     """Cut curves from a mesh: its sections at right angles to x ([GC] 2.1).
 
     A plane may cut several loops: fins, lobes of a tail. The body's loop is the one around the
-    middle of the loop before. From the thickest place the cuts continue both ways as long as there
-    is one, so that a forked tail is not a part of the tube. Each half of a loop, over the back and
-    under the belly, is divided into equal arcs: left, back, right and belly keep their place in
-    every curve.
+    middle of the loop before. The cuts begin at the thickest place and end where no loop is left,
+    so a forked tail is not a part of the tube. Each half of a loop, over the back and under the
+    belly, is divided into equal arcs: left, back, right and belly keep their index in every curve.
 
     Args:
-        solid: ``trimesh.Trimesh`` in the pose above, metres or any unit.
-        curves: how many, with one place at each end.
-        name: of the mesh, for faults.
+        solid: ``trimesh.Trimesh`` in the pose above, any unit.
+        curves: number, with one place at each end.
+        name: of the mesh, for errors.
 
     Raises:
         InputError: fewer than 4 curves, or no plane in the middle finds a closed loop.
@@ -168,7 +164,7 @@ def _around(found: list[Floats], body: Floats) -> Floats:
 
 
 def _inside(loop: Floats, point: Floats) -> bool:
-    """Whether a loop goes around a point: its corners turn about it by a whole turn."""
+    """Whether a loop goes around a point."""
     angle = np.arctan2(*(loop - point).T[::-1])
     turned = np.diff(np.unwrap(np.append(angle, angle[0])))
     return bool(abs(turned.sum()) > np.pi)

@@ -1,8 +1,8 @@
 """The body's mesh: rings of ellipses joined, closed at both tips, with mirrored texture ([PT] 2.2).
 
-The picture's place across the body is the cosine of the angle around it. So the points over and
-under the middle plane show the same pixel: the upper side's picture is mirrored to the lower. (A
-mirror at the ellipse's centre, as the text may be read, would put a seam along both sides.)
+The picture's place across the body is the cosine of the angle around it, so the upper side's
+picture is mirrored to the lower. (A mirror at the ellipse's centre, as the text may be read, would
+put a seam along both sides.)
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     """Put the ellipses at the points of a skeleton (P, 2) in plan, in body lengths, head first.
 
     Raises:
-        ValueError: as many points are needed as the model has.
+        ValueError: another number of points than the model's.
 
     """
     points = len(model.half_width)
@@ -35,7 +35,7 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     forward /= np.hypot(*forward.T)[:, None]
     left = np.stack([-forward[:, 1], forward[:, 0]], axis=-1)
     turn = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
-    # a ring of no size has no normals; a hair's breadth does
+    # a ring of no size has no normals
     round_ = round_tips(model, s)
     wide = np.maximum(np.interp(s, even, model.half_width) * round_, 1e-5)[:, None]
     high = np.maximum(np.interp(s, even, model.half_height) * round_, 1e-5)[:, None]
@@ -62,11 +62,11 @@ def picture_around(mesh: Mesh, around: int = AROUND) -> tuple[Mesh, Ints]:
     The picture begins and ends at the belly, where the corners are split.
 
     Args:
-        mesh: rings of ``around`` corners each, from the left side over the back, then two tips.
-        around: corners of a ring; a multiple of 4.
+        mesh: rings of ``around`` corners, from the left side over the back, then two tips.
+        around: a multiple of 4.
 
     Returns:
-        The mesh, and (V,) the corner from which each of its corners was made.
+        The mesh, and (V,) the original corner of each of its corners.
 
     """
     rings = len(mesh.vertices) // around
@@ -90,7 +90,7 @@ def tips(model: BodyModel) -> tuple[float, float]:
 
 
 def _stations(model: BodyModel) -> Floats:
-    """Places of the rings, 0..1: those of the skeleton, and closer ones around the tips."""
+    """Places of the rings, 0..1: those of the skeleton, closer around the tips."""
     quarter = 1.0 - np.cos(np.linspace(0.0, 0.5 * np.pi, _CAP))
     head, tail = tips(model)
     even = np.linspace(0.0, 1.0, len(model.half_width))
@@ -99,7 +99,7 @@ def _stations(model: BodyModel) -> Floats:
 
 
 def round_tips(model: BodyModel, s: Floats) -> Floats:
-    """Factor on the radii: the skeleton ends on the boundary, so no circle may reach beyond it."""
+    """Factor on the radii: the skeleton ends on the boundary, which no circle may cross."""
     head, tail = tips(model)
     near = np.minimum(s / head, (1.0 - s) / tail)
     return np.asarray(np.sqrt(np.clip(1.0 - np.clip(1.0 - near, 0.0, 1.0) ** 2, 0.0, None)))

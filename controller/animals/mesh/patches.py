@@ -1,8 +1,8 @@
 """A skin of PDE patches: a tube through many closed curves, and fins that grow out ([GC] 1.3).
 
-The paper cuts many curves into fours, each of which makes one patch. Two such patches meet in a
-curve, but not in a tangent plane: the skin has a crease there. Here a patch spans two curves, and
-shares the slope along the body at both with its neighbour; of order 3, the curvature too.
+The paper makes one patch of four curves; two such patches meet in a curve with a crease. Here a
+patch spans two curves, and shares the slope along the body at both with its neighbour; of order 3,
+the curvature too.
 
 A fin is a patch of its own: its first curve is drawn on the tube, three more stand above it.
 """

@@ -6,12 +6,11 @@ The surface meets ``2N`` closed curves, each as a place of the surface or as its
 ... along u. Four places with N = 2 are the biharmonic surface of the paper. Places and slopes at
 both ends join patches without a crease, and six conditions with N = 3 also with even curvature.
 
-Mode n of the curves' Fourier series is carried from curve to curve by ``e^(-a n (1 - u))``, the
-same with ``u``, and both times powers. The printed ``e^(a n u)`` (Eq. 4) grows to 1e13 at n = 30,
-which makes the system singular in practice (condition 1e18; here 7e4). These are the same
-functions, scaled. All modes of the samples are used unless fewer are asked for. The rest of a curve
-goes into the remainder R, of mode ``M + 1`` (Eq. 8), so that the curves are met exactly either way.
-``A_0``, a polynomial, is the spine.
+The functions of mode n are ``e^(-a n (1 - u))``, ``e^(-a n u)``, and both times powers. The printed
+``e^(a n u)`` (Eq. 4) grows to 1e13 at n = 30, which makes the system singular in practice
+(condition 1e18; here 7e4). These are the same functions, scaled. The rest of a curve goes into the
+remainder R, of mode ``M + 1`` (Eq. 8), so the curves are met exactly. ``A_0``, a polynomial, is the
+spine.
 
 The equation is printed (Eq. 1) without ``a2``, although its solution (Eq. 4) has ``a``.
 """
@@ -39,7 +38,7 @@ class PdeSurface:
     at: tuple[float, ...]
     """(2N,) where along u the curves lie."""
     slopes: tuple[int, ...]
-    """(2N,) what a curve gives: 0 the place, 1 the slope dX/du, 2 the second derivative, ..."""
+    """(2N,) meaning of a curve: 0 the place, 1 the slope dX/du, 2 the second derivative, ..."""
     spine_terms: Floats
     """(2N, 3) of the polynomial ``A_0``, from the constant up."""
     cosine: Floats
@@ -57,13 +56,11 @@ class PdeSurface:
         at: Sequence[float] | None = None,
         slopes: Sequence[int] | None = None,
     ) -> "PdeSurface":
-        """Solve for 2N closed curves (2N, C, 3), sampled evenly in v without a last one at 2 pi.
-
-        A sample at ``2 pi`` is that at 0 again: it would count double in every Fourier coefficient.
+        """Solve for 2N closed curves (2N, C, 3), sampled evenly in v without 2 pi.
 
         Args:
             curves_m: metres; of slopes, metres per unit of u.
-            modes: M of the series; None uses all, which leaves nothing for the remainder.
+            modes: M of the series; None uses all, without a remainder.
             spread: a.
             at: (2N,) default: evenly from 0 to 1.
             slopes: (2N,) default: all places.
@@ -129,19 +126,14 @@ class PdeSurface:
         )
 
     def spine_m(self, u: ArrayLike) -> Floats:
-        """(U, 3) the zeroth term: the spine around which the surface is wound."""
+        """(U, 3) the zeroth term: the spine."""
         return np.asarray(_basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0)
                           @ self.spine_terms)  # fmt: skip
 
     def points_m(self, u: ArrayLike, v: ArrayLike, along: int = 0, around: int = 0) -> Floats:
         """(U, V, 3) at all pairs, or the derivative there; the remainder is linear between samples.
 
-        Args:
-            u: (U,)
-            v: (V,)
-            along: times differentiated by u.
-            around: times differentiated by v.
-
+        ``along`` and ``around`` are the orders of the derivative by u (U,) and v (V,).
         """
         us, vs = np.atleast_1d(np.asarray(u, float)), np.atleast_1d(np.asarray(v, float))
         out = np.zeros((len(us), len(vs), 3))
@@ -158,7 +150,7 @@ class PdeSurface:
         return out
 
     def moved_m(self, u: ArrayLike, v: ArrayLike, shift_m: ArrayLike) -> Floats:
-        """(U, V, 3) with the spine moved by (U, 3), as printed: nothing else turns."""
+        """(U, V, 3) with the spine moved by (U, 3); as printed, nothing turns."""
         return np.asarray(self.points_m(u, v) + np.asarray(shift_m, dtype=float)[:, None])
 
     @property
@@ -178,7 +170,7 @@ class PdeSurface:
 
 
 def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Floats:
-    """(K, 3) a mesh whose points go where their nearest surface points went ([GC] 2.4).
+    """(K, 3) mesh points moved with their nearest surface points ([GC] 2.4).
 
     Args:
         mesh_m: (K, 3) aligned with the surface.
@@ -192,7 +184,7 @@ def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Fl
 
 
 def _conditions(places: Floats, kinds: Sequence[int], rate: float | Floats) -> Floats:
-    """(2N, 2N) what each condition asks of the functions of u; (M, 2N, 2N) for rates (M, 1)."""
+    """(2N, 2N) conditions on the functions of u; (M, 2N, 2N) for rates (M, 1)."""
     order = len(places) // 2
     return np.stack(
         [_basis(places[k : k + 1], rate, order, kind)[..., 0, :] for k, kind in enumerate(kinds)],

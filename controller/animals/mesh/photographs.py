@@ -1,8 +1,7 @@
 """A skin's picture from several photographs, around the whole body ([PT] 2.2).
 
-A photograph from above shows half of the body, so that its picture is mirrored to the belly. More
-photographs show more: each point of the skin has the mean of the photographs that see it. A weight
-falls with the angle between the skin and the camera. Where none sees it, the picture is mirrored.
+Each point of the skin has the weighted mean of the photographs that see it. The weight falls with
+the angle between the skin and the camera. If none sees it, the picture is mirrored.
 """
 
 import math
@@ -57,15 +56,11 @@ class PictureAround:
     """Share of the skin's area that a photograph shows; the rest is mirrored."""
     gains: tuple[tuple[float, float, float] | None, ...]
     """Factor on red, green and blue of each photograph that makes it as bright as the first; None
-    where it shows nothing that another one shows."""
+    if it shares no skin with another one."""
 
 
 def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
     """Blend photographs of one body, matched in brightness to the first.
-
-    Args:
-        photographs: one or more.
-        model: cross sections of the body.
 
     Raises:
         ValueError: a skeleton has fewer than 4 distinct points.

@@ -1,4 +1,4 @@
-"""The rig: a mesh, the bones that carry its corners, and where they are at rest."""
+"""The rig: a mesh and the bones that carry its corners."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from snakewalk.controller.track.bone_motion import BoneMotion
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """K bones; at rest each lies along -x from its front, turned by nothing."""
+    """K bones; at rest each lies along -x from its front."""
 
     mesh: Mesh
     held: Weights

@@ -1,11 +1,11 @@
 """The skin that moves: a mesh at rest whose corners are carried by the bones of a spine.
 
-A corner belongs to a place along the spine and goes with the bone there and that bone's neighbours.
-Their shares are quadratic B-splines along the spine: they sum to one and have no kink. If bones are
-links that meet in joints, the spine of the skin runs through every joint and cuts the corner. It
-passes the middle of a link on the outer side, by an eighth of the link's length times the sine of
-the bend. The offset of a corner from the spine turns with the bones: [GC] 2.3 adds it to the moved
-spine unchanged, which makes a body flat after a turn by a right angle.
+A corner goes with the bone at its place along the spine and with that bone's neighbours. Their
+shares are quadratic B-splines: they sum to one and have no kink. If bones are links that meet in
+joints, the spine of the skin runs through every joint. It passes the middle of a link on the outer
+side, by an eighth of the link's length times the sine of the bend. The offset of a corner from the
+spine turns with the bones: [GC] 2.3 adds it unchanged, which makes a body flat after a turn by a
+right angle.
 """
 
 from dataclasses import dataclass, replace
@@ -90,9 +90,9 @@ def pde_skin(sections: CrossSections, tube: Tube, fins: tuple[Fin, ...] = ()) ->
 def carried(mesh: Mesh, surface: Skin) -> Skin:
     """Hang any mesh on a skin: a corner goes where its nearest surface point goes ([GC] 2.4).
 
-    The paper adds the nearest point's displacement. Here the corner gets that point's bones, so
-    that parts off the surface turn with it. Parts beyond the surface's ends, such as the lobes of a
-    tail fin, move by their own place.
+    The paper adds the nearest point's displacement. Here the corner gets that point's bones, so it
+    turns with them. Parts beyond the surface's ends, such as the lobes of a tail fin, move by their
+    own place.
     """
     nearest = cKDTree(surface.mesh.vertices).query(mesh.vertices)[1]
     own = np.clip(-mesh.vertices[:, 0] / surface.length_m, 0.0, 1.0)

@@ -1,7 +1,7 @@
 """A moving skin as one binary glTF 2.0: mesh, texture, bones, weights and an animation.
 
-The bones are a chain of nodes, head first, so that a viewer which interpolates between two frames
-turns joints and keeps lengths. glTF has y up: one node above the bones turns the world.
+The bones are a chain of nodes, head first, so interpolation between two frames keeps lengths. glTF
+has y up: one node above the bones turns the world.
 """
 
 import io
@@ -24,8 +24,7 @@ MOST_BONES: Final = 256
 Y_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _ROOT_QUATERNION = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
 _STILL_M = 1e-6
-"""Share of the body's length: a bone whose place relative to the one before stays within this does
-not slide."""
+"""Share of the body's length: a bone that moves less relative to the one before does not slide."""
 
 
 def write_skin(
@@ -201,7 +200,7 @@ def _material(textured: bool, both_sides: bool) -> pygltflib.Material:
 
 
 class _Builder:
-    """The binary chunk, and what says where everything lies in it."""
+    """The binary chunk and its index."""
 
     def __init__(self) -> None:
         self.data = bytearray()

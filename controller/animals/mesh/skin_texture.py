@@ -17,7 +17,7 @@ def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
 
     Args:
         image: grey or colour.
-        points_px: (P, 2) skeleton in it, x and y with rows downwards, head first; whole numbers are
+        points_px: (P, 2) skeleton, x and y with rows downwards, head first; whole numbers are
             centres of pixels.
         radius_px: (P,) distances to the boundary.
 
@@ -40,11 +40,11 @@ def colours_across(
 
     Args:
         image: grey or colour.
-        points_px: (P, 2) skeleton in it, as for ``unroll``.
+        points_px: (P, 2) as for ``unroll``.
         radius_px: (P,) distances to the boundary.
         across: (R, 512) or (R, 1) places over the radius, 1 on the left of the heading.
-        squeezed: fit the whole width between the mixed pixels at the boundary; else the places keep
-            their distance, and those beyond have the last pure pixel.
+        squeezed: fit the width between the mixed pixels at the boundary; else places beyond have
+            the last pure pixel.
 
     Returns:
         (R, 512, 3)
@@ -89,12 +89,12 @@ def painted(
     Args:
         back_rgb: colour, 0 to 1.
         band_rgb: of the bands, which are broadest over the back.
-        bands: how many from head to tail.
+        bands: number.
         eye_at: place of the eyes along the body, 0 to 1.
         eye_radius: of an eye, over the body's length and over the half height of the body there.
 
     Returns:
-        (256, 1024, 3), laid out as that of ``unroll``; finer, for the eyes.
+        (256, 1024, 3), laid out as that of ``unroll``.
 
     """
     u = (np.arange(2 * ALONG) + 0.5) / (2 * ALONG)

@@ -1,8 +1,7 @@
 """The boundary curves of a person, and the bones to which they are attached ([GC] 2.1, 2.2.1).
 
-The paper cuts its curves from a mesh of a person. These are drawn from figures: ellipses at
-stations of each part, in shares of the stature (ours). A limb begins with a curve on the trunk's
-surface, as in the paper, so that the limb joins it.
+The paper cuts its curves from a mesh. These are ellipses at stations of each part, in shares of the
+stature (ours). A limb begins with a curve on the trunk's surface, as in the paper.
 """
 
 from collections.abc import Sequence
@@ -30,7 +29,7 @@ from snakewalk.controller.animals.people.skeleton import (
 )
 
 AROUND: Final = 32
-"""Points of a curve; the first faces forward, the next ones lie to the left."""
+"""Points of a curve, from the front over the left."""
 _V: Final = np.arange(AROUND) * TURN / AROUND
 
 TRUNK: Final = (
@@ -101,10 +100,7 @@ class BodyPart:
 def body_parts(skeleton: PersonSkeleton, girth: float = 1.0) -> tuple[BodyPart, ...]:
     """Return trunk, two arms, two legs and two shoes.
 
-    Args:
-        skeleton: of the person.
-        girth: factor on all half widths and depths.
-
+    ``girth`` is a factor on all half widths and depths.
     """
     trunk = _trunk(girth)
     surface = Tube.through(trunk.curves_m, trunk.stations)

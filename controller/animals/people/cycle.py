@@ -1,8 +1,8 @@
 """A walk and a run of a person: poses by sines and cosines, legs from the feet ([GC] 2.2.2).
 
-The feet are the handles: Eq. 9 and 10 place them, and inverse kinematics gives hips, knees and
-ankles. The pelvis keeps the height at which both legs reach their feet. Turns of pelvis, chest and
-arms are sines of the cycle; their amplitudes, and the pitch of the feet, are ours.
+Eq. 9 and 10 place the feet, and inverse kinematics gives hips, knees and ankles. The pelvis keeps
+the height at which both legs reach their feet. Turns of pelvis, chest and arms are sines of the
+cycle; their amplitudes, and the pitch of the feet, are ours.
 """
 
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ class PersonGait:
     side: float
     """Distance of the feet from the middle plane."""
     bob: float
-    """Rise of the pelvis over its mean, highest while both feet are farthest apart if above 0."""
+    """Rise of the pelvis over its mean; above 0 it is highest with the feet farthest apart."""
     lean: float
     """Pitch of the trunk, forward."""
     turn: float
@@ -83,13 +83,13 @@ RUN: Final = PersonGait(
     pitch=((0.0, 6.0), (0.05, 0.0), (0.16, 0.0), (0.26, -28.0), (0.35, -58.0), (0.50, -98.0),
            (0.66, -70.0), (0.82, -12.0), (0.93, 6.0)),
 )  # fmt: skip
-"""A run at 3 m/s: 35 % of a cycle on the ground, so that both feet are in the air twice."""
+"""A run at 3 m/s: 35 % of a cycle on the ground."""
 GAITS: Final = dict(zip(MOTIONS, (WALK, RUN), strict=True))
 
 
 @dataclass(frozen=True, slots=True)
 class PersonMotion:
-    """Bones of a person over T moments, and the feet from which they follow."""
+    """Bones of a person over T moments, and the feet."""
 
     bones: BoneMotion
     feet: Feet
@@ -109,16 +109,10 @@ def animate(
     in_place: bool = False,
     parameters: FootParameters | None = None,
 ) -> PersonMotion:
-    """Return whole cycles of a gait; the last pose is the first one again, farther ahead.
+    """Return whole cycles of a gait; the last pose repeats the first, farther ahead.
 
-    Args:
-        skeleton: of the person.
-        gait: walk or run.
-        law: equations of the feet.
-        cycles: how many.
-        frames: poses of a cycle.
-        in_place: whether the person walks on the spot, as on a treadmill.
-        parameters: of Eq. 10; default: those of the gait.
+    ``frames`` is the number of poses in a cycle; ``in_place`` is a walk on the spot. ``parameters``
+    of Eq. 10 are those of the gait by default.
 
     Raises:
         InputError: fewer than one cycle, or fewer than four poses in it.
@@ -179,7 +173,7 @@ def _foot_pitch(gait: PersonGait, ways: Feet) -> tuple[Floats, Floats]:
 
 
 def _ankles(skeleton: PersonSkeleton, gait: PersonGait, ways: Feet, pitch: Floats) -> Floats:
-    """(T, 2, 3) ankles: the foot rolls over heel and ball, which stay where Eq. 10 places them."""
+    """(T, 2, 3) ankles: the foot rolls over heel and ball."""
     size = skeleton.stature_m
     high = float(skeleton.joint_m[INDEX["left foot"], 2])
     pivot = size * np.where(pitch > 0.0, HEEL, BALL)
@@ -210,7 +204,7 @@ def _hips(skeleton: PersonSkeleton, pelvis: Floats) -> Floats:
 def _pelvis(
     skeleton: PersonSkeleton, gait: PersonGait, phase: Floats, ankle_m: Floats, hips: Floats
 ) -> Floats:
-    """(T, 3) the pelvis: as high as both legs reach, with two rises and one sway in a cycle."""
+    """(T, 3) the pelvis, with two rises and one sway in a cycle."""
     size = skeleton.stature_m
     sway = 0.012 * size * np.sin(TURN * phase)
     flat = hips + np.stack([np.zeros_like(sway), sway, np.zeros_like(sway)], -1)[:, None]

@@ -2,13 +2,12 @@
 
     T_y = sin(w t),  T_z = cos(w t);   R_Fy = T_y (H + H_R) + H_RF,  R_Fz = -T_z (L + L_R)
 
-The left foot has the same equations without the minus. As printed both feet use one ``T_y``: both
-are in the air at the same time, and the left one travels backwards while it is lifted. Each foot is
-also below its initial height for half of the cycle.
+The left foot has no minus sign. As printed both feet use one ``T_y``: both are in the air at the
+same time, and the left one travels backwards while it is lifted. Each foot is also below its
+initial height for half of the cycle.
 
 ``FeetLaw.PHASES`` delays the left foot's height by half a cycle, and stops both feet at the ground.
-``FeetLaw.PLANTED`` also chooses the share of the cycle on the ground, where a foot keeps its place:
-in a walk it is more than half, in a run less.
+``FeetLaw.PLANTED`` also chooses the share of the cycle on the ground, where a foot keeps its place.
 """
 
 from dataclasses import dataclass

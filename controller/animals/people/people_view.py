@@ -37,16 +37,10 @@ class PersonView:
         texture: Image | None = None,
         size_px: tuple[int, int] = FILM_PX,
     ) -> None:
-        """Prepare the view.
-
-        Args:
-            person: the body.
-            worn: a mesh on its bones.
-            texture: of the mesh; None is one colour.
-            size_px: width and height.
+        """Prepare the view; ``worn`` is a mesh on the bones, ``texture`` is the mesh's.
 
         Raises:
-            OffscreenError: nothing here draws without a screen.
+            OffscreenError: off-screen rendering is missing.
 
         """
         self._person, self._worn = person, worn
@@ -110,15 +104,9 @@ def film_person(
 ) -> int:
     """Draw the film of a motion of ``FPS`` poses a second, ``file`` ends in .mp4.
 
-    The camera goes along with the person, to its right, and turns by 60 degrees to its front.
-
-    Args:
-        file: the film.
-        person: the body.
-        motion: its motion.
-        worn: a mesh on its bones, and the mesh's texture.
-        title: in the caption.
-        on_progress: called with (frames done, of).
+    The camera goes along with the person, and turns by 60 degrees from its right to its front.
+    ``worn`` is a mesh on its bones, with its texture. ``on_progress`` is called with (frames done,
+    of).
 
     Returns:
         The number of frames.

@@ -1,8 +1,8 @@
 """The skeleton of a person: joints at rest, in shares of the stature.
 
 Segment lengths and joint heights are those of Winter, Biomechanics and Motor Control of Human
-Movement, Fig. 4.1 (after Drillis and Contini, 1966). The person stands, faces x, and has y to the
-left and z up. The arms are held away from the body, which keeps their curves off the trunk.
+Movement, Fig. 4.1 (after Drillis and Contini, 1966). The person faces x, y is to the left, z up.
+The arms are held away from the body, which keeps their curves off the trunk.
 """
 
 from dataclasses import dataclass

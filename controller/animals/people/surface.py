@@ -1,7 +1,7 @@
 """The skin of a person: PDE surfaces through curves that the bones carry ([GC] 2.1, 2.2.1).
 
-``Person.solved_m`` moves the curves and solves for the surface again, as in the paper.
-``Person.rig`` gives each corner the bones of the curves next to it, which a glTF can play.
+``Person.solved_m`` solves for the surface of the moved curves, as in the paper. ``Person.rig``
+gives each corner the bones of the curves next to it, which a glTF can play.
 """
 
 from dataclasses import dataclass
@@ -52,12 +52,9 @@ class Person:
         return cls(skeleton, parts, _rig(skeleton, parts), texture())
 
     def solved_m(self, front_m: Floats, rotation: Floats) -> Floats:
-        """(V, 3) corners in a pose, the surfaces solved for the curves that the bones moved.
+        """(V, 3) corners in a pose, solved for the moved curves.
 
-        Args:
-            front_m: (K, 3) joints.
-            rotation: (K, 3, 3) turns of the bones from rest.
-
+        ``front_m`` (K, 3) are the joints, ``rotation`` (K, 3, 3) the turns of the bones from rest.
         """
         rest_m = self.skeleton.joint_m
         return np.concatenate(
@@ -72,7 +69,7 @@ def _corners(part: BodyPart, curves_m: Floats) -> Floats:
 
 
 def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
-    """Join the parts, and share their corners out among the bones of the next curves."""
+    """Join the parts, and give each corner bones of the next curves."""
     corners, uv, faces, bones, shares = [], [], [], [], []
     start = 0
     for part in parts:
@@ -96,7 +93,7 @@ def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
 
 
 def _row_weights(part: BodyPart, rows: int) -> tuple[Ints, Floats]:
-    """(R, 3) bones and shares of the rows: those of the curves, smooth between two of them."""
+    """(R, 3) bones and shares of the rows, smooth between two curves."""
     count = int(part.bones.max()) + 1
     dense = np.zeros((len(part.bones), count))
     for k in range(3):

@@ -18,11 +18,10 @@ _TRIED, _AGREE = 24, 0.17
 def worn_mesh(person: Person, mesh: Mesh) -> Rig:
     """Hang a mesh on the bones of the nearest points of a person's surface.
 
-    The mesh stands as the person at rest does, with the arms away from the body. It is scaled to
-    the stature and moved so that its feet are on the ground and its middle is the person's. The
-    paper adds the displacement of the nearest point; here the corner gets that point's bones, so
-    that parts off the surface turn with it. The nearest point faces the same way as the corner:
-    that of the inner side of a thigh is not on the other thigh.
+    The mesh stands as the person at rest does. It is scaled to the stature; its feet are on the
+    ground and its middle is the person's. The paper adds the displacement of the nearest point;
+    here the corner gets that point's bones, so it turns with them. The nearest point faces the same
+    way as the corner, so it is not on the other thigh.
     """
     rest = person.rig.mesh.vertices
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)

@@ -33,12 +33,7 @@ def draw_body(
 ) -> None:
     """Write one picture in the format of its ending.
 
-    Args:
-        file: the picture.
-        model: cross sections.
-        mesh: the solid.
-        texture: unrolled skin, if there is one.
-        silhouettes: image, skeleton (P, 2) and radii (P,) in its pixels, of each photograph.
+    ``silhouettes`` are image, skeleton (P, 2) and radii (P,), pixels, of each photograph.
 
     Raises:
         InputError: the ending is not a picture's.

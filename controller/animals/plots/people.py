@@ -25,12 +25,7 @@ def draw_person(
 ) -> None:
     """Write one picture in the format of its ending.
 
-    Args:
-        file: the picture.
-        person: the body.
-        rest: the surface at rest.
-        stages: share of the cycle and picture of each stage.
-        title: of the stages.
+    ``rest`` is the surface at rest; ``stages`` are shares of the cycle with pictures.
 
     Raises:
         InputError: the ending is not a picture's.
@@ -78,7 +73,7 @@ def _skeleton(axes: Axes, person: Person) -> None:
 
 
 def _seen(points_m: Floats) -> Floats:
-    """(P, 2) points (P, 3) as seen from ahead, to the right and above, without perspective."""
+    """(P, 2) points (P, 3) seen from ahead, right and above, without perspective."""
     turn, up = np.radians(40.0), np.radians(8.0)
     across = points_m[:, 0] * np.sin(turn) + points_m[:, 1] * np.cos(turn)
     back = points_m[:, 1] * np.sin(turn) - points_m[:, 0] * np.cos(turn)

@@ -1,9 +1,8 @@
 """The graph of a recording's states: consecutive frames are neighbours, similar ones change course.
 
-[KP] 4.2.1 joins states by distance. Undirected edges let the film run backwards, and random states
-lie far from its frames, so the pattern of bends stops. Here an edge leads from a frame to
-the next one (temporal), and from a frame to the successor of any frame that is closer to it than
-its own neighbours are (similar). A walk by ``deg / 2^v`` follows these edges.
+[KP] 4.2.1 joins states by distance. Its undirected edges let the film run backwards. Here an edge
+leads from a frame to the next one (temporal), and to the successor of any frame that is closer to
+it than its own neighbours are (similar). A walk by ``deg / 2^v`` follows these edges.
 """
 
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from snakewalk.config.arrays import Complexes, Floats, Ints
 from snakewalk.controller.shape.states import to_angles
 
 _LEAST_PULSE = 0.5
-"""Smallest pulse of a frame, as a share of the typical one (ours): an animal at rest is skipped."""
+"""Smallest pulse of a frame, as a share of the typical one (ours): rest is skipped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,7 @@ class FilmStates:
     frame: Ints
     """(S,) number of the frame, increasing."""
     pulse_points: Floats
-    """(S,) points that the pattern of bends moves down the body until the next frame."""
+    """(S,) points that the bends move down the body until the next frame."""
 
     def __post_init__(self) -> None:
         if not (np.diff(self.frame) == 1).any():
@@ -50,8 +49,8 @@ def film_successors(film: FilmStates, points: int) -> list[list[int]]:
     """List the states that can follow each of the S states, in ascending order.
 
     Two states are similar if they are closer than the median of consecutive frames (ours). A state
-    without a successor uses that of the most similar one that lies half a body length or more of
-    the film away.
+    without a successor uses that of the most similar one at least half a body length of the film
+    away.
     """
     apart = np.abs(film.frame[:, None] - film.frame)
     parts = np.concatenate([film.states.real, film.states.imag], axis=1)
@@ -78,9 +77,8 @@ def film_angles(
 ) -> Iterator[tuple[int, Floats]]:
     """Give the state that is left, and A_c (points,), frame by frame and without end.
 
-    Coefficients are interpolated between states, as many frames as the recording's pattern moves
-    points between them. So the pattern of A_c moves by one point a frame, as Eq. 9 moves A_f.
-    The walk begins at a random frame that has a next one.
+    Coefficients are interpolated between states, so that the pattern of A_c moves by one point a
+    frame, as Eq. 9 moves A_f. The walk begins at a random frame that has a next one.
     """
     after = film_successors(film, points)
     degree = np.array([len(states) for states in after])

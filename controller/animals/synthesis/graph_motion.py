@@ -1,11 +1,10 @@
 """Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
 
-States without recorded neighbours are joined by distance, and a walk by ``deg / 2^v`` visits them.
-``film_graph`` joins the others. Coefficients between two states are interpolated linearly: the
-angles ``A_c``. On land the angles of the head pass down the body, one point a frame:
-``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``. Here m falls
-from 1 at the head to 0 behind. Correction: the text wants m "close to 1" at the head. It must be 1
-there, as nothing is in front of the head that the rest of it could come from.
+States without recorded neighbours are joined by distance; ``film_graph`` joins the others.
+Coefficients between two states are interpolated linearly: the angles ``A_c``. On land the angles of
+the head pass down the body, one point a frame:
+``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``. Correction: the text wants
+m "close to 1" at the head. It must be 1 there, as nothing is in front of the head.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,9 +20,8 @@ from snakewalk.controller.shape.walks import walk
 from snakewalk.controller.terrain.path import SplinePath
 
 HEAD_SHARE = 0.5
-"""Share of the body, behind which m is 0 (ours). States next to each other on the graph differ
-little at the head: handed down from the first tenth alone they make a body that is nearly
-straight."""
+"""Share of the body, behind which m is 0 (ours). A tenth alone makes a body that is nearly
+straight, because neighbouring states differ little at the head."""
 
 
 def leading(points: int) -> Floats:
@@ -75,20 +73,18 @@ def graph_motion(
 ) -> Locomotion:
     """Lay at most ``frames`` frames along a path: mass centre on it, mean heading along it.
 
-    Beyond its end the path continues straight.
-
-    Without slip a point of the body moves along the path by a segment a frame, times the mean
-    cosine of the angles about their mean. The centre advances by the same distance (ours; the text
-    leaves the speed open).
+    Beyond its end the path continues straight. Without slip a point of the body moves along the
+    path by a segment a frame, times the mean cosine of the angles about their mean. The centre
+    advances by the same distance (ours; the text leaves the speed open).
 
     Args:
         shapes: of ``graph_angles`` or ``film_angles``.
         path: through the waypoints.
-        frames: the most of them.
+        frames: largest number of frames.
         segment_m: r, the body's length over N.
         dt_s: time between frames.
         until: ends the motion early.
-        on_state: called with (frame, state) whenever the motion enters another state.
+        on_state: called with (frame, state) at each change of state.
 
     """
     state, body = next(shapes)

@@ -88,7 +88,7 @@ class SynthesisedWalk:
         return np.arange(len(self.plan.speed_m_s)) / self.rate_hz
 
     def bones(self, segments: int = 1) -> BoneMotion:
-        """Bones on the ground; each is ``segments`` of the skeleton's, a divisor of their number.
+        """Bones on the ground, each of ``segments`` segments, a divisor of their number.
 
         Raises:
             InputError: the motion stands upright somewhere.
@@ -97,7 +97,7 @@ class SynthesisedWalk:
         return from_points(self.skeleton.points_m[:, ::segments], self.time_s)
 
     def reached_s(self) -> list[float]:
-        """When each of the waypoints that were reached was reached."""
+        """Time at which each waypoint was reached."""
         current = np.array(self.targets.current)
         ends = np.flatnonzero(self.targets.required) + 1
         at = [np.flatnonzero(current >= end) for end in ends]
@@ -134,9 +134,9 @@ class SynthesisedWalk:
     def save(self, file: Path, name: str, source: str) -> None:
         """Write a track that every command for recordings accepts, with additional arrays.
 
-        ``points`` (T, N + 1, 2) are the skeleton in the ground's plane and ``height_m`` (T, N + 1)
-        its height. ``radius_m`` (N + 1,) is half the body's thickness, ``tongue`` (T,) its tongue,
-        and ``state`` (T,) the last state.
+        ``points`` (T, N + 1, 2) are the skeleton in plan and ``height_m`` (T, N + 1) its height.
+        ``radius_m`` (N + 1,) is half the body's thickness, ``tongue`` (T,) its tongue, and
+        ``state`` (T,) the last state.
         """
         points = self.skeleton.points_m
         frames = np.arange(len(points))
@@ -186,7 +186,7 @@ class SnakeSynthesis:
 
     @cached_property
     def library(self) -> StateLibrary:
-        """States with the waves that the behaviour asks for."""
+        """States with the waves of the behaviour."""
         return build_library(
             load_track(self.run.track).angles_rad,
             self.shape_filters,
@@ -210,8 +210,8 @@ class SnakeSynthesis:
     def synthesise(self, frames: int | None = None) -> SynthesisedWalk:
         """Synthesise a motion until the last target, or for a number of frames on the map.
 
-        A number of frames can lead beyond the path. The motion then ends when the head leaves the
-        ground of the world. Before the last target it ends when the whole body has left it.
+        Beyond the path, the motion ends when the head leaves the ground of the world. Before the
+        last target it ends when the whole body has left it.
 
         Raises:
             InputError: the run's time limit allows more than ``FRAMES_MAX``.
@@ -342,7 +342,7 @@ class SnakeSynthesis:
         return plan, states
 
     def _graph_shapes(self) -> Iterator[tuple[int, Floats]]:
-        """States and angles A_c of [KP] 4.2.1, from consecutive frames where there are any."""
+        """States and angles A_c of [KP] 4.2.1, from consecutive frames if there are any."""
         run, library = self.run, self.library
         coefficients = to_states(library.shapes_rad, self.how.coefficients)
         rng = np.random.default_rng(run.seed)

@@ -1,10 +1,10 @@
 """Skeleton angles and points over time ([PT] 2.6.4, Eq. 8-13).
 
 ``Theta(n, t)`` moves along the body at ``u = |v| + g(n, t)`` and slides with weight ``w_d(n, t)``.
-Corrections: the angle track stays untouched and each point keeps its *place* on it; looking up
-fractions of a point again and again (Eq. 10-12 as printed) blurs the angles. Places change by the
-shift less the share w_d of it, which equals Eq. 12 with a forward difference. The base is added
-once, and the head moves along the new ``Theta(1, t)``. A track that runs out grows.
+Corrections: each point keeps its *place* on an unchanged angle track; looking up fractions of a
+point again and again (Eq. 10-12 as printed) blurs the angles. Places change by the shift less the
+share w_d of it, which equals Eq. 12 with a forward difference. The base is added once, and the head
+moves along the new ``Theta(1, t)``. A track that runs out grows.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ Schedule = float | Callable[[int], float | Floats]
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """How the angles move along the body, and how the ends of it are held.
+    """How the angles move along the body, and how its ends are held.
 
     Raises:
         ValueError: a constant sliding outside 0..1.
@@ -34,11 +34,11 @@ class Behaviour:
     """
 
     sliding: Schedule = 0.0
-    """w_d in 0..1: share of the pulse that is lost. At 1 the shape is frozen and glides."""
+    """w_d in 0..1: share of the pulse that is lost. At 1 the shape is frozen."""
     pulse_m_s: Schedule = 0.0
     """g of Eq. 13, added to the speed of the body."""
     head_held: Schedule = 0.0
-    """0..1: how far the head and neck point where the whole body heads (ours)."""
+    """0..1: share of the body's mean heading in the head and neck (ours)."""
     calm_tail: Schedule = 0.0
     """0..1: how far the bends of the tail are flattened (ours)."""
 
@@ -48,7 +48,7 @@ class Behaviour:
 
 
 NECK, HIPS = 0.2, 0.6
-"""Where along the body a held head ends, and a calm tail begins (ours)."""
+"""End of a held head, and start of a calm tail, along the body (ours)."""
 
 
 def at_frame(schedule: Schedule, frame: int) -> Floats:
@@ -66,8 +66,8 @@ def varied_pulse(
 ) -> Floats:
     """Draw g (frames, points) as [PT] 2.6.4 found it: constant on parts, steps below a limit.
 
-    Each of ``parts`` equal parts starts within ``spread_m_s`` of 0 and wanders by less than
-    ``step_m_s`` a frame; neighbouring parts never differ by as much as that.
+    Each of ``parts`` equal parts starts within ``spread_m_s`` of 0. It changes by less than
+    ``step_m_s`` a frame, and neighbouring parts differ by less than that.
     """
     values = np.empty((frames, parts))
     now = np.cumsum(rng.uniform(-1.0, 1.0, parts) * 0.99 * step_m_s)
@@ -117,12 +117,12 @@ def synthesise(
     speed_m_s: float = 0.0,
     until: Until | None = None,
 ) -> Locomotion:
-    """Run ``frames`` frames, the first of which is the body that the track starts with.
+    """Run ``frames`` frames; the first is the body at the start of the track.
 
     Args:
-        track: holds at least the first body; it is extended by ``grow`` when it runs out.
-        law: the speed, from the bends and the turning of the frame before.
-        frames: T, or the most of them.
+        track: contains at least the first body; ``grow`` extends it.
+        law: speed from the bends and the turning of the frame before.
+        frames: T, or the largest T.
         dt_s: time between frames.
         segment_m: r, the body's length over N.
         grow: appends to the track.
@@ -133,7 +133,7 @@ def synthesise(
         until: ends the motion early.
 
     Raises:
-        ValueError: the track ran out and nothing makes it longer; or the time step is unstable.
+        ValueError: the track ran out without ``grow``, or the time step is unstable.
 
     """
     how = behaviour or Behaviour()
@@ -169,8 +169,7 @@ def synthesise(
 def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, int]:
     """Angles with the ends held, and n_0: the first point that follows the track unheld.
 
-    [PT] 2.6.3 lets n_0 change over time. Behind a held head the neck leads, so that the body still
-    passes where the neck passed.
+    [PT] 2.6.3 lets n_0 change over time. Behind a held head the neck leads.
     """
     held, calm = float(at_frame(how.head_held, frame)), float(at_frame(how.calm_tail, frame))
     if held == 0.0 and calm == 0.0:
@@ -200,7 +199,7 @@ _VALUES = readonly_array()
 def _shifted(ahead: Floats, shift: Floats) -> Floats:
     """Places ahead (N,) after a shift: a point shows what the point ``shift`` before it showed.
 
-    Places are looked up, not angles; a constant stays one, bit for bit.
+    A constant stays one, bit for bit.
     """
     moved = np.empty(len(ahead))
     for n in range(len(ahead)):
@@ -234,8 +233,7 @@ def chain(angles_rad: Floats, segment_m: float) -> Floats:
 
 _PATH_POINTS = 200
 Replan = Callable[[Floats, float], SplinePath]
-"""Plans from points (W + 1, 2), the head and the remaining waypoints, and from the body's
-heading."""
+"""Plans from the head and the remaining waypoints (W + 1, 2), and the body's heading."""
 
 
 class Targets:
@@ -244,7 +242,7 @@ class Targets:
     They are the waypoints, and points of the planned path evenly between them. Corrections: the
     loop ends when the last of L targets is reached, where the text prints ``until n < N``. A target
     between waypoints also counts as reached when the body has passed it by within twice the radius,
-    or reached the next one: a body does not turn back for it.
+    or reached the next one.
     """
 
     def __init__(
@@ -259,7 +257,7 @@ class Targets:
         self.radius_m, self._carrot_m, self._spacing_m = radius_m, carrot_m, spacing_m
         self._waypoints_m, self._replan = waypoints_m, replan
         self.points_m = np.empty((0, 2))
-        """(L, 2); after a miss, reached ones and those of the new path."""
+        """(L, 2); after a miss, the reached ones and those of the new path."""
         self.required = np.empty(0, dtype=bool)
         """(L,) whether each is a waypoint."""
         self._marks_m: list[float] = []
@@ -271,9 +269,9 @@ class Targets:
         self.index = 0
         """n, from 0; L when all are reached."""
         self.missed = 0
-        """How often a waypoint was passed by, and a new path planned to it."""
+        """Number of waypoints passed by, after which a new path was planned."""
         self.distance_m: list[float] = []
-        """D_n at each frame, to the target in force after it."""
+        """D_n at each frame, to the target after it."""
 
     def _extend(self, path: SplinePath, waypoints_m: Floats) -> None:
         """Go on along a path through waypoints (W, 2)."""
@@ -291,7 +289,7 @@ class Targets:
             at_s_m = to_s_m
 
     def paths(self, rate_hz: float) -> list[tuple[float, Floats]]:
-        """Time, s, from when on each planned path was in force, and (P, 2) points of it."""
+        """Start time, s, and points (P, 2) of each planned path."""
         return [
             (frame / rate_hz, path.position(np.linspace(0.0, path.length_m, _PATH_POINTS)))
             for frame, path in self._planned
@@ -303,7 +301,7 @@ class Targets:
         return len(self.points_m)
 
     def observe(self, points_m: Floats) -> bool:
-        """Advance n by the body's points (N + 1, 2), as often as needed; whether all are reached.
+        """Advance n by the body's points (N + 1, 2); return whether all targets are reached.
 
         D_n is measured from the mass centre.
         """
@@ -321,9 +319,9 @@ class Targets:
     def aim_rad(self, points_m: Floats, heading_rad: float) -> float:
         """Direction from the head, where the next state begins, to a point ahead on the path.
 
-        Where the head is a body's length beyond a waypoint that it has not reached, a new path is
-        planned, which turns back from the body's mean heading. Printed is the direction from the
-        mass centre, which lies half a body behind: that snake wanders (docs/synthesis.md).
+        If the head is a body's length beyond a waypoint that it missed, a new path is planned from
+        the body's mean heading. Printed is the direction from the mass centre, which lies half a
+        body behind: that snake wanders (docs/synthesis.md).
         """
         head = points_m[0]
         length_m = float(np.hypot(*np.diff(points_m, axis=0).T).sum())

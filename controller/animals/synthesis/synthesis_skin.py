@@ -26,7 +26,7 @@ from snakewalk.controller.track.bone_motion import BoneMotion
 from snakewalk.sim.rendering.looks import SkinLook
 
 FILM_SEGMENTS = 5
-"""Segments of the skeleton that are one bone in the film; the file has a bone a segment."""
+"""Segments of the skeleton in one bone of the film; the file has a bone a segment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,17 +98,17 @@ def film_over(
     """Draw a skin that moves over a run's world; shows progress on standard error.
 
     Args:
-        prepared: the run: its ground and waypoints.
-        file: the film, ends in .mp4.
+        prepared: the run.
+        file: ends in .mp4.
         bones: the motion.
         look: the skin.
-        robot: the body that the camera frames; it has the skin's length.
-        reached_s: when each waypoint was reached.
+        robot: the body in the camera's frame, of the skin's length.
+        reached_s: time at each waypoint.
         paths: paths (P, 2) from a time on.
         title: in the picture.
 
     Returns:
-        How many frames were drawn.
+        The number of frames.
 
     Raises:
         InputError: the simulator or PyAV is not installed, or nothing draws here.

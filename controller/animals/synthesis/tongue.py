@@ -1,7 +1,6 @@
 """The tongue: a second-order Markov chain over heights ([PT] 2.6.6), for any head accessory.
 
-``P(H(t) | H(t - 1), H(t - 2))`` is counted on a short sequence. A servo, an LED or the viewer's
-tongue shows ``Tongue.height(t)``: 0 is in and 1 is out.
+``P(H(t) | H(t - 1), H(t - 2))`` is counted on a short sequence. A height of 0 is in and 1 is out.
 """
 
 import csv
@@ -18,7 +17,7 @@ RATE_LIMITS = (0.4, 2.5)
 
 
 def flicks(rate_hz: float = 25.0) -> Floats:
-    """Make up a sequence (T,) to learn from, as no tracked one is published.
+    """Make a sequence (T,) to learn from: no tracked one is published.
 
     Three bursts of two to four quick strokes, each out in a sixth of a second, with rests between.
     """

@@ -19,7 +19,7 @@ _ROWS = 8
 """Rows that the texture gets for the tongue's colour."""
 _AROUND = 8
 _HIDDEN = 2.0
-"""How far behind the head's tip the tongue's tip is drawn in, over its radius."""
+"""Distance of the drawn-in tongue's tip behind the head's, over its radius."""
 _FORK = 0.35
 """Share of the length that is forked."""
 
@@ -27,11 +27,7 @@ _FORK = 0.35
 def rig_with_tongue(rig: Rig, length_m: float, texture: Image | None) -> tuple[Rig, Image | None]:
     """Hang a tongue on the first bone of a spine; it is the last bone, drawn in at rest.
 
-    Args:
-        rig: of a body.
-        length_m: of the body.
-        texture: of the body; it gets rows of the tongue's colour.
-
+    ``length_m`` is the body's; its texture gets rows of the tongue's colour.
     """
     mesh, bone = rig.mesh, len(rig.rest_m)
     corners, faces = _forked(LENGTH * length_m, RADIUS * length_m)

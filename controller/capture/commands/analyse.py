@@ -1,4 +1,4 @@
-"""``snakewalk analyse``: how the animal of a recording moved."""
+"""``snakewalk analyse``: the motion of a recorded animal."""
 
 import json
 from pathlib import Path
@@ -77,7 +77,7 @@ def analyse(
 
 
 def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[Path | None]:
-    """Where each recording's picture goes; refused before anything is measured."""
+    """File of each recording's picture; rejected before anything is measured."""
     if picture is None:
         return [None] * len(recordings)
     if picture.suffix and not picture.is_dir():
@@ -94,7 +94,7 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
 
 
 def _show(facts: dict[str, Any]) -> None:
-    """One recording as a table of two columns with the units in words."""
+    """One recording as a table of two columns, units in words."""
     missing = f"{facts['frames_missing']} missing in the file, " if facts["frames_missing"] else ""
     assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
     if facts["times_uneven"]:

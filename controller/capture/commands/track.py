@@ -106,7 +106,7 @@ def track(
 
 
 def _show(facts: "RecordingFacts") -> None:
-    """One recording as a table of two columns with the units in words."""
+    """One recording as a table of two columns, units in words."""
     pace = facts.pace
     length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
     bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""

@@ -57,7 +57,7 @@ def draw_analysis(found: Analysis, file: Path) -> None:
 
 
 def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
-    """Draw the pulse speed of body and time, body lengths a second."""
+    """Draw the pulse speed by body and time, body lengths a second."""
     pulse = found.pulse
     speed = pulse.points_per_frame * scale
     low, high = np.nanpercentile(speed, [2.5, 97.5]).tolist()
@@ -77,7 +77,7 @@ def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
 
 
 def _tracks(axes: Axes, found: Analysis) -> None:
-    """Draw where head, middle and tail went, over the bodies."""
+    """Draw the paths of head, middle and tail, over the bodies."""
     body = even_points(found.track)
     if body is None:
         midlines(axes, found.track)

@@ -16,7 +16,7 @@ _SHOWN = 24  # midlines over a recording: more run together
 
 
 def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
-    """One row for each (recording, caption); written to ``file`` in the format of its ending.
+    """Draw one row for each (recording, caption) to ``file``, in the format of its ending.
 
     Raises:
         InputError: the ending does not belong to a picture.
@@ -39,7 +39,7 @@ def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
 
 
 def midlines(axes: Axes, track: Track) -> LineCollection:
-    """Draw bodies where they were, light ones first; heads as dots; return the lines."""
+    """Draw bodies in place, light ones first, with heads as dots; return the lines."""
     some = np.unique(np.linspace(0, track.frames - 1, _SHOWN).astype(int))
     bodies = track.points[some]
     scale, unit = (1.0, "body lengths") if track.length_m is None else (1e3, "mm")

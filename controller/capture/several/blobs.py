@@ -1,4 +1,4 @@
-"""Blobs of one frame: connected parts that may be an animal, or several animals in contact."""
+"""Blobs of one frame: connected parts that may be one or several animals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from snakewalk.controller.images.silhouette import body_threshold, connected_par
 
 SMALLEST = 0.3
 """Area of a blob over the usual area of an animal; smaller ones are dirt."""
-_AS_LARGE = 0.97  # of the largest area of all animals: a background shows all of them
+_AS_LARGE = 0.97  # of the largest area of all animals: with it a background shows all of them
 _SURFACE = "a smooth surface through each frame"
 _WHOLE = 1.25  # times the area against a fixed background: it contains parts of the animals
 FEATURES = ("length", "width", "contrast")
@@ -45,9 +45,9 @@ def blobs_of(
 
     Args:
         frame: (H, W[, C]).
-        ground: the same without animals.
+        ground: the frame without animals.
         detector: its polarity, threshold and region are used.
-        usual_px: usual area of an animal; 0: blobs of any size are returned.
+        usual_px: usual area of an animal; 0: any size.
 
     """
     apart = soft_contrast(frame, ground, detector.polarity)
@@ -92,7 +92,7 @@ def _measured(
 
 
 def usual_area(frames: Sequence[Blobs]) -> float:
-    """Usual area of an animal: half of all that stands out is in larger blobs; 0: nothing does."""
+    """Usual area of an animal: larger blobs make up half of the total; 0: nothing stands out."""
     area = np.sort(np.concatenate([one.area_px for one in frames]))
     if not area.size:
         return 0.0
@@ -101,7 +101,7 @@ def usual_area(frames: Sequence[Blobs]) -> float:
 
 
 def count_of(frames: Sequence[Blobs]) -> tuple[int, float]:
-    """Median number of animals in some frames, and the mean area of all of them together."""
+    """Median number of animals in some frames, and their mean total area."""
     least = SMALLEST * usual_area(frames)
     large = [one.area_px[one.area_px >= least] for one in frames]
     return int(np.median([len(one) for one in large])), float(np.mean([one.sum() for one in large]))
@@ -115,12 +115,12 @@ def detector_of_several(
     threshold: float | None = None,
     wanted: int | None = None,
 ) -> BodyDetector:
-    """Learn the scene of several animals from a few frames of a camera that stands still.
+    """Learn the scene of several animals from a few frames of a fixed camera.
 
     The median over frames shows animals where they rest or come back. A lighter or darker quantile
-    of each pixel is used if animals are larger against it, or nearer to the number ``wanted``.
-    All of them contain animals that hardly move. A surface fitted to each frame is used if it
-    shows the same moving animals clearly larger, and more alike in size.
+    of each pixel is used if animals are larger against it, or nearer to the number ``wanted``. All
+    of them contain animals that hardly move. A surface fitted to each frame is used if it shows the
+    same moving animals clearly larger, and more alike in size.
 
     Args:
         frames: (H, W[, C]), spread over the film.
@@ -158,7 +158,7 @@ def detector_of_several(
 
 
 def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[DeepImage]) -> bool:
-    """Whether a fixed background hides parts of animals that a surface shows whole."""
+    """Whether a fixed background hides parts of animals that a surface shows."""
     whole, parts = (
         [blobs_of(one, detector.ground_of(one), detector) for one in frames]
         for detector in (surface, fixed)
@@ -181,7 +181,7 @@ def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[Dee
 
 
 def _unlike(areas: Floats) -> float:
-    """Median difference of areas from their median, over the median."""
+    """Median deviation of areas from their median, over the median."""
     usual = float(np.median(areas))
     return float(np.median(np.abs(areas - usual))) / usual
 

@@ -1,4 +1,4 @@
-"""How far a medial axis may be off: blur moves the threshold's tips along the body."""
+"""Error of a medial axis: blur moves the threshold's tips along the body."""
 
 import cv2
 import numpy as np
@@ -11,9 +11,9 @@ _LEAST_PX = 0.35
 
 
 def edge_blur_px(level: NDArray[np.float32], threshold: float) -> float:
-    """Blur of a body's boundary: the standard deviation of a step that is blurred as much.
+    """Blur of a body's boundary: standard deviation of an equally blurred step.
 
-    It is contrast over steepness at the boundary, less the blur of the filters themselves.
+    It is contrast over steepness at the boundary, less the blur of the filters.
 
     Args:
         level: (h, w) contrast of one body.

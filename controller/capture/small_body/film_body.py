@@ -1,8 +1,8 @@
 """One body for a whole film: length, widths, blur and shadow are the same in every frame.
 
-They are found together with the bends of a sample of frames by damped least squares on the grey
-values. The frames' own parameters are eliminated, so that the cost grows with the frames only
-linearly. With the body known, a frame fixes its place far better than its two blurred ends do.
+They are fitted together with the bends of a sample of frames by damped least squares on the grey
+values. The frames' own parameters are eliminated, so the cost is linear in the frames. With the
+body known, a frame fixes its place far better than its two blurred ends do.
 """
 
 from collections.abc import Sequence
@@ -26,18 +26,18 @@ from snakewalk.controller.capture.small_body.ribbon import (
 
 _ROUNDS = 14
 _SETTLED = 1e-4  # of the cost
-_LEARNING = 4  # rounds in which the noise is learnt
+_LEARNING = 4  # rounds in which the noise is estimated
 _LEAST_NOISE2 = 1.0
 _LEVEL = 0.35  # prior standard deviation of the log of the mean width
 _EVEN = 0.3  # of second differences of the logs of the widths
-_TIP = (-0.55, 0.3)  # of the log of the width at a tip against that before it: a round cap
+_TIP = (-0.55, 0.3)  # of the log of the width at a tip against the next: a round cap
 _BLUR = 0.5  # of the log of the blur
 _STIFF = 1.0  # rad, of second differences of the bends
 _CONTRAST = 0.15  # of the contrast of one frame against the film's
 _DIRECTIONS = 8
 _AWAY = (0.5, 1.0, 1.8, 3.0)  # of the greatest half width
 _LOOKED_AT = 12  # frames
-_WORTH = 30.0  # by how much the fit must gain, in squares of the noise
+_WORTH = 30.0  # least gain of the fit, in squares of the noise
 _UNSEEN = 1e-6  # of a parameter that no pixel shows: an error of 1,000
 
 
@@ -46,23 +46,23 @@ class Patch:
     """The part of a frame that shows the body."""
 
     picture: Floats
-    """(h, w) contrast with its sign: above 0 where the body is."""
+    """(h, w) signed contrast, above 0 where the body is."""
     use: Floats
-    """(h, w) 1 where the picture counts, 0 elsewhere."""
+    """(h, w) 1 where the picture counts, else 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """One frame fitted with a body that is known."""
+    """One frame fitted with a known body."""
 
     frame: Floats
     """(FRAME,)"""
     noise: float
-    """Standard deviation of the residual, raised where neighbouring pixels of it correlate."""
+    """Standard deviation of the residual, raised where its neighbouring pixels correlate."""
     inverse: Floats
     """(FRAME, FRAME) covariance of the parameters."""
     by_body: Floats
-    """(FRAME, body) how the parameters move with those of the body."""
+    """(FRAME, body) derivatives of the parameters by those of the body."""
     residual: Floats
     """(h, w) picture minus model."""
 
@@ -72,7 +72,7 @@ class FilmBody:
     """Parameters that all frames share."""
 
     values: Floats
-    """Length, log of the blur, log half widths; the shadow's four where there is one."""
+    """Length, log of the blur, log half widths; with a shadow its four."""
     covariance: Floats
     grid: Grid
     contrast: float
@@ -80,7 +80,7 @@ class FilmBody:
 
 
 def _frame_prior(contrast: float) -> tuple[Floats, Floats]:
-    """Prior rows (R, FRAME) and their target values, each in its own standard deviation."""
+    """Prior rows (R, FRAME) and their target values, in their standard deviations."""
     bend = np.zeros((BENDS - 2, FRAME))
     bend[:, 2 : 2 + BENDS] = np.diff(np.eye(BENDS), 2, axis=0) / _STIFF
     level = np.zeros((3, FRAME))
@@ -157,7 +157,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
 
 
 def _correlation(residual: Floats, spot: float) -> float:
-    """Variance of the blurred residual, over that of as much white noise; at least 1."""
+    """Variance of the blurred residual over that of white noise of equal strength; at least 1."""
     # of white noise a Gaussian leaves 1 / (4 pi spot^2); less blur than that of a pixel does not
     # count
     spot = max(spot, 0.8)
@@ -240,13 +240,13 @@ def film_body(
 def _solvable(normal: Floats) -> Floats:
     """Normal equations that can be solved even if no pixel shows a parameter.
 
-    A body that a step took out of its patch moves nothing in it: it stays, with an error of 1,000.
+    A body that left its patch moves nothing in it: it stays, with an error of 1,000.
     """
     return np.asarray(normal + np.diag(np.where(np.diag(normal) < _UNSEEN, _UNSEEN, 0.0)))
 
 
 def _rows(ribbon: Ribbon, frame: Floats, body: Floats, patch: Patch) -> Floats:
-    """(FRAME + body + 1, pixels) slopes, and last what is residual."""
+    """(FRAME + body + 1, pixels) slopes, and the residual last."""
     shown, slopes = ribbon.picture(frame, body, patch.picture.shape)
     rows = np.concatenate([slopes, (patch.picture - shown)[None]]) * patch.use
     return np.asarray(rows.reshape(len(rows), -1))
@@ -272,7 +272,7 @@ def _eliminated(
 def with_shadow(
     body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]
 ) -> tuple[FilmBody, list[Floats]] | None:
-    """Fit again with a shadow where the residual shows one; None where it does not."""
+    """Fit again with a shadow if the residual shows one; else None."""
     best = _shadow(body, frames, patches)
     if best is None:
         return None
@@ -302,7 +302,7 @@ def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) 
         rows = np.concatenate([slopes, (patch.picture - shown)[None], shades]) * patch.use
         products = gram(rows.reshape(len(rows), -1))
         known = len(slopes)
-        # subtract the part that the body itself could explain from the rest and from the shades
+        # subtract the part that the body could explain from the rest and from the shades
         own = products[:known, :known] + 1e-9 * np.trace(products[:known, :known]) * np.eye(known)
         others = products[known:, known:] - products[known:, :known] @ np.linalg.solve(
             own, products[:known, known:]

@@ -1,7 +1,7 @@
 """Small bodies of a film fitted to its grey values, with one body for all frames.
 
-A frame's expected error follows from the residual of its picture and from how well the shared body
-is known; where it is above a hundredth of the length the frame is ``ROUGH``.
+A frame's expected error follows from the residual of its picture and from the error of the shared
+body; above a hundredth of the length the frame is ``ROUGH``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,23 +35,23 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 ROUGH = 0.01
-"""Share of the length: a frame of a larger expected error is ``ROUGH``."""
+"""Share of the length: a frame of larger expected error is ``ROUGH``."""
 _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
 _FEWEST, _MOST = 8, 40
 _PASSES = 2
 _FORM = 0.004  # of the length: possible error of the model of the tips
 _UNLIKE = 10.0  # times misfit and blur: error of the shared parameters; measured on rendered films
-_SHARP = 62.0  # times the blur: a longer body's medial axis is as good
-_LONG, _WIDE = 50.0, 2.4  # times the blur: so is that of a wide body, by length and half width
+_SHARP = 62.0  # times the blur: the medial axis of a longer body is as good
+_LONG, _WIDE = 50.0, 2.4  # times the blur: as is that of a wide body, by length and half width
 _BY_BLUR = 0.6  # of the blur of all of the body, the blur at its edges: ``edge_blur_px``
 _LOST = 2.0  # times the median noise: the picture shows something else
 _FOUND = 1.5  # the same for a frame that had no skeleton
 _ALIKE = 0.3  # of the usual contrast
-_DOUBT = 0.35  # margin of the ends under which both ways are tried
-_NEAR = 3  # frames between which the margin of the ends counts: one may have no body
-_EVIDENCE = 9.0  # squares of the noise: the grey values must say so by three standard deviations
+_DOUBT = 0.35  # margin of the ends under which both directions are tried
+_NEAR = 3  # frames for which the margin of the ends counts: one may have no body
+_EVIDENCE = 9.0  # squares of the noise: three standard deviations of the grey values
 _TRIED = 5  # frames of a stretch between doubts
-_FREE = 0.03  # of the body's cover: less than that is ground
+_FREE = 0.03  # of the body's cover: less is ground
 _WITHOUT_TIPS = 0.85  # of the error of a medial axis: its tips are measured
 _PRIOR_FRAMES = 2.0  # weight of the surroundings of a place, in frames
 
@@ -62,9 +62,9 @@ class FittedFilm:
 
     skeletons: tuple[Skeleton, ...]
     expected_px: Floats
-    """(T,) expected mean error of a point; NaN where nothing was fitted."""
+    """(T,) expected mean error of a point; NaN without a fit."""
     body: FilmBody | None
-    """None where nothing was fitted: the bodies are long against their blur, or too few."""
+    """None without a fit: the bodies are long against their blur, or too few."""
 
 
 def fit_film(
@@ -80,9 +80,9 @@ def fit_film(
     Args:
         skeletons: (T) the same end first in all.
         crops: by frame.
-        margin: (T,) how surely the ends were distinguished: ``identity.margins``.
-        expected_px: (T,) error of frames that are not fitted, NaN where it is not known.
-        fixed: whether the ground stands still, so that its pattern is learnt from all frames.
+        margin: (T,) certainty of the ends: ``identity.margins``.
+        expected_px: (T,) error of frames without a fit, NaN where unknown.
+        fixed: the ground is still, so its pattern is learnt from all frames.
 
     """
     good = [k for k in crops if skeletons[k].status is FrameStatus.GOOD]
@@ -136,7 +136,7 @@ def fit_film(
 
 
 def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> FittedFilm:
-    """Skeletons as they are, ``ROUGH`` where their expected error is too large."""
+    """Skeletons unchanged, ``ROUGH`` where their expected error is too large."""
     good = [one.status is FrameStatus.GOOD for one in skeletons]
     length = np.array([one.length_px for one in skeletons])
     usual = float(np.median(length[good])) if any(good) else 1.0
@@ -154,7 +154,7 @@ def _with_status(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
 
 
 def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> FittedFilm:
-    """The film with expected errors of at least so much in some frames."""
+    """The film with lower bounds on the expected errors of some frames."""
     expected, out = film.expected_px.copy(), list(film.skeletons)
     for k, least in least_px.items():
         if np.isfinite(expected[k]):
@@ -164,16 +164,16 @@ def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> Fitted
 
 
 def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) -> FittedFilm:
-    """The film with the error of the tips in its expected errors.
+    """Return the film with the error of the tips in its expected errors.
 
-    The profile across the body shows where a body ends below the noise or the blur. A length that
-    all frames share is wrong alike in all of them, so the median over the frames counts. It is
-    fitted to the pixels of both tips, so only a body that goes on beyond them counts. For bodies
-    without a shared length, the noise of one frame's profile is larger than its tips' error.
+    The profile across the body shows where a body ends below the noise or the blur. A shared length
+    has the same error in all frames, so the median over the frames counts. It is fitted to both
+    tips, so only a body beyond them counts. Without a shared length, the noise of one frame's
+    profile is larger than its tips' error.
 
     Args:
         film: the fitted film, the same end first in all frames.
-        ends_px: (T) (2, 3) by ``profile_ends``, NaN where they are not known.
+        ends_px: (T) (2, 3) by ``profile_ends``, NaN where unknown.
         solved: (T,) frames of coils, whose error is known.
 
     """
@@ -214,11 +214,10 @@ def expected_error(fit: Fit, body: FilmBody) -> float:
 
 
 def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
-    """How far the body's picture is from its model, of its contrast: median over the frames.
+    """Difference of the body's picture from its model, of its contrast: median over the frames.
 
-    Noise is the same on the body and around it. A stronger residual on the body and at its edge (a
-    saturated ground, the blocks of a JPEG, stains) shifts it alike in all frames, which no
-    covariance shows.
+    A stronger residual on the body and at its edge than around it (a saturated ground, the blocks
+    of a JPEG, stains) shifts it alike in all frames, which no covariance shows.
     """
     ribbon = Ribbon(body.grid)
     found = []
@@ -235,7 +234,7 @@ def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
 def _reverse_wrong_stretches(
     fits: dict[int, Fit], patches: Mapping[int, Patch], body: FilmBody, margin: Floats
 ) -> None:
-    """Reverse stretches whose grey values fit the body better from its other end."""
+    """Reverse stretches whose grey values fit the reversed body better."""
     stretches: list[list[int]] = []
     for k in sorted(fits):
         joined = stretches and k - stretches[-1][-1] <= _NEAR and margin[k] >= _DOUBT
@@ -264,7 +263,7 @@ def _recover_lost(
     radius: float,
     space: Workspace,
 ) -> None:
-    """Fit frames without a skeleton from their neighbour's place; keep those that fit as well."""
+    """Fit frames without a skeleton from their neighbour's place; keep equally good ones."""
     usual = float(np.median([fit.noise for fit in fits.values()]))
     lost = sorted(set(crops) - set(fits))
     for step, order in ((-1, lost), (1, lost[::-1])):
@@ -321,7 +320,7 @@ class FilmGround:
 
     @classmethod
     def of(cls, views: Mapping[int, View], fits: Mapping[int, Fit], body: FilmBody) -> "FilmGround":
-        """Compute the mean residual where the body was not, over all frames that have a fit."""
+        """Compute the mean residual where the body was not, over all fitted frames."""
         firsts = np.array([views[k].first for k in fits])
         lasts = np.array([np.add(views[k].first, views[k].picture.shape[::-1]) for k in fits])
         low, high = firsts.min(axis=0), lasts.max(axis=0)
@@ -345,7 +344,7 @@ class FilmGround:
         return cls(np.asarray(pattern), (int(low[0]), int(low[1])))
 
     def visible(self, view: View, fit: Fit, body: FilmBody) -> Floats:
-        """(h, w) the part of the pattern that a frame shows outside the body."""
+        """(h, w) the part of the pattern visible outside the body."""
         x, y = np.subtract(view.first, self.first)
         rows, columns = view.picture.shape
         cover = Ribbon(body.grid).cover(fit.frame, body.values, view.picture.shape)

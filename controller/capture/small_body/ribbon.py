@@ -1,9 +1,9 @@
-"""The picture that a small, blurred body leaves, and how it changes with the body.
+"""The picture that a small, blurred body leaves, and its derivatives by the body.
 
 A ribbon of half width ``h(s)`` along a curve of fixed length is a few rows of Gaussian spots, so
-that bends, tips and width are blurred as a camera blurs them. Its shadow is a second, wider ribbon
-that darkens the ground where the body does not cover it. The model is
-``I = A c + K t (1 - c) + b``, with the covers ``c`` of the body and ``t`` of the shadow.
+bends, tips and width are blurred as by a camera. Its shadow is a second, wider ribbon that darkens
+the ground where the body does not cover it. The model is ``I = A c + K t (1 - c) + b``, with the
+covers ``c`` of the body and ``t`` of the shadow.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from snakewalk.controller.images.thin_body_fit import draw_spots
 BENDS = 10
 """Coefficients of the tangent angle."""
 STATIONS = np.array([0.0, 0.04, 0.1, 0.2, 0.35, 0.5, 0.65, 0.78, 0.88, 0.95, 1.0])
-"""Places along the body at which its half width is given; linear between them."""
+"""Places along the body with a half width; linear between them."""
 GROUND = 3
 """Coefficients of the ground: level and slopes."""
 FRAME = 2 + BENDS + 1 + GROUND
@@ -33,14 +33,14 @@ _ROWS = 7
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where spots lie along and across a body, chosen once for a film."""
+    """Places of spots along and across a body, chosen once for a film."""
 
     along: int
     across: int
 
     @classmethod
     def of(cls, body: Floats) -> "Grid":
-        """Choose a grid as fine as the blur of ``body`` asks for."""
+        """Choose a grid as fine as the blur of ``body`` needs."""
         apart = _APART * float(np.exp(body[1]))
         wide = 2.0 * float(np.exp(body[2:BODY].max()))
         along = int(np.clip(np.ceil(float(body[0]) / apart), 24, 120))
@@ -63,7 +63,7 @@ def curve_of(frame: Floats, length: float, pieces: int = 400) -> Floats:
 
 
 def curve_slopes(frame: Floats, length: float, pieces: int = 40) -> Floats:
-    """(pieces + 1, 2, 2 + BENDS + 1) of the line by x, y, bends and the length."""
+    """(pieces + 1, 2, 2 + BENDS + 1) derivatives of the line by x, y, bends and the length."""
     middle = (np.arange(pieces) + 0.5) / pieces
     basis = bend_basis(middle)
     angle = basis @ frame[2 : 2 + BENDS]
@@ -77,7 +77,7 @@ def curve_slopes(frame: Floats, length: float, pieces: int = 40) -> Floats:
 
 
 class Ribbon:
-    """Pictures of one body; values that depend on the grid alone are kept."""
+    """Pictures of one body; stores the values that depend on the grid alone."""
 
     def __init__(self, grid: Grid) -> None:
         n, m = grid.along, grid.across
@@ -117,7 +117,7 @@ class Ribbon:
         return shown, np.concatenate(slopes)
 
     def cover(self, frame: Floats, body: Floats, shape: tuple[int, ...]) -> Floats:
-        """(h, w) part of each pixel that the body covers, its shadow not counted."""
+        """(h, w) part of each pixel that the body covers, without its shadow."""
         places = self._places(frame, body, shared=False)
         return _spots(places, float(np.exp(body[1])), shape, slopes=False)[0]
 
@@ -197,7 +197,7 @@ def _ground(shape: tuple[int, ...]) -> Floats:
 
 
 def gram(rows: Floats) -> Floats:
-    """(K, K) products of ``rows`` (K, pixels), a few pixels at a time, so that no thread starts."""
+    """(K, K) products of ``rows`` (K, pixels) in blocks of pixels: no thread starts."""
     each = max(1, 200_000 // len(rows) ** 2)
     short = -rows.shape[1] % each
     parts = np.pad(rows, ((0, 0), (0, short))).reshape(len(rows), -1, each).transpose(1, 0, 2)

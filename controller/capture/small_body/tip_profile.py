@@ -1,4 +1,4 @@
-"""Where a body ends by its contrast summed across it, and how far that is from a found tip.
+"""End of a body by its contrast summed across it, and the error of a tip.
 
 The sum is the width times the contrast, whatever the blur. A pointed tail falls below half of the
 contrast, or below the noise, before it ends. The profile is continued in a straight line to 0.
@@ -18,17 +18,17 @@ from snakewalk.controller.images.cross_profile import (
     seen_across,
 )
 
-_HIGH, _LOW = 0.3, 0.06  # of the usual sum: between these the profile falls as it goes on to 0
+_HIGH, _LOW = 0.3, 0.06  # of the usual sum: between these the profile falls towards 0
 _MOST_LOW = 0.2
 _NOISE = 3.0  # standard deviations of the profile beyond the body
 _FINEST_PX, _STEPS = 0.5, 20  # step along the profile: this, or a part of the width if larger
-_INSIDE, _BEYOND = 1.5, 3.0  # widths of the profile inside of the tip, and beyond it
+_INSIDE, _BEYOND = 1.5, 3.0  # widths of the profile inside the tip, and beyond it
 _LEAST_BEYOND_PX = 10.0
 _ACROSS, _ACROSS_PX = 0.9, 2.5  # widths and px on each side that are summed
-_RIM = 0.75  # of the reach on each side: from there on is ground
-_CALM = 95.0  # percentile of the ground: higher values are not noise
+_RIM = 0.75  # of the reach on each side: beyond is ground
+_CALM = 95.0  # percentile of the ground: higher values are signal
 _USUAL = (0.3, 0.6)  # of the length: where the sum is the usual one
-_ROUND_PX, _BY_BLUR, _LEAST_PX = 1.5, 2.0, 3.0  # so far the profile of a round tip goes beyond it
+_ROUND_PX, _BY_BLUR, _LEAST_PX = 1.5, 2.0, 3.0  # so far a round tip's profile goes beyond it
 _LEAST_BLUR_PX = 0.7
 _MOST_DOUBT_PX = 2.0
 _INNER = 4  # chords from a tip: its direction
@@ -41,9 +41,9 @@ NO_ENDS: Final = np.full((2, 3), np.nan)
 def profile_ends(
     line: Floats, radius_px: Floats, level: NDArray[np.float32], blur_px: float
 ) -> Floats:
-    """(2, 3) x, y where the profile of a body ends at its first and its last point, and the doubt.
+    """(2, 3) x, y of the end of a body's profile at its first and last point, and the doubt.
 
-    The doubt, in px, is the part of the profile that is not seen, less that of a round tip.
+    The doubt, px, is the unseen part of the profile, less that of a round tip.
 
     Args:
         line: (P, 2) the body in pixels of ``level``.
@@ -67,7 +67,7 @@ def profile_ends(
 
 
 def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
-    """(2, 2) for each tip of a body (P, 2): how far its profile goes on beyond it, and the doubt.
+    """(2, 2) for each tip of a body (P, 2): distance of the profile's end beyond it, and the doubt.
 
     The distance is below 0 if the profile ends before the tip. The ends (2, 3) may be in the other
     order.
@@ -93,7 +93,7 @@ def _end(
     usual: float,
     round_px: float,
 ) -> Floats:
-    """Where the profile of a line of equal steps comes to 0, less a round tip, and the doubt."""
+    """Zero of the profile of a line of equal steps, less a round tip, and the doubt."""
     back = min(max(2, round(max(0.5 * wide, 3.0) / step)), len(line) - 1)
     ahead = end_direction(line, back)
     reach = min(max(_BEYOND * wide, _LEAST_BEYOND_PX), 0.25 * step * len(line) + _LEAST_BEYOND_PX)

@@ -17,7 +17,7 @@ from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 REJECTED = {FrameStatus.EMPTY, FrameStatus.KNOT, FrameStatus.LENGTH}
-"""Statuses of frames whose finished skeleton was rejected here."""
+"""Statuses of frames whose skeleton this module rejects."""
 _SAMPLE = 60  # frames from which the usual contrast is learnt
 _USUAL = 75.0  # percentile of the frames: some may lie on empty ground
 _LEAST_LEVELS = 2.0  # grey levels between the body and the ground on either side, in the mean
@@ -26,15 +26,15 @@ _NOISE = 3.0  # standard errors of the ground's noise
 _FAINT = 0.15  # of the usual contrast there: the body does not stand out
 _STRETCH = 5  # stations that are averaged
 _ONE_SIDE, _BOTH_SIDES = 25, 10  # stations of a stretch that does not stand out
-_KNOWN = 0.4  # of the stations: with fewer that show ground a side is not judged
-_BEYOND = 0.5  # of the contrast at a tip: with more contrast beyond the tip the body goes on
+_KNOWN = 0.4  # of the stations: with fewer on ground a side is not judged
+_BEYOND = 0.5  # of the contrast at a tip: with more beyond the tip the body continues
 _FAINT_SAMPLE, _FEWEST_FAINT = 40, 6  # frames in which faint parts beyond a tip are searched
-_FAINT_BEYOND = 0.035  # of the usual contrast: something faint goes on beyond a tip
+_FAINT_BEYOND = 0.035  # of the usual contrast: least contrast of a faint part beyond a tip
 _SAME_TIP = 0.85  # of these frames: beyond the same tip
 _LENGTH, _SPREADS = 0.08, 6.0  # of the usual length; standard deviations
 _FEWEST = 5
-_CONTRADICTS = 0.2  # margin of the ends from which one frame says which is which
-_NEAR = 3  # frames, at most, between those whose ends are compared
+_CONTRADICTS = 0.2  # margin of the ends from which one frame determines them
+_NEAR = 3  # largest number of frames between compared ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +42,13 @@ class _Usual:
     """Usual values of the film's bodies."""
 
     direction: Floats
-    """(C,) how the channels are weighted: the body is above 0."""
+    """(C,) weights of the channels: the body is above 0."""
     contrast: Floats
     """(101,) along the body."""
 
 
 def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]:
-    """The skeletons; without points where the frame contradicts them, the status says why.
+    """Return the skeletons; a contradicted one has no points, and its status gives the reason.
 
     Args:
         skeletons: (T) head first.
@@ -80,8 +80,8 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
 def goes_on_faintly(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
     """Whether something faint goes on beyond the same tip in most frames of a film.
 
-    The check of a single frame finds only strong parts. Noise and stains of the ground are alike
-    beyond both tips, so the difference between the tips over many frames shows a faint tail.
+    The check of a single frame finds only strong parts. Noise and stains are alike beyond both
+    tips, so the difference between the tips over many frames shows a faint tail.
 
     Args:
         skeletons: (T) head first, those of ``verified``.
@@ -112,10 +112,10 @@ def _along_a_ray(rings: Floats) -> Floats:
 
 
 def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
-    """The skeletons, reversed where head and tail contradict the frame before for sure.
+    """Return the skeletons, reversed where head and tail surely contradict the frame before.
 
-    A body does not change its ends from one frame to the next. The function keeps the direction
-    that most frames have.
+    A body does not change its ends from one frame to the next. The direction of most frames is
+    kept.
     """
     used = [k for k, one in enumerate(skeletons) if one.status.has_points]
     sign = np.ones(len(skeletons), dtype=int)
@@ -130,7 +130,7 @@ def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
 
 
 def _check_lengths(bodies: list[Skeleton]) -> None:
-    """Reject bodies whose length lies outside the film's range."""
+    """Reject bodies whose length is outside the film's range."""
     length = np.array([one.length_px for one in bodies])
     good = np.array([one.status is FrameStatus.GOOD for one in bodies])
     if good.sum() < _FEWEST:
@@ -194,7 +194,7 @@ def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
 
 
 def _averaged(side: Floats) -> Floats:
-    """(101,) averaged over a few stations; infinite where no ground is seen."""
+    """(101,) averaged over a few stations; infinite without ground."""
     known = np.isfinite(side)
     weight = uniform_filter1d(known.astype(float), _STRETCH, mode="nearest")
     total = uniform_filter1d(np.where(known, side, 0.0), _STRETCH, mode="nearest")

@@ -1,4 +1,4 @@
-"""The form of a line: bends and loops that a body of its width cannot have."""
+"""The form of a line: bends and loops that are impossible at its width."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -13,7 +13,7 @@ _SMALL_LOOP = 3.0  # widths along the body: a loop around nothing has pi of them
 
 
 def possible_form(body: Skeleton) -> bool:
-    """Whether no bend is tighter than half a width, and no loop smaller than the body is wide.
+    """Whether no bend is tighter than half a width, and no loop smaller than the width.
 
     A body that is not known to lie on itself has no loop at all.
     """
