@@ -21,6 +21,9 @@ from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.run_keys import with_compliance
 
+_LEAST_S = 0.1
+"""Shortest motion (ours)."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class GaitJob:
@@ -54,6 +57,8 @@ class GaitJob:
         options = self.options
         if self.by not in {"blend", "cpg"}:
             raise InputError(f"--by {self.by}: expected blend or cpg")
+        if self.seconds < _LEAST_S:
+            raise InputError(f"--seconds {self.seconds:g}: must be at least {_LEAST_S:g}")
         with ExitStack() as stack:
             watchers = stack.enter_context(watched_by(options))
             page = None if watchers is None else watchers.page

@@ -58,9 +58,7 @@ def run_gait(
     set_: Set = None,
     then: Then = None,
     by: By = "blend",
-    seconds: Annotated[
-        float, typer.Option(min=0.1, help="duration of the motion in seconds")
-    ] = 20.0,
+    seconds: Annotated[float, typer.Option(help="duration of the motion in seconds")] = 20.0,
     look_heading_rad: LookHeading = None,
     look_at: LookAt = None,
     live: Live = False,

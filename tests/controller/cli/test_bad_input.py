@@ -195,7 +195,7 @@ ROWS = [
     ("walk --graph er:100000000:9", "expected 4 to 1000000 states"),
     ("tune rolling --for beauty", "--for: 'beauty' is not one of 'speed', 'efficiency'"),
     ("tune trot --robot yaw16", "gait trot needs two pairs of legs"),
-    ("gait run rolling --seconds 0", "--seconds: must be at least 0.1 (got '0')"),
+    ("gait run rolling --seconds 0", "--seconds 0: must be at least 0.1"),
     ("ros --seconds 0", "--seconds: must be at least 0.1 (got '0')"),
     ("tune rolling --seconds soon", "--seconds: must be a number (got 'soon')"),
     ("synthesise flat-square --frames 2.5", "--frames: must be a whole number (got '2.5')"),

@@ -212,13 +212,13 @@ def test_a_pad_tells_whether_a_shoulder_is_held_and_one_that_is_gone_holds_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pad = Pad()
-    assert not pad.held
+    assert not pad.is_enabled
     assert pad.keys(event(1, 0x81, 4)) == [], "held when the device was opened"
-    assert pad.held
+    assert pad.is_enabled
     assert pad.keys(event(1, 1, 5) + event(0, 1, 4)) == []
-    assert pad.held
+    assert pad.is_enabled
     assert pad.keys(event(0, 1, 5) + event(1, 1, 10)) == ["t"]
-    assert not pad.held
+    assert not pad.is_enabled
     fifo = tmp_path / "js0"
     os.mkfifo(fifo)
 
@@ -228,11 +228,11 @@ def test_a_pad_tells_whether_a_shoulder_is_held_and_one_that_is_gone_holds_none(
     with Gamepad(fifo) as device, fifo.open("wb", buffering=0) as file:
         file.write(event(1, 1, 4))
         assert device.pressed() == []
-        assert device.held
+        assert device.is_enabled
         with monkeypatch.context() as gone:
             gone.setattr(os, "read", unplugged)
             assert device.pressed() == []
-        assert not device.held
+        assert not device.is_enabled
 
 
 def test_a_pipe_whose_writer_has_ended_is_a_gamepad_that_is_gone(tmp_path: Path) -> None:
@@ -244,11 +244,11 @@ def test_a_pipe_whose_writer_has_ended_is_a_gamepad_that_is_gone(tmp_path: Path)
         with fifo.open("wb", buffering=0) as file:
             file.write(event(1, 1, 4))
             assert device.pressed() == []
-            assert device.held
+            assert device.is_enabled
             assert device.gone is None
         assert device.pressed() == []
         assert device.gone is not None
-        assert not device.held
+        assert not device.is_enabled
 
 
 @pytest.mark.parametrize(
