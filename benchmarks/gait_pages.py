@@ -155,7 +155,8 @@ def climbing_table(rows: Mapping[str, Facts]) -> str:
 
 def _parameters(name: str) -> dict[str, Any]:
     """Parameters of a gait by default."""
-    return gait_by_name(name, None)[0].params.model_dump()
+    given: dict[str, Any] = gait_by_name(name, None)[0].params.model_dump()
+    return given
 
 
 def _row(cells: Sequence[str]) -> str:
