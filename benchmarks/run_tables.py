@@ -45,7 +45,8 @@ RECORDINGS: Final = {
 }
 """Recording, and the rate that its source states, by its name on the page."""
 MOTIONS: Final = ("wave-cma", "wave-ppo", "undulation-fast", "lateral-undulation")
-WORLDS: Final = ("flat", "flat-friction-3")
+TUNED: Final = "undulation-fast"
+"""The gait with which the policies are compared."""
 
 
 @dataclass(frozen=True)
@@ -91,12 +92,13 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="replace the tables of the pages")
     given = parser.parse_args()
     chosen = [name for name in TABLES if name in given.names or name.split(".")[0] in given.names]
-    if not chosen:
-        parser.error(f"no table {', '.join(given.names)}; there are {', '.join(TABLES)}")
+    known = {part for name in TABLES for part in (name, name.split(".")[0])}
+    if unknown := [name for name in given.names if name not in known]:
+        parser.error(f"no table {', '.join(unknown)}; there are {', '.join(TABLES)}")
     for name in chosen:
         page, mark = name.split(".")
         words = f"python -m benchmarks.run_tables {name}"
-        words += "" if given.data is None else " --data DIR"
+        words += " --data DIR" if page == "recordings" else ""
         words += "" if given.seeds is None else f" --seeds {given.seeds}"
         source = provenance(words)
         text = f"{source}\n\n{TABLES[name](Wanted(given.seeds, given.data))}"
@@ -116,8 +118,15 @@ def printed(wanted: Wanted) -> str:
 
 
 def _waypoint_table(options: Sequence[str], wanted: Wanted) -> str:
-    head = ("run", "all waypoints", "passed by", "time, median (longest), s")
-    head += ("off the path, mean (worst), m", "states, median", "states that came again")
+    head = (
+        "run",
+        "all waypoints",
+        "passed by",
+        "time, median (longest), s",
+        "off the path, mean (worst), m",
+        "states, median",
+        "states that came again",
+    )
     seeds = range(FIRST_SEED, FIRST_SEED + wanted.of(20))
     options = *options, "--set", "run.time_limit_s=300"
     rows = [waypoint_row(run, [_synthesised(run, seed, options) for seed in seeds]) for run in RUNS]
@@ -143,9 +152,16 @@ def waypoint_row(run: str, made: Sequence[Synthesised]) -> list[str]:
 
 def share(wanted: Wanted) -> str:
     """Return the table of the share of a state that is walked; means over the seeds."""
-    head = ("`sliding`", "`state_share`", "states in 250 frames", "waypoints reached of 5")
-    head += ("off the path, mean, m", "bends K, rad", "predicted gain")
-    head += ("largest change of bend from point to point, rad",)
+    head = (
+        "`sliding`",
+        "`state_share`",
+        "states in 250 frames",
+        "waypoints reached of 5",
+        "off the path, mean, m",
+        "bends K, rad",
+        "predicted gain",
+        "largest change of bend from point to point, rad",
+    )
     rows = []
     for sliding in ("0", "0.4"):
         for part in ("1", "0.5", "0.25", "0.1"):
@@ -197,9 +213,17 @@ def slowing(wanted: Wanted) -> str:
     """
     if wanted.data is None:
         raise SystemExit("recordings: no folder of recordings; add --data DIR")
-    head = ("recording", "frames (left out)", "waves, Hz", "towards the head", "K median (most)")
-    head += ("in 7 coefficients", "joint speed, own pace, rad/s", "slowed throughout")
-    head += ("only where needed",)
+    head = (
+        "recording",
+        "frames (left out)",
+        "waves, Hz",
+        "towards the head",
+        "K median (most)",
+        "in 7 coefficients",
+        "joint speed, own pace, rad/s",
+        "slowed throughout",
+        "only where needed",
+    )
     rows = []
     for name, (file, *options) in RECORDINGS.items():
         shipped = name == file
@@ -222,34 +246,47 @@ def slowing_cells(facts: Facts) -> list[str]:
     ]
 
 
-def policies(wanted: Wanted) -> str:
-    """Return a table for each ground with learnt policies and gaits."""
-    seeds = wanted.of(10)
-    words = [word for world in WORLDS for word in ("--world", world)]
-    found = snakewalk(
-        "policy", "trials", *MOTIONS, *words, "--first-seed", str(FIRST_SEED),
-        "--seeds", str(seeds), "--workers", "1",
-    )  # fmt: skip
-    return "\n\n".join(policy_table(found["table"], world, seeds) for world in WORLDS)
+def policies_on_flat(wanted: Wanted) -> str:
+    """Return the table of policies and gaits on the ground where the policies learnt."""
+    return _policies("flat", wanted)
 
 
-def policy_table(rows: Sequence[Facts], world: str, seeds: int) -> str:
+def policies_on_grip(wanted: Wanted) -> str:
+    """Return the table of policies and gaits on a ground where none has learnt."""
+    return _policies("flat-friction-3", wanted)
+
+
+def _policies(world: str, wanted: Wanted) -> str:
+    seeds = str(wanted.of(10))
+    words = "policy", "trials", *MOTIONS, "--world", world, "--first-seed", str(FIRST_SEED)
+    found = snakewalk(*words, "--seeds", seeds, "--workers", "1")
+    return policy_table(found, world)
+
+
+def policy_table(found: Facts, world: str) -> str:
     """Return the table of one ground."""
     head = (f"motion, on `{world}`", "m/s", "sd", "body lengths a cycle", "J/m", "course, rad")
-    cells = [
-        [
-            f"`{row['motion']}`",
-            _number(row["speed_m_s"], ".3f"),
-            _number(row["speed_sd_m_s"], ".3f"),
-            _number(row["body_lengths_cycle"], ".3f"),
-            _number(row["energy_j_m"], ".1f"),
-            _number(row["course_rad"], ".3f"),
-            f"{row['trips']} of {seeds}",
-        ]
-        for row in rows
-        if row["world"] == world
-    ]
-    return markdown((*head, "trips"), cells)
+    speed = {(trial["motion"], trial["seed"]): trial["speed_m_s"] for trial in found["trials"]}
+    cells = []
+    for row in found["table"]:
+        pairs = [
+            (value, speed[TUNED, seed]) for (name, seed), value in speed.items()
+            if name == row["motion"]
+        ]  # fmt: skip
+        faster = sum(own > tuned for own, tuned in pairs)
+        cells.append(
+            [
+                f"`{row['motion']}`",
+                _number(row["speed_m_s"], ".3f"),
+                _number(row["speed_sd_m_s"], ".3f"),
+                _number(row["body_lengths_cycle"], ".3f"),
+                _number(row["energy_j_m"], ".1f"),
+                _number(row["course_rad"], ".3f"),
+                "" if row["motion"] == TUNED else f"{faster} of {len(pairs)}",
+                f"{row['trips']} of {len(pairs)}",
+            ]
+        )
+    return markdown((*head, f"seeds faster than `{TUNED}`", "trips"), cells)
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -307,7 +344,8 @@ TABLES: Final[Mapping[str, Callable[[Wanted], str]]] = {
     "synthesis.share": share,
     "shipped-robots.robots": shipped_robots,
     "recordings.slowing": slowing,
-    "policies.motions": policies,
+    "policies.flat": policies_on_flat,
+    "policies.grip": policies_on_grip,
     "synthesis.printed": printed,
 }
 """Function of each table, by page and mark; the longest are last."""
