@@ -177,7 +177,7 @@ def share_cells(made: Sequence[Synthesised]) -> list[str]:
     """Return the means over the seeds of a row."""
     return [
         f"{np.mean([one.states_in_250 for one in made]):.1f}",
-        f"{np.mean([one.facts['waypoints_reached'] for one in made]):.2g}",
+        f"{np.mean([one.facts['waypoints_reached'] for one in made]):.3g}",
         f"{np.mean([one.off_path_m.mean() for one in made]):.2f}",
         f"{np.mean([one.facts['bend_k_rad'] for one in made]):.2f}",
         f"{np.mean([one.gain for one in made]):.2f}",
@@ -205,14 +205,7 @@ def trial_cells(found: Facts) -> list[str]:
 
 
 def slowing(wanted: Wanted) -> str:
-    """Return the table of the recordings, and how much slower the robot moves.
-
-    Raises:
-        SystemExit: no folder of recordings was named.
-
-    """
-    if wanted.data is None:
-        raise SystemExit("recordings: no folder of recordings; add --data DIR")
+    """Return the table of the recordings, and how much slower the robot moves."""
     head = (
         "recording",
         "frames (left out)",
@@ -224,12 +217,61 @@ def slowing(wanted: Wanted) -> str:
         "slowed throughout",
         "only where needed",
     )
+    return markdown(head, [[name, *slowing_cells(_track(name, wanted))] for name in RECORDINGS])
+
+
+def walks(wanted: Wanted) -> str:
+    """Return the table of walks around the square, of the shapes of each recording."""
+    head = (
+        "recording",
+        "states kept, refused",
+        "all waypoints",
+        "passed by",
+        "path error, mean, m",
+        "eta",
+        "time, s",
+    )
     rows = []
-    for name, (file, *options) in RECORDINGS.items():
-        shipped = name == file
-        (facts,) = snakewalk("track", file if shipped else str(wanted.data / file), *options)
-        rows.append([name, *slowing_cells(facts)])
+    for name in RECORDINGS:
+        found = snakewalk(
+            "trials", "flat-square", "--motion", "walk", "--seeds", str(wanted.of(3)),
+            "--workers", "1", "--track", _recording(name, wanted)[0],
+        )  # fmt: skip
+        rows.append([name, states_cell(_track(name, wanted)), *walk_cells(found)])
     return markdown(head, rows)
+
+
+def states_cell(facts: Facts) -> str:
+    """Return the number of states that a robot can use, and why others were refused."""
+    refused = facts["states_refused"]
+    reasons = ", ".join(f"{count} {reason}" for reason, count in refused.items() if count)
+    cell = f"{facts['states_kept']} of {facts['states_kept'] + sum(refused.values())}"
+    return f"{cell}; {reasons}" if reasons else cell
+
+
+def walk_cells(found: Facts) -> list[str]:
+    """Return the cells of one row of ``snakewalk trials`` on a recording."""
+    complete, seconds, error_m = trial_cells(found)
+    (row,) = found["table"]
+    return [complete, str(row["passed_by"]), error_m, str(row["eta"]), seconds]
+
+
+def _track(name: str, wanted: Wanted) -> Facts:
+    (facts,) = snakewalk("track", *_recording(name, wanted))
+    return dict(facts)
+
+
+def _recording(name: str, wanted: Wanted) -> tuple[str, ...]:
+    """Return the file and the options of a recording.
+
+    Raises:
+        SystemExit: no folder of recordings was named.
+
+    """
+    if wanted.data is None:
+        raise SystemExit("recordings: no folder of recordings; add --data DIR")
+    file, *options = RECORDINGS[name]
+    return (file if file == name else str(wanted.data / file)), *options
 
 
 def slowing_cells(facts: Facts) -> list[str]:
@@ -344,6 +386,7 @@ TABLES: Final[Mapping[str, Callable[[Wanted], str]]] = {
     "synthesis.share": share,
     "shipped-robots.robots": shipped_robots,
     "recordings.slowing": slowing,
+    "recordings.walks": walks,
     "policies.flat": policies_on_flat,
     "policies.grip": policies_on_grip,
     "synthesis.printed": printed,

@@ -7,7 +7,15 @@ import pytest
 
 from benchmarks import run_tables
 from benchmarks.provenance import PAGES
-from benchmarks.run_tables import TABLES, Synthesised, Wanted, policy_table, waypoint_row
+from benchmarks.run_tables import (
+    TABLES,
+    Synthesised,
+    Wanted,
+    policy_table,
+    states_cell,
+    walk_cells,
+    waypoint_row,
+)
 
 SHARED = {"waypoints": 5, "states_taken": 10, "bend_k_rad": 0.59}
 REACHED = SHARED | {"waypoints_reached": 5, "passed_by": 0, "seconds": 36.0, "states_distinct": 10}
@@ -21,6 +29,12 @@ TRACK = {
     **{"time_towards_head": 0.231, "bend_k_rad": 0.39, "bend_k_most_rad": 0.47},
     **{"energy_kept": 0.9961, "joint_speed_rad_s": 20.53, "slowed_by": 10.27},
     "longer_if_slowed_where_needed": 5.04,
+    "states_kept": 523,
+    "states_refused": {"turn": 50, "joint limits": 0, "self-contact": 27, "traction": 0},
+}
+TRIALS = {
+    "table": [{"complete": "2 of 2", "passed_by": 1, "path_error_m": 0.079, "eta": 0.85}],
+    "trials": [{"duration_s": 56.389}, {"duration_s": 47.1}],
 }
 
 
@@ -62,7 +76,9 @@ def test_a_table_of_recordings_is_written_between_its_marks(
     page.write_text("before\n<!-- slowing begins -->\nold\n<!-- slowing ends -->\nafter\n")
     monkeypatch.setattr(run_tables, "PAGES", tmp_path)
     monkeypatch.setattr(run_tables, "snakewalk", command)
-    monkeypatch.setattr("sys.argv", ["run_tables", "recordings", "--data", "/films", "--write"])
+    monkeypatch.setattr(
+        "sys.argv", ["run_tables", "recordings.slowing", "--data", "/films", "--write"]
+    )
     run_tables.main()
     text = page.read_text()
     cells = "78 (2) | 1.64, 3.86 | 23 % | 0.39 (0.47) | 99.6 % | 20.5 | 10.27 | 5.04"
@@ -77,10 +93,15 @@ def test_a_table_of_recordings_is_written_between_its_marks(
     assert capsys.readouterr().out.strip() in text
 
 
+def test_a_row_of_walks_has_its_refused_states_and_the_range_of_times() -> None:
+    assert states_cell(TRACK) == "523 of 600; 50 turn, 27 self-contact"
+    assert states_cell(TRACK | {"states_refused": {"turn": 0}}) == "523 of 523"
+    assert walk_cells(TRIALS) == ["2 of 2", "1", "0.079", "0.85", "47 to 56"]
+
+
 def test_each_cell_has_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_tables, "_synthesised", lambda *_: made(REACHED, 0.1))
-    trial = {"table": [{"complete": "1 of 1", "path_error_m": 0.1}], "trials": [{"duration_s": 57}]}
-    answers = {"trials": trial, "track": [TRACK], "policy": {"table": [ROW], "trials": []}}
+    answers = {"trials": TRIALS, "track": [TRACK], "policy": {"table": [ROW], "trials": []}}
     monkeypatch.setattr(run_tables, "snakewalk", lambda *words: answers[words[0]])
     for table in TABLES.values():
         lines = table(Wanted(1, Path())).split("\n\n")[0].splitlines()
