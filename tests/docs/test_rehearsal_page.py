@@ -31,7 +31,7 @@ def test_the_page_works_as_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         finally:
             server.send_signal(signal.SIGINT)
     poses = json.loads(checked.stdout)
-    assert poses["faults"] == []
+    assert poses["faults"] == [], poses
     assert poses["noise_m"] == pytest.approx(0.01, rel=0.5)
     answer = json.loads(ran.stdout)
     assert answer["pose_source"] == "udp", ran.stderr
