@@ -13,9 +13,10 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.repertoire.behaviour import Wandering
-from snakewalk.controller.repertoire.detail import FAR, HIDDEN, NEAR, DetailedCrowd, ViewFrustum
+from snakewalk.controller.repertoire.detail import FAR, HIDDEN, NEAR, DetailedCrowd, detail_levels
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot, CrowdView, render_crowd
+from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 FPS: Final = 20
 SIZE_PX: Final = (960, 540)
@@ -96,7 +97,7 @@ class CrowdScene:
             if self._detail:
                 ground_m = self._ground.elevation_m(*crowd.origin_m[:, :2].T)
                 centre = np.column_stack([crowd.origin_m[:, :2], ground_m])
-                levels = frustum.levels(centre, wandering.length_m)
+                levels = detail_levels(frustum, centre, wandering.length_m)
             if self._wandering.separated is None:
                 crowd.visible[:] = levels > HIDDEN
             culled = time.process_time()

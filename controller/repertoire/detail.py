@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.repertoire.crowd import Crowd
+from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 HIDDEN, FAR, MIDDLE, NEAR = range(4)
 """Levels: body frame alone, three segments, every second link, all links on the ground."""
@@ -18,53 +18,17 @@ MIDDLE_PX: Final = 45.0
 """Least apparent length of a body at these levels (ours)."""
 
 
-@dataclass(frozen=True, slots=True)
-class ViewFrustum:
-    """View of a camera without roll."""
+def detail_levels(view: ViewFrustum, centre_m: Floats, length_m: Floats) -> Ints:
+    """(N,) level of bodies with centres (N, 3) and lengths (N,).
 
-    eye_m: Floats
-    """(3,)"""
-    axes: Floats
-    """(3, 3) rows: forward, right, up."""
-    half_tan: tuple[float, float]
-    """Tangents of half the opening, across and up."""
-    height_px: int
-
-    @classmethod
-    def orbit(
-        cls,
-        lookat_m: ArrayLike,
-        distance_m: float,
-        azimuth_deg: float,
-        elevation_deg: float,
-        *,
-        fovy_deg: float,
-        size_px: tuple[int, int],
-    ) -> "ViewFrustum":
-        """Look at a point from a distance, in a direction; below the horizon elevation is < 0."""
-        a, e = np.radians([azimuth_deg, elevation_deg])
-        forward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        right = np.array([np.sin(a), -np.cos(a), 0.0])
-        axes = np.array([forward, right, np.cross(right, forward)])
-        up = float(np.tan(np.radians(0.5 * fovy_deg)))
-        eye = np.asarray(lookat_m, float) - distance_m * forward
-        return cls(eye, axes, (up * size_px[0] / size_px[1], up), size_px[1])
-
-    def levels(self, centre_m: Floats, length_m: Floats) -> Ints:
-        """(N,) level of bodies with centres (N, 3) and lengths (N,).
-
-        A single point is checked, with the frustum wider by half a body ([YT] 6): no body of which
-        a part is in view is left out.
-        """
-        depth, across, up = self.axes @ (centre_m - self.eye_m).T
-        half = 0.5 * length_m
-        seen = depth > -half
-        for offset, tangent in zip((across, up), self.half_tan, strict=True):
-            seen &= np.abs(offset) <= tangent * depth + half * np.hypot(1.0, tangent)
-        focal_px = 0.5 * self.height_px / self.half_tan[1]
-        size_px = focal_px * length_m / np.maximum(np.hypot(depth, np.hypot(across, up)), 1e-6)
-        level = FAR + (size_px >= MIDDLE_PX).astype(int) + (size_px >= NEAR_PX)
-        return np.where(seen, level, HIDDEN)
+    A single point is checked, with the frustum wider by half a body ([YT] 6): no body of which a
+    part is in view is left out.
+    """
+    depth, across, up = view.in_camera(centre_m)
+    focal_px = 0.5 * view.height_px / view.half_tan[1]
+    size_px = focal_px * length_m / np.maximum(np.hypot(depth, np.hypot(across, up)), 1e-6)
+    level = FAR + (size_px >= MIDDLE_PX).astype(int) + (size_px >= NEAR_PX)
+    return np.where(view.touches(centre_m, 0.5 * length_m), level, HIDDEN)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,10 +12,11 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.crowd_mesh import CrowdMeshes
-from snakewalk.sim.rendering.ground_tiles import GroundTiles, TileView
+from snakewalk.sim.rendering.ground_tiles import GroundTiles
 from snakewalk.sim.rendering.looks import dressed_model
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 FOVY_DEG: Final = 45.0
 
@@ -92,7 +93,11 @@ class CrowdView:
         camera.lookat[:], camera.distance = shot.lookat_m, shot.distance_m
         camera.azimuth, camera.elevation = shot.azimuth_deg, shot.elevation_deg
         if self._tiles is not None:
-            view = TileView.orbit(camera, FOVY_DEG, self._size_px)
+            view = ViewFrustum.orbit(
+                *(shot.lookat_m, shot.distance_m, shot.azimuth_deg, shot.elevation_deg),
+                fovy_deg=FOVY_DEG,
+                size_px=self._size_px,
+            )
             self._tiles.choose(self._model, view)
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_STATIC,

@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
+from snakewalk.sim.rendering.view_frustum import camera_axes
 
 SMOOTHING_S: Final = 1.2
 """The camera's smoothing, in seconds of film."""
@@ -98,7 +99,7 @@ def follow(track: BodyTrack, ground: HeightField | None) -> Floats:
 
 def distance_to_show(track: BodyTrack, camera: Floats) -> Floats:
     """(F,) least distances of cameras (F, 6) from which every bone is in the picture."""
-    ahead, right, up = _axes(camera[:, 3], camera[:, 4])
+    ahead, right, up = camera_axes(camera[:, 3], -camera[:, 4])
     off = track.parts_m - camera[:, None, :3]
     half = _EDGE * np.tan(np.radians(0.5 * track.fovy_deg))
     girth = _GIRTH * track.length_m
@@ -117,16 +118,6 @@ def hidden(eye_m: Floats, target_m: Floats, ground: HeightField) -> Bools:
     inside = ground.contains(line[..., 0], line[..., 1])
     above = line[..., 2] > ground.elevation_m(line[..., 0], line[..., 1])
     return np.asarray((inside & ~above).any(axis=-1))
-
-
-def _axes(azimuth_deg: Floats, elevation_deg: Floats) -> tuple[Floats, Floats, Floats]:
-    """Directions (F, 3) ahead of cameras, to their right and upwards."""
-    turn, down = np.radians(azimuth_deg), np.radians(elevation_deg)
-    level = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
-    ahead = np.cos(down)[:, None] * level
-    ahead[:, 2] = -np.sin(down)
-    right = np.stack([np.sin(turn), -np.cos(turn), np.zeros_like(turn)], axis=-1)
-    return ahead, right, np.cross(right, ahead)
 
 
 def _raised(
@@ -148,7 +139,7 @@ def _raised(
         camera[:, 5] = _spread(least, track.fps)
         if ground is None:
             return camera
-        ahead, _, _ = _axes(camera[rows, 3], camera[rows, 4])
+        ahead, _, _ = camera_axes(camera[rows, 3], -camera[rows, 4])
         eye = camera[rows, :3] - camera[rows, 5:] * ahead
         covered = hidden(np.broadcast_to(eye[:, None], shown.shape), shown, ground).any(axis=1)
         covered &= level + 1 < len(levels)

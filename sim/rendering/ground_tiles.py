@@ -6,13 +6,14 @@ whose error is at most a few pixels. Skirts close the gaps between levels.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Final
 
 import mujoco
 import numpy as np
 
-from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.heightfield import HeightField
+from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 STEPS: Final = (1, 2, 4, 8)
 """Samples of the field for one of a tile, finest level first."""
@@ -38,37 +39,6 @@ class TileMesh:
     """(F, 3) counter-clockwise from above."""
     error_m: float
     """Largest vertical distance from the field."""
-
-
-@dataclass(frozen=True, slots=True)
-class TileView:
-    """A camera."""
-
-    eye_m: Floats
-    """(3,)"""
-    ahead: Floats
-    """(3,) direction of view."""
-    up: Floats
-    """(3,) direction of the picture's upper edge."""
-    half: float
-    """Tangent of half the vertical opening."""
-    size_px: tuple[int, int]
-    """Width and height of the picture."""
-
-    @property
-    def pixel_rad(self) -> float:
-        """Opening of a pixel."""
-        return 2.0 * self.half / self.size_px[1]
-
-    @classmethod
-    def orbit(cls, camera: mujoco.MjvCamera, fovy_deg: float, size_px: tuple[int, int]) -> Self:
-        """Return the view of a camera that orbits a point."""
-        turn, rise = np.radians(camera.azimuth), np.radians(camera.elevation)
-        ahead = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-        side = np.array([np.sin(turn), -np.cos(turn), 0.0])
-        eye = np.array(camera.lookat) - camera.distance * ahead
-        half = float(np.tan(np.radians(0.5 * fovy_deg)))
-        return cls(eye, ahead, np.cross(side, ahead), half, size_px)
 
 
 class GroundTiles:
@@ -113,10 +83,9 @@ class GroundTiles:
                 group=_UNSEEN,
             )
 
-    def choose(self, model: mujoco.MjModel, view: TileView) -> None:
+    def choose(self, model: mujoco.MjModel, view: ViewFrustum) -> None:
         """Show the tiles in view; call it before the scene is updated."""
-        off_m = self._middle_m - view.eye_m
-        away = np.linalg.norm(off_m, axis=1) - self._radius_m
+        away = np.linalg.norm(self._middle_m - view.eye_m, axis=1) - self._radius_m
         pixel_m = np.maximum(away, 0.0) * view.pixel_rad
         fits = self._error_m <= MOST_PIXELS * pixel_m[:, None]
         level = np.where(fits, np.arange(len(STEPS)), 0).max(axis=1)
@@ -124,27 +93,13 @@ class GroundTiles:
             names = [model.geom(name).id for name, _ in self._named()]
             self._geoms = np.array(names).reshape(-1, len(STEPS))
         model.geom_group[self._geoms] = _UNSEEN
-        shown = np.flatnonzero(in_view(off_m, self._radius_m, view))
+        shown = np.flatnonzero(view.touches(self._middle_m, self._radius_m))
         model.geom_group[self._geoms[shown, level[shown]]] = 0
 
     def _named(self) -> Iterator[tuple[str, TileMesh]]:
         for tile, levels in enumerate(self._tiles):
             for level, one in enumerate(levels):
                 yield f"tile{tile}-{level}", one
-
-
-def in_view(off_m: Floats, radius_m: Floats, view: TileView) -> Bools:
-    """(T,) whether spheres, whose middles (T, 3) are relative to the eye, touch a view."""
-    depth = off_m @ view.ahead
-    inside = depth > -radius_m
-    side = np.cross(view.ahead, view.up)
-    for axis, slope in (
-        (view.up, view.half),
-        (side, view.half * view.size_px[0] / view.size_px[1]),
-    ):
-        reach = slope * depth + np.hypot(1.0, slope) * radius_m
-        inside &= np.abs(off_m @ axis) <= reach
-    return np.asarray(inside)
 
 
 def _tile(ground: HeightField, row: int, column: int) -> tuple[TileMesh, ...]:

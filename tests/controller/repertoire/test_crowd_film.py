@@ -18,9 +18,10 @@ from snakewalk.controller.repertoire.detail import (
     MIDDLE,
     NEAR,
     DetailedCrowd,
-    ViewFrustum,
+    detail_levels,
 )
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_no_body_of_which_a_part_is_in_view_is_culled_and_most_others_are() -> N
         depth, across, up = np.moveaxis((points - frustum.eye_m) @ frustum.axes.T, 2, 0)
         seen = (depth > 0.0) & (np.abs(across) <= frustum.half_tan[0] * depth)
         seen = (seen & (np.abs(up) <= frustum.half_tan[1] * depth)).any(axis=1)
-        levels = frustum.levels(centre, np.full(200, 0.4))
+        levels = detail_levels(frustum, centre, np.full(200, 0.4))
         assert (levels[seen] > HIDDEN).all()
         wrong += int((levels[~seen] > HIDDEN).sum())
         hidden += int((~seen).sum())
@@ -61,7 +62,7 @@ def test_no_body_of_which_a_part_is_in_view_is_culled_and_most_others_are() -> N
 def test_levels_fall_with_the_distance() -> None:
     frustum = ViewFrustum.orbit(np.zeros(3), 1.0, 0.0, 0.0, fovy_deg=45.0, size_px=(960, 540))
     ahead = np.array([[d - 1.0, 0.0, 0.0] for d in (1.0, 5.0, 15.0, -3.0)])
-    assert frustum.levels(ahead, np.full(4, 0.5)).tolist() == [NEAR, MIDDLE, FAR, HIDDEN]
+    assert detail_levels(frustum, ahead, np.full(4, 0.5)).tolist() == [NEAR, MIDDLE, FAR, HIDDEN]
 
 
 def test_bodies_lie_on_the_ground_and_near_ones_keep_their_length(

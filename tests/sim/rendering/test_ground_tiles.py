@@ -12,9 +12,8 @@ from snakewalk.sim.rendering.ground_tiles import (
     MOST_PIXELS,
     STEPS,
     GroundTiles,
-    TileView,
-    in_view,
 )
+from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 SIZE_PX = 320, 180
 
@@ -26,13 +25,15 @@ def hills(rows: int = 75, columns: int = 100) -> HeightField:
     return HeightField(z, 0.1, -5.0, -3.7)
 
 
-def view(azimuth_deg: float, elevation_deg: float = -25.0) -> TileView:
+def view(azimuth_deg: float, elevation_deg: float = -25.0) -> ViewFrustum:
     """A camera on the orbit of a point in the field, without MuJoCo's formula."""
     turn, rise = np.radians([azimuth_deg, elevation_deg])
     ahead = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
     up = np.array([-np.sin(rise) * np.cos(turn), -np.sin(rise) * np.sin(turn), np.cos(rise)])
     eye = np.array([0.5, 0.2, 0.1]) - 2.0 * ahead
-    return TileView(eye, ahead, up, float(np.tan(np.radians(0.5 * FOVY_DEG))), SIZE_PX)
+    half = float(np.tan(np.radians(0.5 * FOVY_DEG)))
+    axes = np.array([ahead, np.cross(ahead, up), up])
+    return ViewFrustum(eye, axes, (half * SIZE_PX[0] / SIZE_PX[1], half), SIZE_PX[1])
 
 
 def test_every_level_covers_the_field_and_states_its_error() -> None:
@@ -72,12 +73,15 @@ def test_skirts_reach_below_the_neighbours_of_any_level() -> None:
 def test_every_sample_in_the_picture_is_in_a_tile_that_is_shown(azimuth_deg: float) -> None:
     ground, eye = hills(), view(azimuth_deg)
     tiles = GroundTiles(ground)
-    shown = in_view(tiles._middle_m - eye.eye_m, tiles._radius_m, eye)
+    shown = eye.touches(tiles._middle_m, tiles._radius_m)
     for is_shown, levels in zip(shown, tiles._tiles, strict=True):
         off = levels[0].corners_m - eye.eye_m
-        depth = off @ eye.ahead
-        across = np.abs(off @ np.cross(eye.ahead, eye.up)) / eye.half * SIZE_PX[1] / SIZE_PX[0]
-        inside = (depth > 0.0) & (across < depth) & (np.abs(off @ eye.up) / eye.half < depth)
+        ahead, right, up = eye.axes
+        depth = off @ ahead
+        across, upward = (
+            np.abs(off @ axis) / half for axis, half in zip((right, up), eye.half_tan, strict=True)
+        )
+        inside = (depth > 0.0) & (across < depth) & (upward < depth)
         assert is_shown or not inside.any()
     assert not shown.all()
 
@@ -107,7 +111,9 @@ def test_near_tiles_are_finer_than_far_ones() -> None:
         crowd.draw(CrowdShot(np.array([-3.0, 0.0, 0.1]), 1.0, 0.0, -20.0, [], ""))
         model, tiles = crowd._model, crowd._tiles
         assert tiles is not None
-        eye = TileView.orbit(crowd._camera, FOVY_DEG, SIZE_PX)
+        eye = ViewFrustum.orbit(
+            *(np.array([-3.0, 0.0, 0.1]), 1.0, 0.0, -20.0), fovy_deg=FOVY_DEG, size_px=SIZE_PX
+        )
         rows = np.argwhere(model.geom_group[tiles._geoms] == 0)
         assert {int(level) for _, level in rows} > {0}
         for tile, level in rows:
