@@ -47,21 +47,21 @@ class Backend:
     qpos: Callable[[], Floats] | None
     """The simulator's coordinates, for the film."""
     wire_busy_s: Callable[[], float]
-    """Time that bytes have spent on the wire so far; NaN where nobody counts."""
+    """Time for which bytes have occupied the wire; NaN if unknown."""
     energy: Callable[[], MotorEnergy] = MotorEnergy
-    """Energy that the motors have consumed, and work that they have done so far."""
+    """Energy that the motors have consumed, and their work."""
     twin: Callable[[], Twin] | None = None
-    """Makes a second body, on which motion is tried; None where time does not wait for it."""
+    """Makes a second body, on which motion is tried; None in real time."""
     lay_down: Callable[[InitialPose], None] | None = None
-    """Puts a simulated body elsewhere on its level floor, where its servos hold it; else None."""
+    """Moves a simulated body to another place of its level floor; else None."""
     open_supply: Callable[[], None] | None = None
-    """Opens the supply of all servos; None if some of them are real."""
+    """Opens the supply of all servos; None if some are real."""
     poses: PoseFeed | None = None
-    """Poses that arrive at a rehearsal in simulated time, in place of real datagrams."""
+    """Poses of a rehearsal in simulated time, instead of datagrams."""
 
 
 class RehearsedPort(Protocol):
-    """A port of simulated servos in this process and in simulated time, in place of a real one."""
+    """A port of simulated servos in this process and in simulated time, instead of a real one."""
 
     @property
     def name(self) -> str:
@@ -69,19 +69,18 @@ class RehearsedPort(Protocol):
         ...
 
     def open(self, run: RunConfig, robot: RobotConfig) -> Backend:
-        """Open the port; nothing of the simulation but its bytes and datagrams is known."""
+        """Open the port; only its bytes and datagrams are visible."""
         ...
 
 
 def on_ports(robot: RobotConfig, port: str | None) -> RobotConfig:
     """Return the robot with its segments on the ports that ``--port`` means.
 
-    Args:
-        robot: whose ``[[ports]]`` are meant by ``robot``.
-        port: a device or a URL, ``1-8=PORT,9-16=PORT``, ``robot``; None: the simulator.
+    ``port`` is a device or a URL, ``1-8=PORT,9-16=PORT``, or ``robot`` for the ``[[ports]]`` of the
+    robot; None is the simulator.
 
     Raises:
-        InputError: the robot's file names no ports, or what is named does not fit its servos.
+        InputError: the robot's file has no ports, or they do not fit its servos.
 
     """
     if port is None:
@@ -103,7 +102,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
     """Real servos on ``port``, a device or a URL, or on the robot's ports; nothing measures a pose.
 
     Raises:
-        PortError: a port is not there, is taken, or may not be opened.
+        PortError: a port is missing, held, or not permitted.
 
     """
     if robot.ports:
@@ -123,18 +122,17 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
 
 
 def _fingerprint_file(run: RunConfig) -> FingerprintFile | None:
-    """Fingerprints of the servos, next to the robot's file; None for a shipped robot."""
     path = user_file(run.robot)
     return None if path is None else FingerprintFile(path)
 
 
 def is_split(robot: RobotConfig) -> bool:
-    """Whether some of the robot's servos are simulated, and others real."""
+    """Whether some servos are simulated and others real."""
     return any(each.port == SIMULATED for each in robot.ports)
 
 
 def real_ports(robot: RobotConfig) -> list[str]:
-    """Ports of the robot's segments, without that of simulated servos."""
+    """Ports of the segments with real servos."""
     return [each.port for each in robot.ports if each.port != SIMULATED]
 
 
@@ -163,12 +161,7 @@ def bus_on_ports(
 
 
 def is_pseudo_terminal(ports: Sequence[str] | None) -> bool | None:
-    """Return whether all ports are pseudo-terminals, as those of served simulations are.
-
-    Returns:
-        None without a port.
-
-    """
+    """Return whether all ports are pseudo-terminals of served simulations; None without a port."""
     if not ports:
         return None
     return all(Path(os.path.realpath(port)).parts[:3] == ("/", "dev", "pts") for port in ports)

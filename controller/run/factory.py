@@ -1,4 +1,4 @@
-"""The one factory of runs: from a configuration, or a command's options, to a ``PreparedRun``."""
+"""Factory of runs: from a configuration or a command's options to a ``PreparedRun``."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -40,10 +40,10 @@ from snakewalk.controller.track.readers.load import track_beside
 
 
 def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
-    """Prepare a run from its configuration, for example from that in a log.
+    """Prepare a run from its configuration, such as that of a log.
 
     Raises:
-        InputError: the configuration alone does not hold the run, or has no waypoints to walk to.
+        InputError: the configuration is incomplete, or has no waypoints.
 
     """
     if run.motion == "gait":
@@ -63,12 +63,6 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
 
 
 def _extension(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> PreparedRun:
-    """Prepare a run whose motion is a plug-in: a kind of run, or a motion source.
-
-    Raises:
-        InputError: the motion does not exist.
-
-    """
     kind = find("run", run.motion)
     if kind is not None:
         prepared: PreparedRun = kind.load()(run, robot, world)
@@ -90,7 +84,7 @@ def prepare_walk(
     on_paper: bool = False,
     **changes: object,
 ) -> WalkRun:
-    """Load a walk's run: as ``prepare_job``, which also accepts gaits along waypoints.
+    """Load a walk's run like ``prepare_job``, which also accepts gaits along waypoints.
 
     Raises:
         ConfigError: every fault of a file at once.
@@ -175,7 +169,7 @@ def prepare_job(
 
 
 def _refuse_one_joint(robot: RobotConfig) -> None:
-    """Refuse a body that can only bend to and fro: such a motion leads nowhere.
+    """Reject a body with one yaw joint: such a motion leads nowhere.
 
     Raises:
         InputError: it has one yaw joint.
@@ -198,7 +192,7 @@ def _reject_legs(robot: RobotConfig) -> None:
 
 
 def with_map(run: RunConfig, source: str | None) -> RunConfig:
-    """Let the walk know the ground of its world, or map it as it goes; None: as the run says.
+    """Return a run that knows its ground, or maps it; None leaves the run's setting.
 
     Raises:
         InputError: the source is neither ``world`` nor a plug-in.
@@ -214,7 +208,7 @@ def with_map(run: RunConfig, source: str | None) -> RunConfig:
 
 
 def changed(prepared: PreparedRun, **fields: object) -> PreparedRun:
-    """Return a prepared run with other values of its fields, for example ``run`` or ``world``."""
+    """Return a prepared run with changed fields, for example ``run`` or ``world``."""
     made: PreparedRun = replace(prepared, **fields)  # type: ignore[type-var]
     return made
 
@@ -233,13 +227,13 @@ def prepare_playback(
     topic: str | None = None,
     episode: int | None = None,
 ) -> PlaybackRun:
-    """Prepare to play a recording; ``keys`` as of ``prepare_walk``.
+    """Prepare to play a recording; ``keys`` as in ``prepare_walk``.
 
-    ``joints``, ``unit``, ``topic`` and ``episode`` answer what a file of joint angles does not
-    state, as the keys of ``[playback]`` do.
+    ``joints``, ``unit``, ``topic`` and ``episode`` state facts that a file of joint angles omits,
+    like the keys of ``[playback]``.
 
     Raises:
-        InputError: no such recording, joints that do not bend so far, too fast for them.
+        InputError: the recording does not exist, bends joints too far, or is too fast.
 
     """
     keys = checked_keys(keys, OF_A_RECORDING)
@@ -310,12 +304,12 @@ def prepare_policy(
     seed: int = 0,
     keys: Mapping[str, object] | None = None,
 ) -> SourceRun:
-    """Prepare a learnt policy, shipped or of a file; after ``seconds`` it comes to rest.
+    """Prepare a learnt policy, shipped or from a file; it comes to rest after ``seconds``.
 
-    Robot and world are by default those that it was learnt on.
+    Robot and world are by default those of its training.
 
     Raises:
-        InputError: no such policy, or a robot whose joints it does not know.
+        InputError: the policy does not exist, or does not know the robot's joints.
 
     """
     policy = load_policy(name)
@@ -339,12 +333,12 @@ def prepare_commanded(
     name: str,
     keys: Mapping[str, object] | None = None,
 ) -> CommandedRun:
-    """Prepare a run that another program commands, for ``seconds`` at most.
+    """Prepare a run that another program commands, for at most ``seconds``.
 
-    Pitch joints are set up to carry links, as for gaits; ``keys`` as of ``prepare_walk``.
+    Pitch joints are set up as for gaits; ``keys`` as in ``prepare_walk``.
 
     Raises:
-        InputError: no such robot or world; its cycle does not fit the wire.
+        InputError: robot or world do not exist, or the cycle does not fit the wire.
 
     """
     keys = checked_keys(keys, OF_A_SOURCE)

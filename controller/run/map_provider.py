@@ -1,4 +1,4 @@
-"""The map source of a run: the world's own ground, or a plug-in that maps it on the way."""
+"""Map source of a run: the world's ground, or a plug-in that maps it."""
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -34,10 +34,10 @@ class MapContext:
 
 
 class MapPlugin(Protocol):
-    """A map source, as a plug-in of the kind ``map`` provides it."""
+    """A map source, as a plug-in provides it."""
 
     def faults(self, prepared: PreparedRun, *, on_port: bool) -> list[str]:
-        """Return why the source cannot map in a run, one line per fault."""
+        """Return the faults of the source in a run, one per line."""
         ...
 
     def open(self, context: MapContext) -> AbstractContextManager["MapProvider"]:
@@ -51,10 +51,10 @@ def _source(name: str) -> MapPlugin:
 
 
 def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
-    """Reject a run that maps its ground where it cannot.
+    """Reject a run that cannot map its ground.
 
     Raises:
-        InputError: one line per fault, or an extra that mapping needs is missing.
+        InputError: one line per fault, or a missing extra.
 
     """
     mapping = prepared.run.mapping
@@ -67,17 +67,17 @@ def map_faults(prepared: PreparedRun, *, metal: bool) -> None:
 
 @dataclass
 class MapProvider:
-    """Map of a run's ground in addition to its pose, and its accuracy afterwards."""
+    """Map of a run's ground next to its pose, and its accuracy."""
 
     measure: PoseSource
-    """Measures the pose, and captures pictures when they are due."""
+    """Measures the pose, and captures due pictures."""
     ground_map: "GrowingMap | None" = None
-    """None where the walk knows its ground from the world."""
+    """None if the walk knows its ground from the world."""
     true_ground: HeightField | None = None
     head_m: float = 0.0
     """Way of the head so far, in plan."""
     head_over_unknown_m: float = 0.0
-    """Part of it over ground that was not in the map when the head came there."""
+    """Part of it over ground that was unmapped when the head arrived."""
     _last_m: Floats | None = None
 
     def follow(self, head_m: Floats) -> None:
@@ -90,7 +90,7 @@ class MapProvider:
         self._last_m = np.array(head_m)
 
     def facts(self) -> dict[str, float | int]:
-        """Numbers for the log and for a command's answer; none where nothing was mapped."""
+        """Numbers for log and answer; none without a map."""
         ground_map, ground = self.ground_map, self.true_ground
         if ground_map is None or ground is None or not ground_map.known.any():
             return {}
@@ -110,7 +110,7 @@ class MapProvider:
 def map_provider(
     prepared: PreparedRun, backend: Backend, measure: PoseSource, folder: Path, on_event: OnEvent
 ) -> Iterator[MapProvider]:
-    """Map the ground during the run, where the run asks for it."""
+    """Map the ground during the run if the run requests it."""
     mapping = prepared.run.mapping
     if mapping is None:
         yield MapProvider(measure)

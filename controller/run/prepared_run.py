@@ -1,4 +1,4 @@
-"""Preparation of a run before a servo moves: the interface of every kind of motion."""
+"""Prepared runs: the interface of every kind of motion, before a servo moves."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,7 +28,7 @@ class PreparedRun(Protocol):
 
     @property
     def robot(self) -> RobotConfig:
-        """Robot, with its servos set up as this run needs them."""
+        """Robot with the servo settings of this run."""
         ...
 
     @property
@@ -52,25 +52,25 @@ class PreparedRun(Protocol):
         ...
 
     def initial_pose(self) -> InitialPose:
-        """Return the pose in which a simulated robot is put on the ground."""
+        """Return the initial pose of a simulated robot."""
         ...
 
     def check_plan(self) -> PlanSummary:
         """Check the plan on paper and summarise it for the log.
 
         Raises:
-            InputError: the plan breaks a limit of the robot.
+            InputError: it breaks a limit of the robot.
 
         """
         ...
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
-        """Return a fresh motion; it reports its own decisions to ``on_event``."""
+        """Return a fresh motion that reports its decisions to ``on_event``."""
         ...
 
 
 def pose_with(robot: RobotConfig, heading_rad: float, joint_rad: Floats) -> InitialPose:
-    """Return the pose with joints at angles (J,) whose mean heading is ``heading_rad``."""
+    """Return the pose with joint angles (J,) and the mean heading ``heading_rad``."""
     return InitialPose(heading_rad - mean_heading_rad(robot, joint_rad), joint_rad)
 
 
@@ -95,7 +95,7 @@ class GroundedRun:
 
     @property
     def ground_ahead(self) -> HeightField | None:
-        """The ground as far as the run may know it before it begins: nothing, where it maps it."""
+        """Ground that the run knows before it begins; none if it maps the ground."""
         return None if self.run.mapping is not None else self.ground
 
 

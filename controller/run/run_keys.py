@@ -89,7 +89,7 @@ def with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
 
 
 def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:
-    """Let joints yield, by the run's own table if it has one, or not; None: as the run says."""
+    """Return a run whose joints yield or not; None leaves the run's setting."""
     if on is None:
         return run
     table = (run.compliance or ComplianceConfig()) if on else None

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 
 class _SimulatedBody:
-    """The body of a run in MuJoCo, not yet placed, and the parts that are made from it."""
-
     def __init__(
         self,
         run: RunConfig,
@@ -110,11 +108,11 @@ def split(
 ) -> Backend:
     """Real servos on the robot's ports, the others on a simulated line, in real time.
 
-    The joints of the simulated body that have real servos follow what those measure, so that the
-    others feel their weight and friction; the body's pose is the simulator's.
+    Joints of the simulated body that have real servos follow these, so the others feel their weight
+    and friction. The simulator gives the pose.
 
     Raises:
-        PortError: a port is not there, is taken, or may not be opened.
+        PortError: a port is missing, held, or not permitted.
 
     """
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)

@@ -16,10 +16,10 @@ from snakewalk.controller.run.servo_setup import with_gains
 
 
 def gait_keys(keys: Mapping[str, object] | None) -> dict[str, object]:
-    """Return keys of run, robot and world that a gait's run accepts, angles in rad.
+    """Return keys of run, robot and world for a gait's run, angles in rad.
 
     Raises:
-        InputError: a key is of none of the files, or has an option of its own; one line each.
+        InputError: no file has a key, or an option sets it; one line each.
 
     """
     return checked_keys(keys, OF_A_GAIT)

@@ -28,10 +28,10 @@ class PathRun(GroundedRun):
         return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
 
     def check_waypoint(self, point_m: Floats) -> None:
-        """Refuse a point (2,) off the ground, or in an obstacle; whether a path leads is not asked.
+        """Reject a point (2,) off the ground or in an obstacle; paths are not checked.
 
         Raises:
-            InputError: says what is there.
+            InputError: with the fault.
 
         """
         x_m, y_m = (float(at) for at in point_m)
@@ -46,7 +46,7 @@ class PathRun(GroundedRun):
             raise InputError(f"{where} is in the world's obstacle, the {obstacle.kind}")
 
     def on_map(self, points_m: Floats) -> Bools:
-        """Whether points (..., 2) are on the ground of the world: (...)."""
+        """Whether points (..., 2) are on the world's ground: (...)."""
         ground = self.world.ground
         if isinstance(ground, FlatGround | WaterGround):
             return np.asarray(np.abs(points_m).max(axis=-1) <= 0.5 * ground.size_m)
