@@ -19,6 +19,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from benchmarks.command_facts import markdown
 from benchmarks.provenance import PAGES, provenance, write_tables
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.registry import GAITS
@@ -35,6 +36,10 @@ from snakewalk.sim.plant import ServoDrive
 
 RUN_S = 12.0
 PROFILE_MS = 20
+HEAD = (
+    *("motion", "cost", "by samples", "peak A, read", "true", "lag, ms"),
+    *("100 Hz: cost", "lag", "profile of 20 ms: cost", "lag"),
+)
 TIME_BASED = 0x04
 """Drive Mode(10), bit 2."""
 
@@ -44,11 +49,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="replace the table of the page")
     write = parser.parse_args().write
-    lines = [
-        "| motion | cost | by samples | peak A, read | true | lag, ms | 100 Hz: cost | lag "
-        "| profile of 20 ms: cost | lag |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for name, prepared in jobs():
         with currents() as peak_a:
             held = finish(prepared)
@@ -62,11 +63,11 @@ def main() -> None:
         cells = [name, cost(held), f"{share:.2f}"]
         cells += [f"{held.summary.peak_current_a:.2f}", f"{peak_a[0]:.2f}", lag_ms(held)]
         cells += [cost(often), lag_ms(often), cost(smooth), lag_ms(smooth)]
-        lines.append(f"| {' | '.join(cells)} |")
-        print(lines[-1], flush=True)
+        rows.append(cells)
+        print(*cells, sep=" | ", flush=True)
     if write:
-        table = "\n".join([*lines, "", provenance("python -m benchmarks.energy --write")])
-        write_tables(PAGES / "gait-energy.md", "energy", table)
+        source = provenance("python -m benchmarks.energy --write")
+        write_tables(PAGES / "gait-energy.md", "energy", f"{markdown(HEAD, rows)}\n\n{source}")
 
 
 def jobs() -> Iterator[tuple[str, PreparedRun]]:

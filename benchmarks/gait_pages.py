@@ -6,11 +6,9 @@ deterministic, so n = 1.
 """
 
 import argparse
-import json
 import math
-import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -18,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import j0
 
+from benchmarks.command_facts import markdown, snakewalk
 from benchmarks.provenance import PAGES, provenance, write_tables
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.run.kinds.gait_factory import gait_by_name
@@ -44,30 +43,25 @@ NO_COST_BELOW: Final = 0.05
 
 
 def measured(name: str, seconds: float) -> Facts:
-    """Return the facts that ``snakewalk gait run`` prints as JSON.
+    """Return the facts that ``snakewalk gait run`` prints.
 
     Raises:
-        subprocess.CalledProcessError: the command failed.
+        SystemExit: the command failed.
 
     """
     with TemporaryDirectory() as folder:
-        program = "from snakewalk.controller.cli.main import main; main()"
-        options = ("--no-film", "--json", "--quiet", "--out", str(Path(folder) / "run"))
-        words = ("gait", "run", name, "--seconds", f"{seconds:g}", *options)
-        done = subprocess.run(
-            [sys.executable, "-c", program, *words], stdout=subprocess.PIPE, check=True
-        )
-    facts: Facts = json.loads(done.stdout)
+        options = ("--no-film", "--quiet", "--out", str(Path(folder) / "run"))
+        facts: Facts = snakewalk("gait", "run", name, "--seconds", f"{seconds:g}", *options)
     return facts
 
 
 def motion_table(rows: Mapping[str, Facts]) -> str:
     """Motion and cost of the gaits on land."""
-    lines = [
-        "| gait | joints | robot, world | Hz | forward, body lengths | to the left | turn, rad "
-        "| m/s | cost | mechanical |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    head = (
+        *("gait", "joints", "robot, world", "Hz", "forward, body lengths", "to the left"),
+        *("turn, rad", "m/s", "cost", "mechanical"),
+    )
+    lines = []
     for name, facts in rows.items():
         ahead, left = facts["forward_body_lengths_cycle"], facts["left_body_lengths_cycle"]
         moves = np.hypot(ahead, left) >= NO_COST_BELOW or abs(facts["turn_rad_cycle"]) < 1.0
@@ -79,8 +73,8 @@ def motion_table(rows: Mapping[str, Facts]) -> str:
             f"{facts['speed_m_s']:.3f}",
             *(f"{facts[key]:.2f}" if moves else "" for key in costs),
         ]
-        lines.append(_row(cells))
-    return "\n".join(lines)
+        lines.append(cells)
+    return markdown(head, lines)
 
 
 def slip_table(rows: Mapping[str, Facts]) -> str:
@@ -101,19 +95,20 @@ def slip_table(rows: Mapping[str, Facts]) -> str:
             2.0 * np.pi * radius_m / length_m,
         ),
     }
-    lines = ["| gait | body lengths a cycle | without slip | share |", "|---|---|---|---|"]
+    lines = []
     for text, (facts, done, most) in without.items():
         where = f"{text}, {facts['robot']} on `{facts['world']}`"
-        lines.append(_row([where, f"{done:.3f}", f"{most:.3f}", f"{done / most:.2f}"]))
-    return "\n".join(lines)
+        lines.append([where, f"{done:.3f}", f"{most:.3f}", f"{done / most:.2f}"])
+    return markdown(("gait", "body lengths a cycle", "without slip", "share"), lines)
 
 
 def swimming_table(rows: Mapping[str, Facts]) -> str:
     """Motion of the swimming gaits and their largest current."""
-    lines = [
-        "| mode | Omega, alpha, omega | robot | at | body lengths a cycle | m/s | peak current |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    head = (
+        *("mode", "Omega, alpha, omega", "robot", "at", "body lengths a cycle"),
+        *("m/s", "peak current"),
+    )
+    lines = []
     for name, facts in rows.items():
         given = _parameters(name)
         ends = [f"{given[key]:g}" for key in ("nose", "tail")]
@@ -126,17 +121,17 @@ def swimming_table(rows: Mapping[str, Facts]) -> str:
             f"{facts['speed_m_s']:.2f}",
             f"{facts['peak_current_a']:.2f} A",
         ]
-        lines.append(_row(cells))
-    return "\n".join(lines)
+        lines.append(cells)
+    return markdown(head, lines)
 
 
 def climbing_table(rows: Mapping[str, Facts]) -> str:
     """Climb in a cycle, and that of a body that rolls without slip (``gaits/helix.py``)."""
-    lines = [
-        "| gait | up, m a cycle | rolling without slip | turn about the axis, rad a cycle "
-        "| without slip | slowed to | peak current |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    head = (
+        *("gait", "up, m a cycle", "rolling without slip", "turn about the axis, rad a cycle"),
+        *("without slip", "slowed to", "peak current"),
+    )
+    lines = []
     for name, facts in rows.items():
         given = _parameters(name)
         around_m, rise_rad = 2.0 * math.pi * given["body_radius_m"], given["rise_rad"]
@@ -149,18 +144,14 @@ def climbing_table(rows: Mapping[str, Facts]) -> str:
             *(f"`{name}`", f"{up_m:.3f}", f"{around_m * math.cos(rise_rad):.3f}", *turns),
             *(f"{facts['slowed_to']:.0%}", f"{facts['peak_current_a']:.2f} A"),
         ]
-        lines.append(_row(cells))
-    return "\n".join(lines)
+        lines.append(cells)
+    return markdown(head, lines)
 
 
 def _parameters(name: str) -> dict[str, Any]:
     """Parameters of a gait by default."""
     given: dict[str, Any] = gait_by_name(name, None)[0].params.model_dump()
     return given
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
 
 
 def _all(names: Iterable[str], seconds: float) -> dict[str, Facts]:

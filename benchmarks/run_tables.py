@@ -8,9 +8,6 @@ one on its page. ``recordings`` needs ``--data DIR`` with the published recordin
 """
 
 import argparse
-import json
-import subprocess
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.command_facts import markdown, snakewalk
 from benchmarks.provenance import PAGES, provenance, write_tables
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.mechanics.traction import quasi_static_gain
@@ -28,7 +26,6 @@ from snakewalk.controller.run.factory import prepare_walk
 Facts = Mapping[str, Any]
 """An object of a command's JSON."""
 
-PROGRAM: Final = "from snakewalk.controller.cli.main import main; main()"
 RUNS: Final = ("flat-slalom", "jacksboro-traverse")
 FIRST_SEED: Final = 1000
 GAIN_EVERY: Final = 10
@@ -329,29 +326,6 @@ def policy_table(found: Facts, world: str) -> str:
             ]
         )
     return markdown((*head, f"seeds faster than `{TUNED}`", "trips"), cells)
-
-
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table as Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def snakewalk(*words: str) -> Any:
-    """Run a command as a user does; its JSON.
-
-    Raises:
-        SystemExit: the command printed no JSON.
-
-    """
-    run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *words, "--json"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    try:
-        return json.loads(run.stdout)
-    except json.JSONDecodeError:
-        raise SystemExit(f"snakewalk {' '.join(words)}: {run.stderr.strip()}") from None
 
 
 def _number(value: float | None, form: str) -> str:

@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bus_faults import Bench
+from benchmarks.command_facts import PROGRAM
 from benchmarks.provenance import PAGES, provenance, write_tables
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
@@ -171,7 +172,7 @@ def served(folder: Path) -> Iterator[tuple[str, int]]:
     """Serve simulated servos by another process; its device and process ID."""
     (folder / "noise.toml").write_text(NOISE, encoding="utf-8")
     command = [
-        *(sys.executable, "-u", "-c", "from snakewalk.controller.cli.main import main; main()"),
+        *(sys.executable, "-u", "-c", PROGRAM),
         *("bus", "serve", "--servos", f"1-{JOINTS}", "--faults", str(folder / "noise.toml")),
     ]
     with subprocess.Popen(

@@ -4,13 +4,13 @@ import resource
 import subprocess
 import sys
 
+from benchmarks.command_facts import PROGRAM
 from benchmarks.rows import Row
 from snakewalk.controller.console.plugins import builtin_plugins
 
 TITLE = "start of the program"
 TRIES = 5
 TYPER = ("-c", "import typer, rich")
-PROGRAM = "from snakewalk.controller.cli.main import main; main()"
 REFERENCE = "import typer, rich"
 
 
