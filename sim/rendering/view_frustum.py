@@ -1,4 +1,4 @@
-"""What a camera without roll sees."""
+"""View of a camera without roll: its axes, and the bodies in it."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Bools, Floats
 
 @dataclass(frozen=True, slots=True)
 class ViewFrustum:
-    """View of a camera without roll."""
+    """Eye, axes and opening of a camera."""
 
     eye_m: Floats
     """(3,)"""
