@@ -35,6 +35,7 @@ MODULES = tuple(
         "support",
         "gym_steps",
         "startup",
+        "run_path",
         "replanning",
         "busy_calibrations",
         "light_install",

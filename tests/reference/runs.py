@@ -1,19 +1,25 @@
-"""Joint commands and wire bytes of ten runs, as hashes."""
+"""Joint commands and wire bytes of thirteen runs, as hashes."""
 
 import hashlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import snakewalk
+from snakewalk.config.camera import MappingConfig
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.playback import ScheduleConfig
+from snakewalk.config.pose import TrackerConfig
+from snakewalk.controller.rehearsal.rehearsal import LATE_S, errors_of, generator, moved
+from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
-from snakewalk.controller.run.factory import prepare_job, prepare_playback
+from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
+from snakewalk.controller.run.factory import changed, prepare_job, prepare_playback
+from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.sim.line import wire
 
 Hashes = dict[str, str | int]
@@ -62,11 +68,50 @@ def _repertoire(folder: Path) -> Any:
     return prepare_schedule(file, ScheduleConfig(speed_m_s=0.5, duration_s=4.0))
 
 
-def runs(folder: Path) -> dict[str, Callable[[], Any]]:
-    """Return what prepares each run, by name; the repertoire is recorded in ``folder``."""
+@dataclass(frozen=True, slots=True)
+class ReferenceRun:
+    """A run whose commands and bytes are compared."""
+
+    prepare: Callable[[], Any]
+    shadow: bool = False
+    is_rehearsed: bool = False
+    """Whether a simulated robot is served on its port, with errors and a tracker."""
+
+    def record(self, folder: Path) -> tuple[RunRecord, list[WireHash]]:
+        """Run it; return its log and the bytes of its lines, without those of its preparation."""
+        prepared = self.prepare()
+        with ExitStack() as stack:
+            lines = stack.enter_context(hashed_wires())
+            port = stack.enter_context(_served(prepared, folder)) if self.is_rehearsed else None
+            done = snakewalk.execute(prepared, folder, port, shadow=self.shadow, stoppable=False)
+        return done.record, lines
+
+
+@contextmanager
+def _served(prepared: Any, folder: Path) -> Iterator[SimulatedPort]:
+    rng = generator(1)
+    place = moved(place_of(prepared), rng)
+    tracker = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
+    serving = Serving(tracker, errors_of(prepared.robot, rng), LATE_S, 1)
+    truth = folder.parent / f"{folder.name}.jsonl"
+    with ServedRobot(prepared.robot, prepared.world, place, serving, truth) as served:
+        yield SimulatedPort(served)
+
+
+def _mapped() -> Any:
+    prepared = prepare_job(
+        "random-10", robot="alternating16-stereo", motion="serpenoid", seed=1, time_limit_s=2.5
+    )
+    often = MappingConfig(replan_bodies=0.3)
+    return changed(prepared, run=prepared.run.model_copy(update={"mapping": often}))
+
+
+def runs(folder: Path) -> dict[str, ReferenceRun]:
+    """Return the runs by name; the repertoire is recorded in ``folder``."""
     job, gait = prepare_job, snakewalk.prepare_gait
     camera = partial(job, "flat-square", pose="camera", motion="serpenoid")
-    return {
+    tracked = partial(job, "flat-square", pose="udp:9870")
+    plain = {
         "flat-walk": lambda: _limited(partial(job, "flat-square"), 8.0),
         "traverse": lambda: _limited(partial(job, "jacksboro-traverse"), 8.0),
         "ramp": lambda: _limited(partial(job, "ramp-10-up"), 6.0),
@@ -77,14 +122,18 @@ def runs(folder: Path) -> dict[str, Callable[[], Any]]:
         "camera": lambda: _limited(camera, 5.0),
         "swimming": lambda: gait("subcarangiform", seconds=4.0),
         "salamander": lambda: _limited(partial(job, "salamander-square"), 6.0),
+        "map": _mapped,
+    }
+    return {name: ReferenceRun(prepare) for name, prepare in plain.items()} | {
+        "rehearsal": ReferenceRun(lambda: _limited(tracked, 5.0), is_rehearsed=True),
+        "shadow": ReferenceRun(lambda: gait("lateral-undulation", seconds=3.0), shadow=True),
     }
 
 
-def hashes_of(prepare: Callable[[], Any], folder: Path) -> Hashes:
+def hashes_of(run: ReferenceRun, folder: Path) -> Hashes:
     """Run one of them; hashes of its joint commands and wire bytes, and their counts."""
-    prepared = prepare()  # the recording of a repertoire has lines of its own
-    with hashed_wires() as lines:
-        sent_rad = snakewalk.execute(prepared, folder, stoppable=False).record.cycle.sent_rad
+    record, lines = run.record(folder)
+    sent_rad = record.cycle.sent_rad
     return {
         "cycles": len(sent_rad),
         "goals": hashlib.sha256(sent_rad.tobytes()).hexdigest()[:16],

@@ -1,0 +1,139 @@
+"""A run checks everything before it opens anything, and switches torque on last."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.pose import TrackerConfig
+from snakewalk.controller.console.result_files import RUN_FILES
+from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
+from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
+from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.runtime.drive import Progress
+from snakewalk.drivers.safety.stop_button import StopButton
+from tests.helpers.calls import calls_of
+
+ORDER = (
+    "refuse_another_run",
+    "pose_faults",
+    "map_faults",
+    "check_compliance",
+    "RunShadow.check",
+    "WalkRun.check_plan",
+    "SimulatedPort.open",
+    "Logger.warning",  # the pose is not measured
+    "clear_run",
+    "StopButton.__init__",
+    "RunLog.__init__",
+    "Observer.on_button",
+    "RunLog.config",
+    "pose_provider",
+    "map_provider",
+    "WalkRun.make_source",
+    "second_body",
+    "SafeLink.__init__",
+    "RunShadow.__init__",
+    "SafeLink.enable",
+    "RunShadow.begin",
+    "SafeLink.write",
+    "SafeLink.disable",
+    "StopButton.report_end",
+    "RunShadow.end",
+    "StopButton.end",
+    "end map_provider",
+    "end pose_provider",
+    "RunLog.__exit__",
+    "read_log",
+    "write_summary",
+)
+
+
+class Observer:
+    """An observer whose E-STOP is lost at a time that a test chooses."""
+
+    def __init__(self) -> None:
+        self.reason: str | None = None
+        self.rows = 0
+
+    def lost(self, now_s: float) -> str | None:
+        return self.reason
+
+    def rejected(self) -> list[str]:
+        return []
+
+    def on_row(self, topic: str, row: bytes) -> None:
+        self.rows += 1
+
+    def on_button(self, path: Path) -> None:
+        assert path.exists()
+
+    def on_picture(self, image: np.ndarray, time_s: float) -> None: ...
+
+
+@contextmanager
+def served(prepared: Any, folder: Path) -> Iterator[SimulatedPort]:
+    serving = Serving(TrackerConfig())
+    truth = folder / "truth.jsonl"
+    with ServedRobot(prepared.robot, prepared.world, place_of(prepared), serving, truth) as robot:
+        yield SimulatedPort(robot)
+
+
+def test_a_run_keeps_the_order_of_its_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    prepared = prepare_job("flat-square", pose="joints", time_limit_s=0.2)
+    with served(prepared, tmp_path) as port, calls_of(ORDER) as calls:
+        observer = Observer()
+        execute(prepared, tmp_path / "run", port, view=observer, shadow=True)
+    assert calls == list(ORDER)
+    assert observer.rows > 0
+
+
+def test_a_port_that_fails_leaves_the_files_of_the_folder(tmp_path: Path) -> None:
+    for name in RUN_FILES:
+        (tmp_path / name).write_text("of an earlier run")
+    prepared = prepare_gait("lateral-undulation", seconds=0.2)
+    with pytest.raises(InputError, match="/dev/nosuch"):
+        execute(prepared, tmp_path, "/dev/nosuch", force=True)
+    assert all((tmp_path / name).read_text() == "of an earlier run" for name in RUN_FILES)
+
+
+@pytest.mark.parametrize("source", ["operator", "button", "observer"])
+def test_a_stop_is_asked_of_operator_button_and_observers_in_this_order(
+    source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of them stop from the same cycle on; those before ``source`` do not."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    order = ("operator", "button", "observer")
+    stopping = order[order.index(source) :]
+    observer = Observer()
+    is_due = False
+
+    def on_progress(progress: Progress) -> None:
+        nonlocal is_due
+        is_due = True
+        observer.reason = "the observer" if "observer" in stopping else None
+
+    def reason(name: str) -> str | None:
+        return f"the {name}" if is_due and name in stopping else None
+
+    monkeypatch.setattr(StopButton, "pressed", lambda button: reason("button"))
+    prepared = prepare_gait("lateral-undulation", seconds=0.2)
+    finished = execute(
+        prepared,
+        tmp_path / "run",
+        view=observer,
+        stop_requested=lambda: reason("operator"),
+        on_progress=on_progress,
+    )
+    assert (finished.outcome.tripped or "").startswith(f"the {source}")
