@@ -4,6 +4,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from importlib.metadata import version
 from itertools import pairwise
 from typing import Annotated, Any, Final
@@ -76,6 +77,24 @@ class CommandGroup(TyperGroup):
             _stub(cmd_name, entries[0]) if self._is_listing else _full_command(cmd_name, entries[0])
         )
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that the first word names; an unknown word gets a suggestion."""
+        try:
+            return super().resolve_command(ctx, args)
+        except Exception as error:
+            if hasattr(error, "message"):  # an error of typer's or click's
+                error.message = error.message.rstrip(".") + self._suggestion(ctx, args[0])
+            raise
+
+    def _suggestion(self, ctx: Any, word: str) -> str:
+        """Return the commands of a similar name: those below this prefix, else any other."""
+        near = get_close_matches(word, self.list_commands(ctx), 2, 0.7)
+        meant = [f"{self.prefix} {each}".strip() for each in near]
+        if not meant:
+            names = {each.name.split()[-1]: each.name for each in reversed(_listed(""))}
+            meant = [names[each] for each in get_close_matches(word, names, 1, 0.8)]
+        return f"; did you mean {' or '.join(meant)}?" if meant else ""
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the list of commands from their manifests."""
         with self._listing():
@@ -143,6 +162,9 @@ def _print_fault(error: Any) -> None:
     context = getattr(error, "ctx", None)
     path = "snakewalk" if context is None else context.command_path
     text = " ".join(error.format_message().split())
+    if getattr(error, "possibilities", None):  # of an unknown option
+        near = get_close_matches(error.option_name, error.possibilities, 1)
+        text = f"{error.message}; did you mean {near[0]}?" if near else error.message
     text = re.sub(r"^Invalid value for '([^']+)'(?: / '[^']+')*: ", r"\1: ", text)
     text = re.sub(r": (?:dir|file) ('.*' is a (?:file|directory))\.$", r": \1", text)
     text = re.sub(r"^Missing (?:option|argument) '([^']+)'.*\.$", r"\1: is required", text)

