@@ -1,0 +1,1 @@
+"""Bench of films of real animals: what ``snakewalk capture`` makes of them, beside the truth."""

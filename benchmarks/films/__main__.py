@@ -1,0 +1,115 @@
+"""``python -m benchmarks.films FOLDER [--rendered] [--only WORD]``: capture all films of a folder.
+
+A TOML file beside a film, or in this package, states source, licence and truth
+(``described_film.py``). Prints a Markdown table: frames used, good, above twice the expected error,
+exchanges, distances of marked heads and tails, CPU time.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.films.described_film import films_of
+from benchmarks.films.judged_film import JudgedFilm, judge
+from benchmarks.films.rendered import write_rendered
+
+HEADS = (
+    "film", "used", "good", "good above twice", "error px (expected)", "head right", "exchanges",
+    "eyes off px", "tail off px", "wrong length", "head by", "CPU s / MP", "exit",
+)  # fmt: skip
+
+
+def main() -> int:
+    """Run the films, print a row for each as it is done, and the totals."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.films", description=(__doc__ or "").splitlines()[0]
+    )
+    parser.add_argument("folder", type=Path, nargs="?", help="folder of films")
+    parser.add_argument("--rendered", action="store_true", help="also run rendered films")
+    parser.add_argument("--only", default="", metavar="WORD", help="only films with this word")
+    given = parser.parse_args()
+    if given.folder is None and not given.rendered:
+        parser.error("give a FOLDER of films, or --rendered")
+    if given.folder is not None and not given.folder.is_dir():
+        parser.error(f"{given.folder}: is no folder; give a folder of films")
+    print("| " + " | ".join(HEADS) + " |")
+    print("| --- |" + " --- |" * (len(HEADS) - 1))
+    done = []
+    with tempfile.TemporaryDirectory() as scratch:
+        folders = [] if given.folder is None else [given.folder.resolve()]
+        if given.rendered:
+            folders.append(Path(scratch, "rendered"))
+            write_rendered(folders[-1])
+        for film in (one for folder in folders for one in films_of(folder)):
+            if given.only in str(film.path):
+                done.append(judge(film, Path(scratch)))
+                print(row_of(done[-1]), flush=True)
+    print(summary(done))
+    return 0
+
+
+def row_of(one: JudgedFilm) -> str:
+    """One film as a line of the table."""
+    known = bool(one.true_px)
+    error = f"{np.median(one.true_px):.2f} ({np.median(one.expected_px):.2f})" if known else "-"
+    heads = f"{sum(one.heads)} of {len(one.heads)}" if known else "-"
+    cells = (
+        one.name,
+        f"{one.used} of {one.frames}",
+        str(one.good),
+        f"{one.above_twice} of {sum(one.are_good)}" if known else "-",
+        error,
+        heads,
+        str(one.exchanges) if known else "-",
+        _distances(one.head_px),
+        _distances(one.tail_px),
+        str(one.wrong_length),
+        f"{one.head_by} {one.head_sure:.2f}",
+        f"{one.cpu_s_per_megapixel:.2f}",
+        str(one.exit_code),
+    )
+    return "| " + " | ".join(cells) + " |"
+
+
+def _distances(px: list[float]) -> str:
+    """Median and largest distance over all marks; a mark without a line counts as infinite."""
+    if not px:
+        return "-"
+    every = np.nan_to_num(px, nan=np.inf)
+    return f"{np.median(every):.1f} (most {every.max():.1f})"
+
+
+def summary(done: list[JudgedFilm]) -> str:
+    """The calibration of the expected error and of the head's certainty over all films."""
+    good = [
+        (true, expected)
+        for one in done
+        for true, expected, is_good in zip(one.true_px, one.expected_px, one.are_good, strict=True)
+        if is_good
+    ]
+    lines = []
+    if good:
+        true, expected = np.array(good).T
+        above = int((true > 2.0 * expected).sum())
+        ratio = float(np.median(expected) / np.median(true))
+        lines.append(
+            f"\n{above} of {len(good)} good frames with truth ({above / len(good):.1%}) are above "
+            f"twice their expected error; median expected over median true error {ratio:.2f}."
+        )
+    judged = [(one.head_sure, all(one.heads)) for one in done if one.heads]
+    if judged:
+        for low, high in ((0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)):
+            here = [right for sure, right in judged if low <= sure < high]
+            if here:
+                lines.append(
+                    f"Head sure by {low:g} to {min(high, 1.0):g}: right in {sum(here)} of "
+                    f"{len(here)} films."
+                )
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
