@@ -50,7 +50,7 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
     header, pose, cycle = record.header, record.pose, record.cycle
     settings: dict[str, Any] = {"bus": header.backend, "software": header.software}
     for table, config in (("run", header.run), ("robot", header.robot), ("world", header.world)):
-        settings |= _flat(config.model_dump(mode="json"), table)
+        settings |= flat(config.model_dump(mode="json"), table)
     off_rad = tracking_error_rad(cycle)
     known = np.isfinite(off_rad)
     count = np.maximum(known.sum(axis=1), 1)
@@ -90,9 +90,15 @@ def differing(runs: Sequence[ComparedRun]) -> dict[str, list[Any]]:
     return {key: row for key, row in values.items() if any(one != row[0] for one in row)}
 
 
-def _flat(table: Mapping[str, Any], name: str) -> dict[str, Any]:
+def flat(table: Mapping[Any, Any], name: str = "") -> dict[str, Any]:
+    """Values of a table and of the tables in it by dotted key; rows are numbered from 0."""
     found: dict[str, Any] = {}
     for key, value in table.items():
-        where = f"{name}.{key}"
-        found |= _flat(value, where) if isinstance(value, Mapping) else {where: value}
+        where = f"{name}.{key}".removeprefix(".")
+        if isinstance(value, Mapping):
+            found |= flat(value, where)
+        elif isinstance(value, list) and any(isinstance(row, Mapping) for row in value):
+            found |= flat(dict(enumerate(value)), where)
+        else:
+            found[where] = value
     return found

@@ -85,6 +85,10 @@ def rehearse_runs(
         print(json.dumps({"rehearsals": rows, "file": str(out)}))
     else:
         console.print(_table(rows))
+        for row in rows:
+            if not row.get("has_arrived", False):
+                why = row.get("error") or row["outcome"]
+                console.print(f"{row['run']}, seed {row['seed']}: {why}")
     if not all(row.get("has_arrived", False) for row in rows):
         raise SystemExit(1)
 
@@ -97,8 +101,8 @@ def _rehearsal(row: dict[str, Any]) -> dict[str, Any]:
 def _table(rows: Sequence[dict[str, Any]]) -> Table:
     table = Table(box=None)
     heads = ("run", "truly there", "false claims", "path m", "pose m", "pose deg", *_METRICS)
-    for head in (*heads, "false alarms", "why not"):
-        table.add_column(head, justify="left" if head in {"run", "why not"} else "right")
+    for head in (*heads, "false alarms"):
+        table.add_column(head, justify="left" if head == "run" else "right")
     for run in dict.fromkeys(row["run"] for row in rows):
         table.add_row(*_cells(run, [row for row in rows if row["run"] == run]))
     return table
@@ -121,11 +125,6 @@ def _cells(run: str, rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
         values = [row[key] for row in judged if row[key] is not None]
         return f"{fmean(values):.{digits}f}" if values else ""
 
-    why = [
-        row.get("error") or f"seed {row['seed']}: {row['outcome']}"
-        for row in rows
-        if not row.get("has_arrived", False)
-    ]
     return (
         run,
         f"{sum(row['has_arrived'] for row in judged)} of {len(rows)}",
@@ -134,5 +133,4 @@ def _cells(run: str, rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
         mean("pose_error_rms_m", 3),
         mean("heading_error_rms_deg", 1),
         *_worst_errors([row["metrics"] for row in judged if row.get("metrics")]),
-        "; ".join(why),
     )

@@ -14,7 +14,7 @@ from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.commands.pictures import pictures
-from snakewalk.controller.studies.run_comparison import compared_run, differing, log_names
+from snakewalk.controller.studies.run_comparison import compared_run, differing, flat, log_names
 
 if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
@@ -76,10 +76,11 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
     numbers = Table(
         "number", *_columns(runs), box=None, title="What came of it", title_justify="left"
     )
-    for key in runs[0].summary.to_dict():
-        values = [run.summary.to_dict()[key] for run in runs]
-        told = any(value not in (None, "") for value in values)
-        if told and not isinstance(values[0], dict) and key not in {"config_hash", "software"}:
+    summaries = [flat(run.summary.to_dict()) for run in runs]
+    for key in dict.fromkeys(key for each in summaries for key in each):
+        values = [each.get(key) for each in summaries]
+        is_known = any(value not in (None, "") for value in values)
+        if is_known and key not in {"config_hash", "software"}:
             numbers.add_row(key.replace("_", " "), *map(_text, values))
     console.print(numbers)
 

@@ -12,7 +12,12 @@ from typer.testing import CliRunner
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console import options
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.studies.run_comparison import compared_run, differing, log_names
+from snakewalk.controller.studies.run_comparison import (
+    compared_run,
+    differing,
+    flat,
+    log_names,
+)
 
 pytestmark = pytest.mark.usefixtures("legible_figures")
 
@@ -39,6 +44,16 @@ def test_what_differs_is_told_by_its_key(record: RunRecord) -> None:
     assert differing(runs[::2]) == {}
 
 
+def test_values_of_joints_and_tables_have_keys_of_their_own() -> None:
+    values = {"servo": {"gain": 800}, "joints": [{"id": 3, "zero": [0, 1]}], "axes": ["y"]}
+    assert flat(values, "robot") == {
+        "robot.servo.gain": 800,
+        "robot.joints.0.id": 3,
+        "robot.joints.0.zero": [0, 1],
+        "robot.axes": ["y"],
+    }
+
+
 def test_the_curves_are_the_logs(record: RunRecord) -> None:
     run, cycle = compared_run(record, "a"), record.cycle
     row = int(np.flatnonzero(cycle.valid.all(axis=1))[50])
@@ -61,6 +76,7 @@ def test_the_command_compares_and_draws(make: Make, tmp_path: Path) -> None:
     assert [s["duration_s"] > 10.0 for s in told["summaries"]] == [False, True]
     assert picture.read_bytes().startswith(b"\x89PNG")
     table = CliRunner().invoke(app, ["compare", *logs]).stdout
+    assert "{" not in table
     assert "run.seed" in table
     assert "path error mean m" in table
 
