@@ -1,11 +1,16 @@
-# make run   set everything up and do the main job on the embedded defaults
-# make test  set everything up and pass lint, types and tests
+# make run      set everything up and do the main job on the embedded defaults
+# make test     set everything up and pass lint, types and the fast tests
+# make quick    the fast tests that the changed files concern, in less than a minute
+# make slow     further cases of the expensive tests; CI runs them
+# make nightly  everything that is too long for CI
 PY ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 
-.PHONY: setup lock loops fallbacks run test lint types unit docs bench campaign lerobot warp failures clean
+PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
+
+.PHONY: setup lock loops fallbacks run test lint types unit quick slow nightly docs bench campaign lerobot warp failures clean
 
 setup: $(STAMP)
 
@@ -41,7 +46,20 @@ types: setup
 # Each process takes whole files in their order, so that a file's fixtures are made once. Byte code is kept,
 # also where the environment says that it is not: forty tests start a program of their own.
 unit: loops
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
+	$(PYTEST) --most-expensive 30
+
+quick: setup
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.tiers
+
+slow: loops
+	$(PYTEST) -m slow --most-expensive 30
+
+# Each of them, with the reason that keeps it out of CI, is in docs/how-to/test-a-change.md.
+nightly: loops
+	$(PYTEST) -m nightly --most-expensive 30
+	$(BIN)/python -m tests.campaign
+	$(BIN)/python -m tests.mutation
+	$(BIN)/python -m benchmarks
 
 # make docs      the site, in build/docs; a link that leads nowhere inside it, or any other warning, is an error
 docs: setup

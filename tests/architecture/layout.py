@@ -49,3 +49,10 @@ VOCABULARY: Final = frozenset(
 """Modules of the drivers that every core package may import."""
 JOINING: Final = frozenset({"run", *FEATURES})
 """Packages of the controller that may import the bus and the simulator."""
+
+
+def package_of(module: str) -> str:
+    """Return the package of a module (dotted, without ``snakewalk``)."""
+    parts = module.split(".")
+    name = ".".join(parts[:2])
+    return name if name in ORDER[parts[0]] else parts[0]

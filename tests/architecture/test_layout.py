@@ -1,14 +1,11 @@
 """Imports follow the order of ``tests/architecture/layout.py``, and no files form a cycle."""
 
-import ast
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
+from collections.abc import Iterable
 
 import networkx as nx
 import pytest
 
+from tests.architecture.imports import module_imports, read_source, sources
 from tests.architecture.layout import (
     BETWEEN_FEATURES,
     CORE,
@@ -18,66 +15,10 @@ from tests.architecture.layout import (
     ORDER,
     TOPS,
     VOCABULARY,
+    package_of,
 )
 
-ROOT = Path(__file__).resolve().parents[2]
 SAFETY_MUST_NOT_KNOW = ("drivers.bus", "dynamixel_sdk")
-
-
-def package_of(module: str) -> str:
-    """Return the package of a module (dotted, without ``snakewalk``)."""
-    parts = module.split(".")
-    name = ".".join(parts[:2])
-    return name if name in ORDER[parts[0]] else parts[0]
-
-
-@dataclass(frozen=True)
-class Source:
-    """What a file says, of what these tests ask; its syntax tree would be kept by the thousand."""
-
-    imported: set[str]
-    """Modules and names of ours, and of tests, that it imports, without ``snakewalk``."""
-    defined: list[tuple[str, int]]
-    """Classes, functions, parameters and attributes, with their lines."""
-    classes: list[str]
-    """On the file's top level."""
-
-
-def read_source(text: str) -> Source:
-    names: set[str] = set()
-    defined: list[tuple[str, int]] = []
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
-        match node:
-            case ast.Import():
-                names |= {alias.name for alias in node.names}
-            case ast.ImportFrom():
-                assert node.level == 0, "imports are absolute"
-                names |= {f"{node.module}.{alias.name}" for alias in node.names}
-            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
-                defined.append((name, node.lineno))
-            case ast.Attribute(attr=name, ctx=ast.Store()):
-                defined.append((name, node.lineno))
-            case ast.AnnAssign(target=ast.Name(id=name)):
-                defined.append((name, node.lineno))
-    bare = {name for name in names if name.split(".")[0] in TOPS}
-    assert not bare, f"top folders are imported as snakewalk.*: {bare}"
-    ours = {name.removeprefix("snakewalk.") for name in names if name.startswith("snakewalk.")}
-    others = {name for name in names if name.split(".")[0] in {"tests", "dynamixel_sdk"}}
-    classes = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
-    return Source(ours | others, defined, classes)
-
-
-@cache
-def sources() -> Mapping[str, Source]:
-    """Every module of the packages (dotted, without ``snakewalk``), read once for all tests."""
-    return {
-        ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): (
-            read_source(file.read_text(encoding="utf-8"))
-        )
-        for top in TOPS
-        for file in sorted((ROOT / top).rglob("*.py"))
-    }
 
 
 def is_upward(module: str, name: str) -> bool:
@@ -118,22 +59,6 @@ def forbidden(module: str, names: Iterable[str]) -> set[str]:
     return wrong
 
 
-def module_of(name: str, known: Iterable[str]) -> str | None:
-    """Return the module that an imported name lives in."""
-    return name if name in known else name.rpartition(".")[0] or None
-
-
-def module_imports() -> nx.DiGraph:
-    """Return the imports from module to module."""
-    ours = sources()
-    return nx.DiGraph(
-        (m, to)
-        for m, source in ours.items()
-        for name in source.imported
-        if (to := module_of(name, ours)) in ours and to != m
-    )
-
-
 def package_cycles(imports: nx.DiGraph, level: int) -> list[list[str]]:
     """Return the cycles between packages, taking modules apart at ``level`` dots."""
 
@@ -159,18 +84,18 @@ def test_every_import_points_to_a_package_above(top: str) -> None:
 
 
 def test_no_files_form_a_cycle() -> None:
-    assert list(nx.simple_cycles(module_imports())) == []
+    assert list(nx.simple_cycles(module_imports(sources()))) == []
 
 
 @pytest.mark.parametrize("level", [1, 2])
 def test_no_packages_form_a_cycle(level: int) -> None:
-    assert package_cycles(module_imports(), level) == []
+    assert package_cycles(module_imports(sources()), level) == []
 
 
 def test_few_imports_between_feature_packages() -> None:
     used = {
         (of, to)
-        for a, b in module_imports().edges
+        for a, b in module_imports(sources()).edges
         if a.startswith("controller.") and b.startswith("controller.")
         for of, to in [(a.split(".")[1], b.split(".")[1])]
         if of != to and of in FEATURES and to in FEATURES and of != "cli"

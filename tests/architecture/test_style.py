@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from tests.architecture.test_layout import sources
+from tests.architecture.imports import sources
 
 
 def test_no_public_class_name_is_defined_in_two_files() -> None:

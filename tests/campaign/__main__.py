@@ -9,9 +9,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from .campaign import campaign
-from .report import BEGIN, END, table
-from .scenarios import SCENARIOS
+from tests.campaign.campaign import campaign
+from tests.campaign.report import BEGIN, END, table
+from tests.campaign.scenarios import SCENARIOS
 
 DOC = Path(__file__).resolve().parents[2] / "docs" / "benchmarks" / "campaign.md"
 

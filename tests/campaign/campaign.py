@@ -11,10 +11,9 @@ from snakewalk.drivers.errors import DriverError, PortError, SafetyTrippedError
 from snakewalk.drivers.port.byte_port import reopen
 from snakewalk.drivers.safety.recovery import Policy
 from snakewalk.drivers.types import JointCommand
-
-from .rig import JOINTS, PATIENCE_S, ROBOT, SAFETY, Rig
-from .scenarios import CHANGES, NOISE, plan
-from .sensors import judge_sensors
+from tests.campaign.rig import JOINTS, PATIENCE_S, ROBOT, SAFETY, Rig
+from tests.campaign.scenarios import CHANGES, NOISE, plan
+from tests.campaign.sensors import judge_sensors
 
 PERIOD_S = 0.02
 LONGEST_CYCLE_S = PATIENCE_S + 3.0

@@ -1,6 +1,6 @@
 """The campaign's table, by kind of fault."""
 
-from .campaign import Tally
+from tests.campaign.campaign import Tally
 
 BEGIN, END = "<!-- campaign begins -->", "<!-- campaign ends -->"
 _COLUMNS = {

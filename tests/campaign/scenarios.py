@@ -5,8 +5,7 @@ from itertools import combinations
 from typing import Any
 
 from snakewalk.config.faults import FaultPlan
-
-from .rig import ROBOT
+from tests.campaign.rig import ROBOT
 
 NOISE = ("drop", "corrupt", "truncate", "duplicate", "delay", "late")
 SERVO = ("mute", "stuck", "brown_out", "no_output", "alert")

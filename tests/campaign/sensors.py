@@ -4,8 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from snakewalk.config.faults import FaultPlan, ReadingFault
-
-from .rig import ROBOT
+from tests.campaign.rig import ROBOT
 
 LONG_S = 2.0
 """Duration from which a constant reading has to be named."""

@@ -11,13 +11,22 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.types import JointState
 from snakewalk.sim.line.rx_queue import RxQueue
+from tests.campaign import rig
+from tests.campaign.campaign import Tally, campaign, run_scenario
+from tests.campaign.report import table
+from tests.campaign.rig import JOINTS, ROBOT, Rig
+from tests.campaign.scenarios import (
+    CHANGES,
+    JUMPS,
+    KINDS,
+    LINES,
+    OTHERS,
+    SCENARIOS,
+    SENSORS,
+    WRITES,
+    plan,
+)
 from tests.oracles.raw_positions import raw_positions
-
-from . import rig
-from .campaign import Tally, campaign, run_scenario
-from .report import table
-from .rig import JOINTS, ROBOT, Rig
-from .scenarios import CHANGES, JUMPS, KINDS, LINES, OTHERS, SCENARIOS, SENSORS, WRITES, plan
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -20,7 +20,7 @@ import pytest
 from rich.console import Console
 from rich.progress import track
 
-from .mutants import Mutant, mutants
+from tests.mutation.mutants import Mutant, mutants
 
 ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / "docs" / "mutation.md"

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from .runs import hashes_of, runs
+from tests.reference.runs import hashes_of, runs
 
 FILE = Path(__file__).with_name("hashes.json")
 

@@ -173,7 +173,7 @@ def test_a_chain_is_found_out_completely_and_then_walks(
     assert finished.summary.path_error_mean_m < 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a whole walk after a whole calibration")
 def test_a_chain_that_was_found_out_walks_the_square(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

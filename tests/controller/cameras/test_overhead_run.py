@@ -41,7 +41,7 @@ def drawn() -> None:
     view.close()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("draws and searches a picture in every cycle of a walk")
 @pytest.mark.usefixtures("drawn")
 def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
     small = {"width_px": 384, "height_px": 288, "field_width_m": 3.6, "height_m": 3.6}

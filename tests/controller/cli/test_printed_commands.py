@@ -13,7 +13,7 @@ They are run as printed, in this process, with a budget that the pages do not sh
 What a line takes from its reader, a film or a map, is a small one under the printed name. A line
 that stood on an earlier page, and reads nothing of its own page, is not run again: its files are
 put there. ``NOT_RUN`` names what is left out. README, commands.md and docs/start are run always,
-the other pages by ``pytest -m slow``.
+the other pages by ``pytest -m nightly``.
 """
 
 import re
@@ -403,10 +403,13 @@ def _run(words: Sequence[str], budget: Budget, left: dict[str, Path]) -> str | N
     return None
 
 
+EVERY_PAGE = pytest.mark.nightly("runs the printed commands of every page, with films and sweeps")
+
+
 def _parameter(page: Path) -> Any:
     name = str(page.relative_to(ROOT))
     tour = name in {"README.md", "docs/commands.md"} or page.parent.name == "start"
-    return pytest.param(page, id=name, marks=() if tour else pytest.mark.slow)
+    return pytest.param(page, id=name, marks=() if tour else EVERY_PAGE)
 
 
 RUN_PAGES = [

@@ -13,9 +13,8 @@ from snakewalk.drivers.protocol.packet import (
     encode_status,
 )
 from snakewalk.drivers.protocol.parser import PacketParser
+from tests.drivers.bus.test_group_codec import fast
 from tests.helpers.scripted_port import ScriptedPort
-
-from .test_group_codec import fast
 
 IDS = (1, 2, 3, 4)
 

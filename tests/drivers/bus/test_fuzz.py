@@ -19,8 +19,7 @@ from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-
-from .test_group_codec import fast as fast_answer
+from tests.drivers.bus.test_group_codec import fast as fast_answer
 
 GOOD = StatusPacket(7, 0, b"\x01\x02\x03")
 GOOD_RAW = encode_status(GOOD)
@@ -154,7 +153,7 @@ def test_servos_answer_after_anything() -> None:
     fuzz_servos(1_500, seed=3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a soak: 1,050,000 byte streams")
 @pytest.mark.parametrize("seed", range(10))
 def test_a_million_streams(seed: int) -> None:
     fuzz_reader(60_000, seed=100 + seed)

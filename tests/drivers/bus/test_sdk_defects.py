@@ -26,9 +26,8 @@ from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
+from tests.drivers.bus.test_cycle_faults import IDS, Servos
 from tests.helpers.scripted_port import ScriptedPort
-
-from .test_cycle_faults import IDS, Servos
 
 HEADER_LIKE = int.from_bytes(b"\xff\xff\xfd\x00", "little")
 PH = sdk.PacketHandler(2.0)

@@ -19,8 +19,7 @@ from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.port.serial_wait import LATE, new_latency_estimate, update
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
-
-from .test_group_codec import HEADER_LIKE, fast, plain
+from tests.drivers.bus.test_group_codec import HEADER_LIKE, fast, plain
 
 IDS = (1, 2, 3, 4)
 FAR_S = 5.0

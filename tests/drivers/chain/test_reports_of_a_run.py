@@ -13,8 +13,7 @@ from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-
-from .test_motion_sensors import ROBOT, STEP_S
+from tests.drivers.chain.test_motion_sensors import ROBOT, STEP_S
 
 
 def test_a_run_reports_a_dead_current_sensor() -> None:

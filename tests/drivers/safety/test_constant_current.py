@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.safety.following_error import IDLE_TIME_S, FollowingError
-
-from .test_following_error import JUDGED
-from .test_safety_vet import J, one, state
+from tests.drivers.safety.test_following_error import JUDGED
+from tests.drivers.safety.test_safety_vet import J, one, state
 
 
 def steady(

@@ -18,8 +18,7 @@ from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-
-from .test_safety_vet import LIMITS, J, one, state
+from tests.drivers.safety.test_safety_vet import LIMITS, J, one, state
 
 PERIOD_S = 0.02
 

@@ -17,8 +17,7 @@ from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
-
-from .test_safety_vet import LIMITS, NOW, J, one, state
+from tests.drivers.safety.test_safety_vet import LIMITS, NOW, J, one, state
 
 BEFORE = state(time_s=NOW - 0.02, position_rad=np.full(J, 0.1), current_a=np.full(J, 0.2))
 EDGE_RAD = 0.2 + 8.0 * 0.02

@@ -10,8 +10,7 @@ from snakewalk.drivers.errors import BusError, SafetyTrippedError
 from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.types import JointCommand, JointState
 from snakewalk.sim.line.clock import SimClock
-
-from .test_safety_vet import LIMITS, J, one, state
+from tests.drivers.safety.test_safety_vet import LIMITS, J, one, state
 
 
 class Joints:

@@ -11,8 +11,7 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.vet import SafetyMemory, _age_max_s, vet
 from snakewalk.drivers.types import JointCommand
-
-from .test_safety_vet import (
+from tests.drivers.safety.test_safety_vet import (
     LIMITS,
     NOW,
     J,

@@ -108,7 +108,7 @@ def test_each_class_is_imported_exported_and_imported_again(tmp_path: Path, name
         np.testing.assert_allclose(back.robot.link_masses_kg, robot.link_masses_kg, atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("plans and runs every published class of robot")
 @pytest.mark.parametrize("name", CLASSES)
 def test_each_class_is_planned_and_run(tmp_path: Path, name: str) -> None:
     model = CLASSES[name]

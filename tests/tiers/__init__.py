@@ -1,0 +1,1 @@
+"""Which tests run when, and what each of them costs."""
