@@ -27,7 +27,7 @@ lock: setup
 
 # The loops are compiled once, by two processes, before many would compile them each for itself.
 loops: setup
-	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk compile
+	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk tools compile
 
 run: loops
 	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk run
@@ -93,7 +93,7 @@ warp:
 SEEDS ?= 20
 FIRST_SEED ?= 1000
 FAILURES ?= runs/failures
-TRIALS := $(BIN)/snakewalk trials --motion walk --seeds $(SEEDS) --first-seed $(FIRST_SEED) --force
+TRIALS := $(BIN)/snakewalk trials run --motion walk --seeds $(SEEDS) --first-seed $(FIRST_SEED) --force
 ANYWHERE := --over world.planner.slope_limit_rad=1.4 --over world.planner.variance_limit_m2=1
 BODIES := --robot alternating16 --robot yaw16
 

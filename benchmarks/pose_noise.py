@@ -2,7 +2,7 @@
 
 The true poses of a simulated run go through the simulated tracker, the pose filter and the friction
 estimate of a run with an external pose. The metrics of the filtered poses are compared with those
-of the true ones. The walk does not react to the noise here: `snakewalk rehearse` shows that.
+of the true ones. The walk does not react to the noise here: `snakewalk trials rehearse` shows that.
 
 Run: .venv/bin/snakewalk run flat-slalom --no-film --out runs/slalom
      .venv/bin/python -m benchmarks.pose_noise runs/slalom/log.mcap --seeds 20 --first-seed 500

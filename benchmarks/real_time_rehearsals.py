@@ -1,4 +1,4 @@
-"""Rehearsals in real time: `bus serve`, `run` and `judge` over a pseudo-terminal and UDP.
+"""Rehearsals in real time: `bus serve`, `run` and `log judge` over a pseudo-terminal and UDP.
 
 The server has one core, the client another. A row states how late the server served and how late
 the cycles of the client were. A run whose server was late by more than 0.1 s is void: its servos

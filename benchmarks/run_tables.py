@@ -187,7 +187,7 @@ def shipped_robots(wanted: Wanted) -> str:
     rows = []
     for robot in ROBOTS:
         found = snakewalk(
-            "trials", "flat-square", "--motion", "walk", "--robot", robot, "--workers", "1",
+            "trials", "run", "flat-square", "--motion", "walk", "--robot", robot, "--workers", "1",
             "--first-seed", str(FIRST_SEED), "--seeds", str(wanted.of(3)), "--start-spread", "0.02",
         )  # fmt: skip
         rows.append([f"`{robot}`", *trial_cells(found)])
@@ -195,7 +195,7 @@ def shipped_robots(wanted: Wanted) -> str:
 
 
 def trial_cells(found: Facts) -> list[str]:
-    """Return completion, times and path error of one row of ``snakewalk trials``."""
+    """Return completion, times and path error of one row of ``snakewalk trials run``."""
     (row,) = found["table"]
     seconds = [trial["duration_s"] for trial in found["trials"]]
     return [row["complete"], f"{min(seconds):.0f} to {max(seconds):.0f}", str(row["path_error_m"])]
@@ -231,7 +231,7 @@ def walks(wanted: Wanted) -> str:
     rows = []
     for name in RECORDINGS:
         found = snakewalk(
-            "trials", "flat-square", "--motion", "walk", "--seeds", str(wanted.of(3)),
+            "trials", "run", "flat-square", "--motion", "walk", "--seeds", str(wanted.of(3)),
             "--workers", "1", "--track", _recording(name, wanted)[0],
         )  # fmt: skip
         rows.append([name, states_cell(_track(name, wanted)), *walk_cells(found)])
@@ -247,14 +247,14 @@ def states_cell(facts: Facts) -> str:
 
 
 def walk_cells(found: Facts) -> list[str]:
-    """Return the cells of one row of ``snakewalk trials`` on a recording."""
+    """Return the cells of one row of ``snakewalk trials run`` on a recording."""
     complete, seconds, error_m = trial_cells(found)
     (row,) = found["table"]
     return [complete, str(row["passed_by"]), error_m, str(row["eta"]), seconds]
 
 
 def _track(name: str, wanted: Wanted) -> Facts:
-    (facts,) = snakewalk("track", *_recording(name, wanted))
+    (facts,) = snakewalk("animal", "track", *_recording(name, wanted))
     return dict(facts)
 
 
@@ -297,7 +297,7 @@ def policies_on_grip(wanted: Wanted) -> str:
 
 def _policies(world: str, wanted: Wanted) -> str:
     seeds = str(wanted.of(10))
-    words = "policy", "trials", *MOTIONS, "--world", world, "--first-seed", str(FIRST_SEED)
+    words = "trials", "policy", *MOTIONS, "--world", world, "--first-seed", str(FIRST_SEED)
     found = snakewalk(*words, "--seeds", seeds, "--workers", "1")
     return policy_table(found, world)
 
@@ -336,7 +336,7 @@ def _synthesised(run: str, seed: int, options: Sequence[str]) -> Synthesised:
     """Synthesise a motion, and measure its file."""
     with TemporaryDirectory() as folder:
         name = Path(folder) / "motion"
-        words = "synthesise", run, "--seed", str(seed), "--output", str(name), *options
+        words = "animal", "synthesise", run, "--seed", str(seed), "--output", str(name), *options
         facts = snakewalk(*words)
         with np.load(name.with_suffix(".npz")) as file:
             points_m, state = file["points"], file["state"]

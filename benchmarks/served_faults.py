@@ -206,7 +206,7 @@ def main() -> None:
         *(provenance("python -m benchmarks.served_faults"), ""),
         "| fault | exit code | message | torque |",
         *("| --- | ---: | --- | --- |", *runs, ""),
-        "| `calibrate` ends by | exit code | torque | answers before | asked again | result |",
+        "| `bus calibrate` ends by | exit code | torque | answers before | asked again | result |",
         *("| --- | ---: | --- | ---: | ---: | --- |", *calibrations),
     ]
     print(*lines, sep="\n")

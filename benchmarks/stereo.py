@@ -78,7 +78,7 @@ def filled(left: Image, right: Image, count: int) -> Floats:
 MATCHERS = {
     "OpenCV `StereoSGBM`": opencv,
     "the same with a left border": widened_opencv,
-    "`terrain from-stereo`": match,
+    "`world stereo`": match,
     "the same with filled gaps": filled,
 }
 

@@ -19,11 +19,11 @@ _QUESTION = re.compile(
 
 
 class Calibration:
-    """``snakewalk calibrate`` in a terminal, whose questions get the right answers."""
+    """``snakewalk bus calibrate`` in a terminal, whose questions get the right answers."""
 
     def __init__(self, folder: Path, *options: str) -> None:
         self._master, terminal = os.openpty()
-        words = ["calibrate", "--robot", "robot.toml", "--port", "port", "-o", "out.toml"]
+        words = ["bus", "calibrate", "--robot", "robot.toml", "--port", "port", "-o", "out.toml"]
         self.process = subprocess.Popen(
             ["setsid", "--ctty", PROGRAM, *words, *options], cwd=folder,
             stdin=terminal, stdout=terminal, stderr=terminal,

@@ -3,8 +3,8 @@
 ``python -m benchmarks.torque_start`` starts a gait and a walk with the commands of a user on 16
 simulated servos, which this process serves on a pseudo-terminal, and watches their register Torque
 Enable.
-The loops must be compiled already (``snakewalk compile``). With ``--write`` it replaces the table
-of ``docs/benchmarks/startup.md``.
+The loops must be compiled already (``snakewalk tools compile``). With ``--write`` it replaces the
+table of ``docs/benchmarks/startup.md``.
 """
 
 import argparse

@@ -39,7 +39,7 @@ class CameraConfig(Strict):
     )
     markers_m: dict[str, Place] | None = Field(
         None,
-        description="printed markers of `snakewalk camera markers`, by their numbers: where the "
+        description="printed markers of `snakewalk pose markers`, by their numbers: where the "
         "middle of each lies on the floor; in place of corners",
     )
     marker_side_m: float = Field(
@@ -61,7 +61,7 @@ class CameraConfig(Strict):
     )
     lens: str | None = Field(
         None,
-        description="file of `snakewalk camera calibrate`: the distortion of a real camera is "
+        description="file of `snakewalk pose calibrate`: the distortion of a real camera is "
         "undone; default: none",
     )
     shade: float = Field(
@@ -78,7 +78,7 @@ class CameraConfig(Strict):
     latency_s: float = Field(
         0.0, ge=0.0, le=1.0,
         description="how long after it was taken a real camera's frame is handed over, as "
-        "`snakewalk camera check` measures it",
+        "`snakewalk pose camera` measures it",
     )  # fmt: skip
     background: str | None = Field(
         None, description="image of the empty floor, needed with a real camera"

@@ -80,7 +80,7 @@ gear_drag_n_m_s = 0.006
 default and its meaning (`--robot`, `--from RUN`: like another one), and `snakewalk run
 mine/run.toml` runs them as they are.
 
-**In an editor.** `snakewalk schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
+**In an editor.** `snakewalk tools schema run` (`robot`, `world`, `synthesis`, `gait`, `recording`,
 `skin`, `animal`, `schedule`, `faults`, `servo`, `policy`) prints the JSON Schema of such a file.
 `init` writes those of its three files into `mine/schema/` and names them in each file's first line,
 `#:schema schema/run.json`. With it the extension *Even Better TOML* of VS Code completes keys,

@@ -44,7 +44,7 @@ class ScheduleConfig(Strict):
 class RepertoireConfig(ScheduleConfig):
     """Recorded actions in place of a walk ([YT])."""
 
-    file: str = Field(description="file that `snakewalk repertoire record` wrote")
+    file: str = Field(description="file that `snakewalk gait repertoire record` wrote")
     patience: int | None = Field(
         None,
         ge=1,

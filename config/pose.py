@@ -77,7 +77,7 @@ class PoseConfig(Strict):
 
 
 class TrackerConfig(Strict):
-    """A simulated tracker: `bus serve --pose-out` and `rehearse` publish the true pose by it."""
+    """A simulated tracker: `bus serve --pose-out` and `trials rehearse` publish poses by it."""
 
     rate_hz: float = Field(50.0, ge=1.0, le=1000.0, description="poses a second")
     noise_m: float = Field(0.0, ge=0.0, le=1.0, description="standard deviation of each coordinate")

@@ -258,8 +258,8 @@ class RunConfig(Strict):
     track: str = Field("worm-like", description="a shipped recording's name or a file")
     motion: MotionName = Field(
         "walk",
-        description="kp: on paper only, `snakewalk synthesise`; source: a motion source of your "
-        "own, run by `prepare_source`",
+        description="kp: on paper only, `snakewalk animal synthesise`; source: a motion source of "
+        "your own, run by `prepare_source`",
     )
     waypoints_m: tuple[tuple[Place, Place], ...] = Field(
         (),

@@ -92,7 +92,9 @@ class Adaptation(StrEnum):
 
 
 class SynthesisConfig(Strict):
-    """`snakewalk synthesise`: a motion on paper ([PT] 2.6). A curve is a number or [[s, value]...].
+    """`snakewalk animal synthesise`: a motion on paper ([PT] 2.6).
+
+    A curve is a number or [[s, value]...].
 
     The constants of the speed law are those of [PT] 2.6.3, in a unit of length that is declared.
     """

@@ -53,7 +53,7 @@ class ElevationGround(Strict):
 
 
 class MapGround(Strict):
-    """Real ground as measured, with holes where nothing was: written by `snakewalk terrain`."""
+    """Real ground as measured, with holes where nothing was: written by `snakewalk world`."""
 
     kind: Literal["map"] = "map"
     source: str = Field(description="an .npz with z_m, known, spacing_m, x0_m, y0_m")

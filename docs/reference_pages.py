@@ -1,7 +1,7 @@
-"""Generated parts of reference pages: options of commands, and topics of a log.
+"""Generated parts of pages: options and former names of commands, and topics of a log.
 
-A page has a line ``<!-- commands: GROUP -->`` or ``<!-- topics -->``; each build puts the
-tables in its place.
+A page has a line ``<!-- commands: WORDS -->``, ``<!-- former names -->`` or ``<!-- topics -->``;
+each build puts the tables in its place.
 """
 
 import re
@@ -12,15 +12,18 @@ import typer
 from sphinx.application import Sphinx
 
 from snakewalk.controller.cli.command_line import app as program
+from snakewalk.controller.cli.command_tree import FORMER
 from snakewalk.controller.runlog import topics
 from snakewalk.controller.runlog.column import Column, registered_tables
 
-PLACE = re.compile(r"^<!-- (commands|topics)(?:: (.*?))? -->$", re.MULTILINE)
+PLACE = re.compile(r"^<!-- (commands|former names|topics)(?:: (.*?))? -->$", re.MULTILINE)
 PAGES = [
-    "reference/commands-job",
-    "reference/commands-motion",
-    "reference/commands-recordings",
-    "reference/commands-bus",
+    "commands",
+    "reference/commands-every-day",
+    "reference/commands-gait",
+    "reference/commands-log",
+    "reference/commands-robot",
+    "reference/commands-animal",
     "reference/log-topics",
 ]
 
@@ -56,15 +59,15 @@ def option_row(option: Any, context: Any) -> str:
     return f"| {name} | {shown} | {cell(option.help or '')} | {cell(default)} |"
 
 
-def commands(group: str) -> str:
-    """Return a section with options and examples for each command of a group of ``--help``."""
+def commands(firsts: str) -> str:
+    """Return a section with options and examples for each command with one of the first words."""
     root = typer.main.get_command(program)
     context = root.make_context("snakewalk", [], resilient_parsing=True)
     parts = []
-    for first in root.list_commands(context):  # type: ignore[attr-defined]
+    for first in firsts.split():
         top = root.get_command(context, first)  # type: ignore[attr-defined]
-        if getattr(top, "rich_help_panel", None) != group:
-            continue
+        if top is None:
+            raise ValueError(f"commands: {first}: no such command")
         for words, command in leaves(top, f"snakewalk {first}"):
             rows = [
                 option_row(each, context)
@@ -80,9 +83,13 @@ def commands(group: str) -> str:
                 ),
                 "\n".join(["```", *examples, "```"]),
             ]
-    if not parts:
-        raise ValueError(f"commands: {group}: no command is in this group")
     return "\n\n".join(parts)
+
+
+def former_names() -> str:
+    """Return a table of the former names of commands."""
+    rows = [f"| `snakewalk {old}` | `snakewalk {new}` |" for old, new in FORMER.items()]
+    return "\n".join(["| former name | name |", "| --- | --- |", *rows])
 
 
 def shape_of(column: Column) -> str:
@@ -110,7 +117,9 @@ def fill(app: Sphinx, name: str, source: list[str]) -> None:
     """Put the tables in the places of a page."""
 
     def made(place: re.Match[str]) -> str:
-        return topic_tables() if place[1] == "topics" else commands(place[2])
+        if place[1] == "commands":
+            return commands(place[2])
+        return topic_tables() if place[1] == "topics" else former_names()
 
     source[0] = PLACE.sub(made, source[0])
 

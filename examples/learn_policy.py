@@ -3,7 +3,7 @@
 Besides snakewalk[gym] it needs torch and stable-baselines3; the policy that it writes does not.
 
 python examples/learn_policy.py --total-steps 100000 --out mine.toml
-snakewalk policy run mine.toml
+snakewalk gait policy run mine.toml
 """
 
 import argparse
@@ -107,7 +107,7 @@ def main() -> None:
     )
     agent.learn(given.total_steps, callback=Saving(given))
     save_policy(learnt(agent, given), given.out)
-    print(f"snakewalk policy run {given.out}")
+    print(f"snakewalk gait policy run {given.out}")
 
 
 if __name__ == "__main__":

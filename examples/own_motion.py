@@ -52,7 +52,7 @@ def main() -> None:
             raise SystemExit(str(error)) from None
     print(f"the body went {finished.summary.travelled_m:.2f} m in {finished.summary.cycles} cycles")
     if given.out:
-        print(f"snakewalk report {finished.log}")
+        print(f"snakewalk log report {finished.log}")
 
 
 if __name__ == "__main__":

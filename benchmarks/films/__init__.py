@@ -1,1 +1,1 @@
-"""Bench of films of real animals: what ``snakewalk capture`` makes of them, beside the truth."""
+"""Bench of films of real animals: what ``snakewalk animal capture`` makes of them, and truth."""

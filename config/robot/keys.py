@@ -47,7 +47,7 @@ class RobotKeys(Strict):
         min_length=2,
         max_length=200,
         description="radii over body_radius_m at equal stations, head to tail, each over "
-        "0.05 and at most 1; for the look and the ground step (snakewalk body measures it)",
+        "0.05 and at most 1; for the look and the ground step (snakewalk animal body measures it)",
     )
     belly: BellyConfig = BellyConfig()
     link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="of each link")

@@ -3,13 +3,13 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "body", "Make the body's mesh (.obj, .glb), or an animated, textured skin with --animate.", "snakewalk.controller.animals.commands.body:body", "Recordings"),
-    ("command", "fish film", "Render a film of a fish with known angles, marks, shadow, blur and noise.", "snakewalk.controller.animals.commands.fish_film:film", ""),
-    ("command", "fish match", "Fit a deformable fish to every frame: head, spine angles, and from the side its pitch.", "snakewalk.controller.animals.commands.fish_match:match", ""),
-    ("command", "fish synthesise", "Join segments of a film in a new order, at random or through control points.", "snakewalk.controller.animals.commands.fish_synthesise:synthesise", ""),
-    ("command", "people", "Animate a person who walks or runs: PDE skin, feet by [GC] Eq. 9 and 10.", "snakewalk.controller.animals.commands.people:people", "Recordings"),
-    ("command", "stride", "Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends.", "snakewalk.controller.animals.commands.stride:stride", "Recordings"),
-    ("command", "synthesise", "Make an animal's motion over a world: a snake from states ([PT]), or legs ([KP]).", "snakewalk.controller.animals.commands.synthesise:synthesise", "Motion"),
-    ("look", "animal", "The animal of the run's recording, or a plain snake.", "snakewalk.controller.animals.mesh.body_look:AnimalLook", ""),
-    ("look", "body", "The skin of a named body, or of a body's file.", "snakewalk.controller.animals.mesh.body_look:BodyLook", ""),
+    ("command", "animal body", "Make the body's mesh (.obj, .glb), or an animated, textured skin with --animate.", "snakewalk.controller.animals.commands.body:body"),
+    ("command", "animal fish film", "Render a film of a fish with known angles, marks, shadow, blur and noise.", "snakewalk.controller.animals.commands.fish_film:film"),
+    ("command", "animal fish match", "Fit a deformable fish to every frame: head, spine angles, and from the side its pitch.", "snakewalk.controller.animals.commands.fish_match:match"),
+    ("command", "animal fish synthesise", "Join segments of a film in a new order, at random or through control points.", "snakewalk.controller.animals.commands.fish_synthesise:synthesise"),
+    ("command", "animal people", "Animate a person who walks or runs: PDE skin, feet by [GC] Eq. 9 and 10.", "snakewalk.controller.animals.commands.people:people"),
+    ("command", "animal stride", "Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends.", "snakewalk.controller.animals.commands.stride:stride"),
+    ("command", "animal synthesise", "Make an animal's motion over a world: a snake from states ([PT]), or legs ([KP]).", "snakewalk.controller.animals.commands.synthesise:synthesise"),
+    ("look", "animal", "The animal of the run's recording, or a plain snake.", "snakewalk.controller.animals.mesh.body_look:AnimalLook"),
+    ("look", "body", "The skin of a named body, or of a body's file.", "snakewalk.controller.animals.mesh.body_look:BodyLook"),
 )

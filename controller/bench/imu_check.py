@@ -27,7 +27,7 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
     try:
         reader.find()
     except ChainError as error:
-        return Finding("imu", "fail", str(error), "look at its cable; snakewalk scan")
+        return Finding("imu", "fail", str(error), "look at its cable; snakewalk bus scan")
     shown: list[ImuState] = []
     for _ in range(_READS):
         state = reader.read(lambda line: None)

@@ -108,8 +108,8 @@ def robot_skeleton(
     robot = checked(RobotConfig, described | ({"ports": ports} if len(ports) > 1 else {}), name)
     return robot_toml(
         robot,
-        f"{len(chain)} servos as snakewalk bus identify found them. Not known, and assumed:\n"
-        "- the order: by ID from the head; snakewalk calibrate finds it out, and signs and zeros;\n"
+        f"{len(chain)} servos as snakewalk bus inventory found them. Not known, and assumed:\n"
+        "- the order: by ID from the head; snakewalk bus calibrate finds it, and signs and zeros;\n"
         '- axes: "y" = yaw everywhere; write axis = "p" for joints that lift;\n'
         "- links: link_length_m, link_mass_kg, body_radius_m, or [[links]]; as by default.",
     )

@@ -106,11 +106,11 @@ def _missing_remedy(
     if len(others) >= len(missing):
         return (
             f"{shown_subject(others, 'reply')} instead: this chain is not calibrated; snakewalk "
-            f"calibrate --port {port} -o my-robot.toml finds the joint of each servo"
+            f"bus calibrate --port {port} -o my-robot.toml finds the joint of each servo"
         )
     if len(missing) == len(expected):
         return "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
-    return f"look at the cable in front of servo {missing[0]}; snakewalk scan --port {port}"
+    return f"look at the cable in front of servo {missing[0]}; snakewalk bus scan --port {port}"
 
 
 def unnamed_robot(findings: Sequence[Finding], robot: RobotConfig) -> Finding | None:

@@ -61,7 +61,7 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
     if not report.seen:
         extra = ", ".join(str(name) for name in report.others)
         seen = f"; in the picture are {extra}" if extra else ""
-        remedy = "snakewalk camera markers, and their places in [camera.markers_m]"
+        remedy = "snakewalk pose markers, and their places in [camera.markers_m]"
         return [Finding("markers", "warn", f"none are named{seen}", remedy)]
     shown = ", ".join(f"{name} in {100.0 * one:.0f} %" for name, one in report.seen.items())
     seldom = [name for name, one in report.seen.items() if one < _SEEN]
@@ -90,7 +90,7 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         error_mm = 1e3 * report.distortion.error_m
         second = Finding(
             "floor", "warn", f"{found}; the lens distorts by up to {error_mm:.0f} mm",
-            "calibrate the lens: snakewalk camera board, snakewalk camera calibrate",
+            "calibrate the lens: snakewalk pose board, snakewalk pose calibrate",
         )  # fmt: skip
     elif floor.residual_m[worst] > MISPLACED_M:
         second = Finding("floor", "fail", found, f"measure the place of marker {worst} again")

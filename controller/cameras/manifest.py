@@ -3,10 +3,10 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "camera board", "Draw the board for `camera calibrate`; print it without scaling, and glue it to a plate.", "snakewalk.controller.cameras.commands.board:board", ""),
-    ("command", "camera calibrate", "Calibrate a camera's lens with OpenCV from pictures of the board of `camera board`.", "snakewalk.controller.cameras.commands.lens:calibrate_camera", ""),
-    ("command", "camera check", "Check a camera, real or simulated: markers, frame rate, latency, light.", "snakewalk.controller.cameras.commands.check:check", ""),
-    ("command", "camera markers", "Draw markers for the floor under the camera; print them without scaling.", "snakewalk.controller.cameras.commands.markers:markers", ""),
-    ("pose", "camera", "A camera that looks down on known ground, level or not.", "snakewalk.controller.cameras.camera_source:OverheadCameraPose", ""),
-    ("pose", "tags", "Printed tags on the links, seen by one calibrated camera in any position.", "snakewalk.controller.cameras.tags.tag_source:TagsPose", ""),
+    ("command", "pose board", "Draw the board for `pose calibrate`; print it without scaling, and glue it to a plate.", "snakewalk.controller.cameras.commands.board:board"),
+    ("command", "pose calibrate", "Calibrate a camera's lens with OpenCV from pictures of the board of `pose board`.", "snakewalk.controller.cameras.commands.lens:calibrate_camera"),
+    ("command", "pose camera", "Check a camera, real or simulated: markers, frame rate, latency, light.", "snakewalk.controller.cameras.commands.check:check"),
+    ("command", "pose markers", "Draw markers for the floor under the camera; print them without scaling.", "snakewalk.controller.cameras.commands.markers:markers"),
+    ("pose", "camera", "A camera that looks down on known ground, level or not.", "snakewalk.controller.cameras.camera_source:OverheadCameraPose"),
+    ("pose", "tags", "Printed tags on the links, seen by one calibrated camera in any position.", "snakewalk.controller.cameras.tags.tag_source:TagsPose"),
 )

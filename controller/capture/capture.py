@@ -151,7 +151,7 @@ def captured_from(
     fixed: bool = True,
     part: bool = False,
 ) -> Capture:
-    """Make a capture of the detections of a film; see ``capture``.
+    """Make a capture of the detections of a film; see ``animal capture``.
 
     A ``part`` of a film may be without motion or without any body.
     """
@@ -319,7 +319,9 @@ def load_capture(path: Path) -> CaptureFile:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except ValueError:
-        raise InputError(f"{path}: is no .npz; a track that `capture` wrote is needed") from None
+        raise InputError(
+            f"{path}: is no .npz; a track that `animal capture` wrote is needed"
+        ) from None
     frames = len(held["verdict"]) if "verdict" in held and held["verdict"].ndim == 1 else 0
     shapes: dict[str, tuple[int, ...]] = {}
     shapes |= dict.fromkeys(_OF_FRAMES, (frames,))
@@ -337,7 +339,7 @@ def load_capture(path: Path) -> CaptureFile:
     )
     if not whole:
         raise InputError(
-            f"{path}: is not a track that `capture` wrote: data of its frames are "
+            f"{path}: is not a track that `animal capture` wrote: data of its frames are "
             "missing; choose another file"
         )
     scale, rate_hz = float(held["m_per_px"]), float(held["rate_hz"])

@@ -1,7 +1,7 @@
 """A person's corrections of a captured recording: heads flipped, frames left out or redrawn.
 
-The page of ``snakewalk capture --review`` writes them as JSON; ``apply_corrections`` applies them.
-The file names its track by a fingerprint.
+The page of ``snakewalk animal capture --review`` writes them as JSON; ``apply_corrections`` applies
+them. The file names its track by a fingerprint.
 """
 
 from collections import Counter

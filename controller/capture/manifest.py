@@ -3,7 +3,7 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "analyse", "Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy.", "snakewalk.controller.capture.commands.analyse:analyse", "Recordings"),
-    ("command", "capture", "Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail.", "snakewalk.controller.capture.commands.capture:capture", "Recordings"),
-    ("command", "track", "Examine recordings: wave, bends, states this robot can use, slowing for its servos.", "snakewalk.controller.capture.commands.track:track", "Recordings"),
+    ("command", "animal analyse", "Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy.", "snakewalk.controller.capture.commands.analyse:analyse"),
+    ("command", "animal capture", "Find the animal in every frame: silhouette, medial axis, 100 equal chords, head and tail.", "snakewalk.controller.capture.commands.capture:capture"),
+    ("command", "animal track", "Examine recordings: wave, bends, states this robot can use, slowing for its servos.", "snakewalk.controller.capture.commands.track:track"),
 )

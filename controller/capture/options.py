@@ -1,4 +1,4 @@
-"""Options of ``snakewalk capture``, and their checks before any work."""
+"""Options of ``snakewalk animal capture``, and their checks before any work."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ MOST_ANIMALS = 200
 
 @dataclass(frozen=True, slots=True)
 class CaptureOptions:
-    """The options of ``snakewalk capture``; see its help."""
+    """The options of ``snakewalk animal capture``; see its help."""
 
     recording: Path
     output: Path

@@ -1,4 +1,4 @@
-"""The facts of ``snakewalk track``: a recording's content, and the share that a robot can do."""
+"""The facts of ``snakewalk animal track``: its content, and the share that a robot can do."""
 
 from dataclasses import dataclass
 

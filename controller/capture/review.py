@@ -108,7 +108,16 @@ def _of_animal(held: CaptureFile, track: Path) -> dict[str, Any]:
         "track": held.fingerprint,
         "corrections": corrections,
         "command": shlex.join(
-            ["snakewalk", "capture", str(track), "--corrections", corrections, "-o", str(corrected)]
+            [
+                "snakewalk",
+                "animal",
+                "capture",
+                str(track),
+                "--corrections",
+                corrections,
+                "-o",
+                str(corrected),
+            ]
         ),
         "length": round(float(np.nanmedian(captured.length_px)), 2),
         "status": [_WORDS.index(str(one)) for one in captured.status],

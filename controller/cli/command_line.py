@@ -13,33 +13,20 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from snakewalk.controller.cli.called_command import CalledCommand, called
-from snakewalk.controller.console.command import (
-    BUS,
-    JOB,
-    MOTION,
-    RECORDINGS,
-    CommandInfo,
-    command_info,
+from snakewalk.controller.cli.command_tree import (
+    EVERY_DAY,
+    FAMILIES,
+    OTHERS,
+    SUBJECTS,
+    VERBS,
+    former_name,
 )
+from snakewalk.controller.console.command import CommandInfo, command_info
 from snakewalk.controller.console.declaration import declaration
 from snakewalk.controller.console.plugins import Plugin, plugins
 
-_FAMILIES: Final = {
-    "bus": ("Servos and their settings", BUS),
-    "camera": ("The camera above the robot", JOB),
-    "fish": ("Fish from video", RECORDINGS),
-    "gait": ("Gaits", MOTION),
-    "policy": ("Learnt policies", MOTION),
-    "repertoire": ("Actions recorded from the physics", MOTION),
-    "robot": ("A robot", JOB),
-    "pose": ("External poses", JOB),
-    "terrain": ("Worlds from real ground", JOB),
-}
-"""Subject and group of commands of two words; those of other packages have a general subject."""
-_GROUPS: Final = (JOB, MOTION, RECORDINGS, BUS)
-"""Order of the groups in ``--help``; other groups follow."""
-_FIRST: Final = ("list", "init", "plan", "run", "stop", "report")
-"""Commands that come first in their group; the others follow by name."""
+_FIRST: Final = (*VERBS, *(words for words in FAMILIES if " " not in words))
+"""First words in the order of ``--help``; those of other packages follow by name."""
 _COMMON: Final = ("robot", "world", "run", "motion", "port", "seconds")
 """Options that come first in the help of a command; the others follow as declared."""
 _PANELS: Final = {
@@ -145,6 +132,17 @@ class CommandGroup(TyperGroup):
                 raise typer.BadParameter(f"nothing after {name}: fill it, or leave it out")
         return super().make_context(info_name, args, *more, **options)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Read the words of a command line; a former name of a command becomes the current one."""
+        names = {each.name for each in _listed("")}
+        renamed = None if self.prefix else former_name(args, names)
+        if renamed is not None:
+            old, new = renamed
+            if not ctx.resilient_parsing:  # of completion
+                print(f"snakewalk {old} is now snakewalk {new}", file=sys.stderr)
+            args = [*new.split(), *args[len(old.split()) :]]
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         """Run a command; after an interrupt, print the notes about torque and log."""
         try:
@@ -173,18 +171,24 @@ def _print_fault(error: Any) -> None:
 
 def _listed(prefix: str) -> list[Plugin]:
     """Return the commands below a prefix in the order of ``--help``."""
-
-    def order(each: Plugin) -> tuple[int, int, str]:
-        group = each.group or _FAMILIES.get(each.name.split()[0], ("", ""))[1]
-        first = _FIRST.index(each.name) if each.name in _FIRST else len(_FIRST)
-        place = _GROUPS.index(group) if group in _GROUPS else len(_GROUPS)
-        return place, first, each.name
-
     commands: dict[str, Plugin] = {}
     for each in plugins("command"):
         if not prefix or each.name.startswith(f"{prefix} "):
             commands.setdefault(each.name, each)
+
+    def order(each: Plugin) -> tuple[int, str]:
+        first = each.name.split()[0]
+        return _FIRST.index(first) if first in _FIRST else len(_FIRST), each.name
+
     return sorted(commands.values(), key=order)
+
+
+def _panel(each: Plugin) -> str | None:
+    """Return the group of a command, or of its family, in ``--help`` of the first level."""
+    first = each.name.split()[0]
+    if first in _FIRST:
+        return EVERY_DAY if first in VERBS else SUBJECTS
+    return each.group or OTHERS
 
 
 def _next_word(each: Plugin, prefix: str) -> str:
@@ -193,15 +197,16 @@ def _next_word(each: Plugin, prefix: str) -> str:
 
 def _family(path: str, commands: list[Plugin]) -> Any:
     """Return the group of the commands that begin with the same word."""
-    about, group = _FAMILIES.get(path, (f"Commands of {commands[0].package}", commands[0].group))
+    about = FAMILIES.get(path, f"Commands of {commands[0].package}")
     about += f": {', '.join(dict.fromkeys(_next_word(each, path) for each in commands))}."
     group_class = type("Family", (CommandGroup,), {"prefix": path})
     family = typer.Typer(
         cls=group_class, help=about, rich_markup_mode="rich", context_settings=_CONTEXT
     )
-    family.callback(no_args_is_help=True, help=about, rich_help_panel=group or None)(_nothing)
+    panel = None if " " in path else _panel(commands[0])
+    family.callback(no_args_is_help=True, help=about, rich_help_panel=panel)(_nothing)
     made = typer.main.get_group(family)
-    made.name, made.rich_help_panel = path.rsplit(maxsplit=1)[-1], group or None
+    made.name, made.rich_help_panel = path.rsplit(maxsplit=1)[-1], panel
     return made
 
 
@@ -209,9 +214,8 @@ def _nothing() -> None: ...
 
 
 def _stub(name: str, listed: Plugin) -> Any:
-    return TyperCommand(
-        name, help=listed.help, rich_help_panel=listed.group or None, rich_markup_mode="rich"
-    )
+    panel = None if " " in listed.name else _panel(listed)
+    return TyperCommand(name, help=listed.help, rich_help_panel=panel, rich_markup_mode="rich")
 
 
 def _full_command(name: str, listed: Plugin) -> Any:
@@ -220,9 +224,7 @@ def _full_command(name: str, listed: Plugin) -> Any:
     function: Callable[..., Any] = declared or listed.load()
     info = command_info(function)
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)
-    alone.command(
-        name, cls=CalledCommand, epilog=_examples(info), rich_help_panel=listed.group or None
-    )(called(function, listed.load))
+    alone.command(name, cls=CalledCommand, epilog=_examples(info))(called(function, listed.load))
     made = typer.main.get_command(alone)
     _group_options(made)
     return made

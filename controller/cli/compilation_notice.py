@@ -21,7 +21,7 @@ class CompilationNotice:
         now_s = self._clock.now_s()
         if self._count == 1:
             self._print_line(
-                "compiling loops for this computer, once; snakewalk compile does it in advance"
+                "compiling loops for this computer, once; in advance: snakewalk tools compile"
             )
             self._next_s = now_s + _EVERY_S
         elif now_s >= self._next_s:

@@ -1,4 +1,4 @@
-"""Declaration of a command: its words, its group in ``--help``, and runnable examples."""
+"""Declaration of a command: its words, and runnable examples."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,22 +7,15 @@ from typing import Final, TypeVar
 F = TypeVar("F", bound=Callable[..., object])
 T = TypeVar("T")
 
-JOB: Final = "The job"
-MOTION: Final = "Motion"
-RECORDINGS: Final = "Recordings"
-BUS: Final = "The bus"
-"""Groups of ``snakewalk --help``."""
 _ATTRIBUTE: Final = "snakewalk_command"
 
 
 @dataclass(frozen=True, slots=True)
 class CommandInfo:
-    """Words, group and examples of a command."""
+    """Words and examples of a command."""
 
     words: str
-    """``scan``, or ``bus serve`` for a command of a family."""
-    group: str
-    """Group in ``--help``; the family's own where it is empty."""
+    """``plan``, or ``bus serve`` for a command below a subject."""
     examples: tuple[str, ...]
     """Command lines without the leading ``snakewalk``."""
     results: tuple[str, ...] = ()
@@ -34,7 +27,6 @@ class CommandInfo:
 def command(
     words: str,
     *,
-    group: str = "",
     examples: tuple[str, ...] = (),
     results: tuple[str, ...] = (),
     tables: tuple[str, ...] = (),
@@ -45,7 +37,7 @@ def command(
     """
 
     def declare(function: F) -> F:
-        setattr(function, _ATTRIBUTE, CommandInfo(words, group, examples, results, tables))
+        setattr(function, _ATTRIBUTE, CommandInfo(words, examples, results, tables))
         return function
 
     return declare

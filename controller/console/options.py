@@ -74,7 +74,7 @@ Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the
 Look = Annotated[
     str,
     typer.Option(
-        help="body in the film: servos, animal, or a BODY that `snakewalk body` accepts",
+        help="body in the film: servos, animal, or a BODY that `snakewalk animal body` accepts",
         autocompletion=completion.LOOKS,
     ),
 ]

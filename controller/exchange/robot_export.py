@@ -128,7 +128,7 @@ def _dynamixel_params(robot: RobotConfig) -> dict[str, str]:
             raise InputError(
                 f"{robot.name}: {robot.joint_label(joint)} has zero_rad {zero:g}, which "
                 "dynamixel_hardware_interface does not know: write it into Homing Offset "
-                "(snakewalk calibrate), or give --ros2-control topic"
+                "(snakewalk bus calibrate), or give --ros2-control topic"
             )
     if len(robot.ports) > 1:
         raise InputError(

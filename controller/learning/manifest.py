@@ -3,8 +3,8 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "policy learn", "Learn a wave with feedback by CMA-ES, on episodes of the Gymnasium environment.", "snakewalk.controller.learning.commands.policy_learn:learn_policy", ""),
-    ("command", "policy list", "List the shipped policies, and how each was learnt.", "snakewalk.controller.learning.commands.policy_list:list_policies", ""),
-    ("command", "policy run", "Run a learnt policy on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.learning.commands.policy_run:run_policy", ""),
-    ("command", "policy trials", "Compare policies with gaits: each seed varies start, friction and supply equally for all.", "snakewalk.controller.learning.commands.policy_trials:policy_trials", ""),
+    ("command", "gait policy learn", "Learn a wave with feedback by CMA-ES, on episodes of the Gymnasium environment.", "snakewalk.controller.learning.commands.policy_learn:learn_policy"),
+    ("command", "gait policy list", "List the shipped policies, and how each was learnt.", "snakewalk.controller.learning.commands.policy_list:list_policies"),
+    ("command", "gait policy run", "Run a learnt policy on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.learning.commands.policy_run:run_policy"),
+    ("command", "trials policy", "Compare policies with gaits: each seed varies start, friction and supply equally for all.", "snakewalk.controller.learning.commands.policy_trials:policy_trials"),
 )

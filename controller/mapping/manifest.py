@@ -3,8 +3,8 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "terrain from", "Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown.", "snakewalk.controller.mapping.commands.elevation:elevation", ""),
-    ("command", "terrain from-stereo", "Make a world of the ground in front of a stereo camera; unseen ground stays unknown.", "snakewalk.controller.mapping.commands.stereo:stereo", ""),
-    ("command", "terrain walkthrough", "Film a walk along several stereo positions: each local model morphs into the next one.", "snakewalk.controller.mapping.commands.walkthrough:walkthrough", ""),
-    ("map", "stereo", "A map from the pictures of the robot's stereo head.", "snakewalk.controller.mapping.stereo_map:StereoMap", ""),
+    ("command", "world from", "Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown.", "snakewalk.controller.mapping.commands.elevation:elevation"),
+    ("command", "world stereo", "Make a world of the ground in front of a stereo camera; unseen ground stays unknown.", "snakewalk.controller.mapping.commands.stereo:stereo"),
+    ("command", "world walkthrough", "Film a walk along several stereo positions: each local model morphs into the next one.", "snakewalk.controller.mapping.commands.walkthrough:walkthrough"),
+    ("map", "stereo", "A map from the pictures of the robot's stereo head.", "snakewalk.controller.mapping.stereo_map:StereoMap"),
 )

@@ -3,7 +3,7 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "judge", "Compare a run with the truth of the served robot; exit code 1 unless it truly arrived.", "snakewalk.controller.rehearsal.commands.judge:judge", "The job"),
-    ("command", "rehearse", "Rehearse runs against served robots in simulated time; exit code 1 if one did not arrive.", "snakewalk.controller.rehearsal.commands.rehearse:rehearse_runs", "The job"),
-    ("command", "tasks", "Run controllers on twelve tasks with stated conditions; list what the body truly did.", "snakewalk.controller.rehearsal.commands.tasks:tasks", "The job"),
+    ("command", "log judge", "Compare a run with the truth of the served robot; exit code 1 unless it truly arrived.", "snakewalk.controller.rehearsal.commands.judge:judge"),
+    ("command", "trials rehearse", "Rehearse runs against served robots in simulated time; exit code 1 if one did not arrive.", "snakewalk.controller.rehearsal.commands.rehearse:rehearse_runs"),
+    ("command", "trials tasks", "Run controllers on twelve tasks with stated conditions; list what the body truly did.", "snakewalk.controller.rehearsal.commands.tasks:tasks"),
 )

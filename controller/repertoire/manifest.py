@@ -3,11 +3,11 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "repertoire crowd", "Make a film of many animals that cross a terrain by recorded actions, without physics.", "snakewalk.controller.repertoire.commands.crowd:crowd", ""),
-    ("command", "repertoire play", "Play recorded actions on servos or in the simulator for a requested speed and turn rate.", "snakewalk.controller.repertoire.commands.repertoire_play:play_actions", ""),
-    ("command", "repertoire record", "Simulate forward, left and right actions, and record a settled cycle of each.", "snakewalk.controller.repertoire.commands.repertoire_record:record", ""),
-    ("command", "repertoire run", "Run a plan on servos or in the simulator, and compare predicted with measured poses.", "snakewalk.controller.repertoire.commands.repertoire_run:run_plan", ""),
-    ("command", "repertoire show", "Show the actions of a repertoire: speed, turn and closure error of a cycle.", "snakewalk.controller.repertoire.commands.repertoire_show:show_file", ""),
-    ("planner", "repertoire", "Search over recorded actions; show, and where asked save, time on the physics, and run.", "snakewalk.controller.repertoire.commands.plan_route:plan_with_repertoire", ""),
-    ("run", "repertoire", "Recorded actions played by a schedule of speeds and turns.", "snakewalk.controller.repertoire.prepare_schedule:prepare_repertoire", ""),
+    ("command", "gait repertoire crowd", "Make a film of many animals that cross a terrain by recorded actions, without physics.", "snakewalk.controller.repertoire.commands.crowd:crowd"),
+    ("command", "gait repertoire play", "Play recorded actions on servos or in the simulator for a requested speed and turn rate.", "snakewalk.controller.repertoire.commands.repertoire_play:play_actions"),
+    ("command", "gait repertoire record", "Simulate forward, left and right actions, and record a settled cycle of each.", "snakewalk.controller.repertoire.commands.repertoire_record:record"),
+    ("command", "gait repertoire run", "Run a plan on servos or in the simulator, and compare predicted with measured poses.", "snakewalk.controller.repertoire.commands.repertoire_run:run_plan"),
+    ("command", "gait repertoire show", "Show the actions of a repertoire: speed, turn and closure error of a cycle.", "snakewalk.controller.repertoire.commands.repertoire_show:show_file"),
+    ("planner", "repertoire", "Search over recorded actions; show, and where asked save, time on the physics, and run.", "snakewalk.controller.repertoire.commands.plan_route:plan_with_repertoire"),
+    ("run", "repertoire", "Recorded actions played by a schedule of speeds and turns.", "snakewalk.controller.repertoire.prepare_schedule:prepare_repertoire"),
 )

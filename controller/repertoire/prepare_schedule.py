@@ -20,7 +20,7 @@ from snakewalk.controller.run.run_keys import OF_A_SCHEDULE, checked_keys
 def prepare_repertoire(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> ScheduleRun:
     """Recorded actions played by a schedule of speeds and turns."""
     if run.repertoire is None:
-        raise InputError(f"run {run.name}: made again by: snakewalk repertoire run PLAN")
+        raise InputError(f"run {run.name}: made again by: snakewalk gait repertoire run PLAN")
     return ScheduleRun(run, robot, world)
 
 

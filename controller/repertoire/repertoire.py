@@ -100,7 +100,7 @@ def load_repertoire(path: Path) -> Repertoire:
     """
     if not path.is_file():
         raise InputError(
-            f"{path}: no such file; make one by: snakewalk repertoire record -o {path}"
+            f"{path}: no such file; make one by: snakewalk gait repertoire record -o {path}"
         )
     try:
         held, _ = read_arrays(path)
@@ -114,7 +114,7 @@ def load_repertoire(path: Path) -> Repertoire:
         )
     except (KeyError, TypeError, AttributeError, ValueError):
         raise InputError(
-            f"{path}: not a repertoire; snakewalk repertoire record makes one"
+            f"{path}: not a repertoire; snakewalk gait repertoire record makes one"
         ) from None
     if not segments:
         raise InputError(f"{path}: a repertoire without actions")

@@ -71,8 +71,8 @@ def plan_route(
     flat(ground)
     if not file.is_file():
         raise InputError(
-            f"{file}: no such file; make one by: snakewalk repertoire record --robot {run.robot} "
-            f"--world {run.world} -o {file}"
+            f"{file}: no such file; make one by: snakewalk gait repertoire record "
+            f"--robot {run.robot} --world {run.world} -o {file}"
         )
     repertoire = load_repertoire(file)
     repertoire.check(body)

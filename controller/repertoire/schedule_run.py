@@ -159,7 +159,7 @@ class ScheduleRun(PathlessRun):
         return (
             f"{self.config.file}: the nearest action to {asked[0]:g} m/s and {asked[1]:g} rad/s "
             f"(from {since_s:.1f} s) is {control.text(control.nearest(*asked))}; "
-            "`snakewalk repertoire show` lists all actions"
+            "`snakewalk gait repertoire show` lists all actions"
         )
 
     def _first_lasting(

@@ -3,6 +3,6 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "report", "Make report.html, summary.json and film.mp4 again from a log.", "snakewalk.controller.report.commands.report:report", "The job"),
-    ("results", "report", "Make ``summary.json``, ``report.html`` and ``film.mp4`` in ``folder`` from a record.", "snakewalk.controller.report.artifacts:make_artifacts", ""),
+    ("command", "log report", "Make report.html, summary.json and film.mp4 again from a log.", "snakewalk.controller.report.commands.report:report"),
+    ("results", "report", "Make ``summary.json``, ``report.html`` and ``film.mp4`` in ``folder`` from a record.", "snakewalk.controller.report.artifacts:make_artifacts"),
 )

@@ -3,7 +3,7 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "ros", "Connect a robot or the simulator to ROS 2, which can command, watch and stop it.", "snakewalk.controller.ros.commands.ros:ros", "The job"),
-    ("observer", "ros", "ROS 2 node that publishes a run and offers a stop service.", "snakewalk.controller.ros.ros_link:open_node", ""),
-    ("pose", "ros", "Poses of a ROS 2 topic: ros:/TOPIC, or ros:/tf:FRAME.", "snakewalk.controller.ros.ros_pose:RosPose", ""),
+    ("command", "ros", "Connect robot or simulator to ROS 2: command, watch and stop.", "snakewalk.controller.ros.commands.ros:ros"),
+    ("observer", "ros", "ROS 2 node that publishes a run and offers a stop service.", "snakewalk.controller.ros.ros_link:open_node"),
+    ("pose", "ros", "Poses of a ROS 2 topic: ros:/TOPIC, or ros:/tf:FRAME.", "snakewalk.controller.ros.ros_pose:RosPose"),
 )

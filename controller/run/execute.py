@@ -352,7 +352,7 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
     except DriverError as fault:  # says itself what it knows of torque
         if link.tripped is not None:
             log.event(clock.now_s(), "interrupt", str(fault), "warning")
-            fault.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
+            fault.add_note(f"log: {log.path}; its page: snakewalk log report {log.path}")
         raise
     except (KeyboardInterrupt, SystemExit, OSError) as stop:
         if not link.was_enabled:
@@ -362,7 +362,7 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
             stop.add_note("torque may be on: switch the supply off")
         if not isinstance(stop, OSError):
             log.event(clock.now_s(), "interrupt", torque, "warning")
-            stop.add_note(f"log: {log.path}; its page: snakewalk report {log.path}")
+            stop.add_note(f"log: {log.path}; its page: snakewalk log report {log.path}")
         raise
 
 
@@ -372,7 +372,7 @@ def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
         moved = travel(record)
         return record, write_summary(summary(record, moved), log.parent), moved
     except KeyboardInterrupt as stop:
-        stop.add_note(f"the run is whole: {log}; its page: snakewalk report {log}")
+        stop.add_note(f"the run is whole: {log}; its page: snakewalk log report {log}")
         raise
 
 

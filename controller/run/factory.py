@@ -53,7 +53,7 @@ def prepare_run(run: RunConfig, robot: RobotConfig, world: WorldConfig) -> Prepa
     if run.motion == "source":
         raise InputError(
             f"run {run.name}: its motion was the user's own, which no configuration holds; its "
-            "goals are sent again by: snakewalk replay LOG; a new run is made by prepare_source"
+            "goals are sent again by: snakewalk log replay LOG; a new run is made by prepare_source"
         )
     if run.motion not in WALKS:
         return _extension(run, robot, world)
@@ -133,7 +133,7 @@ def prepare_job(
     run = with_keys_of("run", run, keys)
     if run.motion == "kp" and not on_paper:
         raise InputError(
-            f"run {run.name}: kp is a motion on paper: snakewalk synthesise RUN --motion kp "
+            f"run {run.name}: kp is a motion on paper: snakewalk animal synthesise RUN --motion kp "
             "-o NAME, then snakewalk play NAME.npz"
         )
     if run.motion == "gait" and not run.waypoints_m:
@@ -143,7 +143,7 @@ def prepare_job(
     if run.motion == "repertoire":
         raise InputError(
             f"run {run.name}: planned by: snakewalk plan --with repertoire; without waypoints "
-            "played by: snakewalk repertoire play"
+            "played by: snakewalk gait repertoire play"
         )
     if run.motion == "source":
         raise InputError(f"run {run.name}: a source of your own is run by prepare_source")

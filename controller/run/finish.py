@@ -65,7 +65,7 @@ def write_artifacts(
     except KeyboardInterrupt as stop:
         log = folder / LOG
         if log.exists():
-            stop.add_note(f"the run is whole: {log}; its film: snakewalk report {log}")
+            stop.add_note(f"the run is whole: {log}; its film: snakewalk log report {log}")
         raise
     for line in made.notes:
         LOGGER.warning("%s", line)

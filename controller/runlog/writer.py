@@ -105,7 +105,7 @@ class RunLog:
         except OSError as fault:
             told = error if isinstance(error, OSError) else fault
             told.filename = told.filename or str(self._part)
-            told.add_note(f"the run up to there: snakewalk report {self._part}")
+            told.add_note(f"the run up to there: snakewalk log report {self._part}")
             if error is None:
                 raise
             return

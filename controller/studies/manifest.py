@@ -3,15 +3,15 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("backend", "processes", "Compiled simulator with bus and servos, one point per process at a time.", "snakewalk.controller.studies.sweep_backends:ProcessBackend", ""),
-    ("backend", "warp", "MuJoCo-Warp for many robots at once on a level floor; the argument is a Warp device.", "snakewalk.controller.studies.sweep_backends:WarpBackend", ""),
-    ("command", "compare", "Compare runs: their numbers, and the differences of run, robot and world.", "snakewalk.controller.studies.commands.compare:compare", "The job"),
-    ("command", "identify", "Find a servo's constants from its pendulum, or friction and mass from logs of runs.", "snakewalk.controller.studies.commands.identify:identify", "The bus"),
-    ("command", "replay", "Send a log's commands to simulated servos again; exit code 1 if the replies differ.", "snakewalk.controller.studies.commands.replay:replay", "The job"),
-    ("command", "shadow", "Send a log's goals to a simulated robot; exit code 1 if it names a cause of differences.", "snakewalk.controller.studies.commands.shadow:shadow", "The job"),
-    ("command", "sweep", "Measure gaits over their parameters: speed, cost of transport, torque, heat, slip.", "snakewalk.controller.studies.commands.sweep:sweep", "Motion"),
-    ("command", "trials", "Simulate runs or gaits over seeds; list how many arrived, and why others failed.", "snakewalk.controller.studies.commands.trials:trials", "The job"),
-    ("command", "tune", "Search a gait's parameters for speed or efficiency, and compare with the defaults.", "snakewalk.controller.studies.commands.tune:tune", "Motion"),
-    ("command", "walk", "Walk graphs of states until all are visited: number of steps, and how soon states repeat.", "snakewalk.controller.studies.commands.walk:walk", "Motion"),
-    ("observer", "shadow", "The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.", "snakewalk.controller.studies.shadow.run_shadow:RunShadow", ""),
+    ("backend", "processes", "Compiled simulator with bus and servos, one point per process at a time.", "snakewalk.controller.studies.sweep_backends:ProcessBackend"),
+    ("backend", "warp", "MuJoCo-Warp for many robots at once on a level floor; the argument is a Warp device.", "snakewalk.controller.studies.sweep_backends:WarpBackend"),
+    ("command", "animal graph", "Walk graphs of states until all are visited: number of steps, and how soon states repeat.", "snakewalk.controller.studies.commands.walk:walk"),
+    ("command", "gait sweep", "Measure gaits over their parameters: speed, cost of transport, torque, heat, slip.", "snakewalk.controller.studies.commands.sweep:sweep"),
+    ("command", "gait tune", "Search a gait's parameters for speed or efficiency, and compare with the defaults.", "snakewalk.controller.studies.commands.tune:tune"),
+    ("command", "log compare", "Compare runs: their numbers, and the differences of run, robot and world.", "snakewalk.controller.studies.commands.compare:compare"),
+    ("command", "log replay", "Send a log's commands to simulated servos again; exit code 1 if the replies differ.", "snakewalk.controller.studies.commands.replay:replay"),
+    ("command", "log shadow", "Send a log's goals to a simulated robot; exit code 1 if it names a cause of differences.", "snakewalk.controller.studies.commands.shadow:shadow"),
+    ("command", "robot identify", "Find a servo's constants from its pendulum, or friction and mass from logs of runs.", "snakewalk.controller.studies.commands.identify:identify"),
+    ("command", "trials run", "Simulate runs or gaits over seeds; list how many arrived, and why others failed.", "snakewalk.controller.studies.commands.trials:trials"),
+    ("observer", "shadow", "The shadow of a run: logs each cycle, raises the alarm, and names the cause at the end.", "snakewalk.controller.studies.shadow.run_shadow:RunShadow"),
 )

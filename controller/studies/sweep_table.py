@@ -74,7 +74,7 @@ class SweepTable(CsvTable):
             path,
             columns=COLUMNS,
             place=_PLACE,
-            command="sweep",
+            command="gait sweep",
             keeps_rows=False,
             optional=_ADDED,
         )

@@ -35,7 +35,7 @@ class TrialsTable(CsvTable):
             InputError: the file is something else.
 
         """
-        super().__init__(path, columns=COLUMNS, place=_PLACE, command="trials")
+        super().__init__(path, columns=COLUMNS, place=_PLACE, command="trials run")
         self._configs, self._spread = dict(configs), f"{spread_m:g}"
 
     def finished(self, planned: Sequence[tuple[Case, int]]) -> list[Trial]:

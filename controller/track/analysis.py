@@ -28,7 +28,7 @@ LEAST_TRAVEL = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """The results of ``snakewalk analyse``."""
+    """The results of ``snakewalk animal analyse``."""
 
     track: Track
     wave: Wave

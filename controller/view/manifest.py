@@ -3,6 +3,6 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "view", "Show a log in the browser: body, path, servos and curves, with a time slider. ^C ends it.", "snakewalk.controller.view.commands.view:view", "The job"),
-    ("observer", "page", "Live web page of a run, with a stop button.", "snakewalk.controller.view.live_view:open_page", ""),
+    ("command", "view", "Show a log in the browser: body, path, servos and curves.", "snakewalk.controller.view.commands.view:view"),
+    ("observer", "page", "Live web page of a run, with a stop button.", "snakewalk.controller.view.live_view:open_page"),
 )

@@ -379,7 +379,7 @@ class DynamixelBus:
             if result == sdk.COMM_RX_TIMEOUT:
                 reason = "no answer"
             baud = self.port.getBaudRate()
-            find = "; find it with snakewalk scan" if what == "ping" else ""
+            find = "; find it with snakewalk bus scan" if what == "ping" else ""
             raise NoAnswerError(f"servo {servo_id}: {what}: {reason} at {baud} baud{find}")
 
 

@@ -126,7 +126,7 @@ def inspect(
             if len(missing) == len(on_it) > 1:
                 text = (
                     f"{port}: no answer from any of the servos {whole} at {baud} baud: power, "
-                    f"cable, baud rate or another make; snakewalk scan --port {port} lists the "
+                    f"cable, baud rate or another make; snakewalk bus scan --port {port} lists the "
                     "servos that reply"
                 )
             faults.append(ChainFault(FaultCause.NO_ANSWER, text))

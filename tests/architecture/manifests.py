@@ -11,12 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from snakewalk.controller.console import command as declarations
-
 ROOT: Final = Path(__file__).resolve().parents[2]
-_GROUPS: Final = {
-    name: value for name, value in vars(declarations).items() if name.isupper() and name[0] != "_"
-}
 
 
 def rows(package: Path) -> list[tuple[str, ...]]:
@@ -36,18 +31,9 @@ def _declared(file: Path) -> Iterator[tuple[str, ...]]:
                 continue
             words = [a.value for a in decorator.args if isinstance(a, ast.Constant)]
             if decorator.func.id == "command":
-                yield "command", str(words[0]), about, f"{module}:{node.name}", _group(decorator)
+                yield "command", str(words[0]), about, f"{module}:{node.name}"
             elif decorator.func.id == "plugin":
-                yield str(words[0]), str(words[1]), about, f"{module}:{node.name}", ""
-
-
-def _group(decorator: ast.Call) -> str:
-    for keyword in decorator.keywords:
-        if keyword.arg == "group":
-            if isinstance(keyword.value, ast.Name):
-                return str(_GROUPS[keyword.value.id])
-            return str(ast.literal_eval(keyword.value))
-    return ""
+                yield str(words[0]), str(words[1]), about, f"{module}:{node.name}"
 
 
 def text(package: Path) -> str:

@@ -88,8 +88,14 @@ def test_a_table_of_recordings_is_written_between_its_marks(
     assert "old" not in text
     assert "`python -m benchmarks.run_tables recordings.slowing --data DIR`, commit `" in text
     assert "/films" not in text
-    assert ("track", "worm-like") in asked
-    assert ("track", "/films/worm-joint-angles/kymogram_omega-turn.npy", "--rate", "32") in asked
+    assert ("animal", "track", "worm-like") in asked
+    assert (
+        "animal",
+        "track",
+        "/films/worm-joint-angles/kymogram_omega-turn.npy",
+        "--rate",
+        "32",
+    ) in asked
     assert capsys.readouterr().out.strip() in text
 
 
@@ -117,8 +123,8 @@ def test_each_table_has_its_place_on_a_page(name: str) -> None:
 
 
 def test_a_command_that_prints_no_json_stops_the_table() -> None:
-    with pytest.raises(SystemExit, match="snakewalk track nothing"):
-        run_tables.snakewalk("track", "nothing.csv")
+    with pytest.raises(SystemExit, match="snakewalk animal track nothing"):
+        run_tables.snakewalk("animal", "track", "nothing.csv")
 
 
 def test_an_unknown_table_is_refused(

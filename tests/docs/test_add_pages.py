@@ -115,7 +115,7 @@ def test_a_command_is_listed_and_runs(extended: Extended) -> None:
 
 
 def test_a_fault_kind_is_accepted_and_played(extended: Extended) -> None:
-    assert '"hang"' in only(extended.shown, "schema faults")
+    assert '"hang"' in only(extended.shown, "tools schema faults")
     assert any("hang.toml" in line for line in extended.shown)
 
 

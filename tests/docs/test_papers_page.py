@@ -28,7 +28,7 @@ def test_every_row_has_a_command_and_a_test_or_a_reason() -> None:
 
 
 def test_every_command_is_complete() -> None:
-    """The page named commands without the arguments that they need, such as ``snakewalk body``."""
+    """The page named commands without required arguments, such as ``snakewalk animal body``."""
     commands = {row[2].strip("`") for row in ROWS if row[2] != "-"}
     assert len(commands) > 25
     for words in commands:
@@ -38,7 +38,7 @@ def test_every_command_is_complete() -> None:
 
 
 def test_a_command_with_a_missing_or_unknown_word_is_not_complete() -> None:
-    for words in (["body"], ["people", "walk", "--bogus"], ["terrain", "none"]):
+    for words in (["animal", "body"], ["animal", "people", "walk", "--bogus"], ["world", "none"]):
         with pytest.raises(Exception, match=r"Missing|No such"):
             parsed(words)
 

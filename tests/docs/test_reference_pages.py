@@ -39,7 +39,7 @@ def test_each_command_is_on_one_page(pages: ModuleType) -> None:
 
 
 def test_a_command_has_its_options_and_examples(pages: ModuleType) -> None:
-    text = filled(pages, "reference/commands-bus")
+    text = filled(pages, "reference/commands-robot")
     section = text.partition("## snakewalk bus set\n")[2].partition("\n## ")[0]
     assert "| `--new-baud` | `<int>` | new baud rate in bit/s |  |" in section
     assert "| `--id` | `<int>` | ID of the servo, 0 to 252 | required |" in section
@@ -56,6 +56,6 @@ def test_every_topic_is_on_its_page_with_all_fields(pages: ModuleType) -> None:
         )
 
 
-def test_an_unknown_group_ends_the_build(pages: ModuleType) -> None:
-    with pytest.raises(ValueError, match="no command is in this group"):
+def test_an_unknown_command_ends_the_build(pages: ModuleType) -> None:
+    with pytest.raises(ValueError, match="no such command"):
         pages.commands("nosuch")

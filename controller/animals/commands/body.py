@@ -1,4 +1,4 @@
-"""``snakewalk body``: a solid body from skeletons and widths, and a skin that moves."""
+"""``snakewalk animal body``: a solid body from skeletons and widths, and a skin that moves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ from snakewalk.controller.animals.mesh.mesh import body_mesh, picture_around
 from snakewalk.controller.animals.mesh.rig import spine_rig
 from snakewalk.controller.animals.mesh.skin_file import write_skin
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import RECORDINGS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
@@ -93,9 +93,8 @@ Frame = Annotated[
 
 
 @command(
-    "body",
-    group=RECORDINGS,
-    examples=("body worm-like -o worm.glb", "body TRACK.npz --image 0.png -o b.obj"),
+    "animal body",
+    examples=("animal body worm-like -o worm.glb", "animal body TRACK.npz --image 0.png -o b.obj"),
 )
 def body(
     track: Annotated[

@@ -1,4 +1,4 @@
-"""``snakewalk fish film``: films of a fish whose every angle is known."""
+"""``snakewalk animal fish film``: films of a fish whose every angle is known."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,8 +15,11 @@ from snakewalk.controller.console.progress import ProgressBar
 
 
 @command(
-    "fish film",
-    examples=("fish film tank --side", "fish film eel --motion MIDLINES.csv --build eel"),
+    "animal fish film",
+    examples=(
+        "animal fish film tank --side",
+        "animal fish film eel --motion MIDLINES.csv --build eel",
+    ),
 )
 def film(
     folder: Annotated[Path, typer.Argument(help="folder for the frames and truth.npz")],

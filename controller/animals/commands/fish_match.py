@@ -1,4 +1,4 @@
-"""``snakewalk fish match``: postures of a fish from film."""
+"""``snakewalk animal fish match``: postures of a fish from film."""
 
 from pathlib import Path
 from typing import Annotated
@@ -26,10 +26,10 @@ Rate = Annotated[
 
 
 @command(
-    "fish match",
+    "animal fish match",
     examples=(
-        "fish match top.mp4 --side side.mp4 -o postures.npz",
-        "fish match tank/top --background tank/top-background.png --picture match.png",
+        "animal fish match top.mp4 --side side.mp4 -o postures.npz",
+        "animal fish match tank/top --background tank/top-background.png --picture match.png",
     ),
     results=("output", "picture"),
 )

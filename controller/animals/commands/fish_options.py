@@ -1,4 +1,4 @@
-"""Options that several ``snakewalk fish`` commands have."""
+"""Options that several ``snakewalk animal fish`` commands have."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""``snakewalk fish synthesise``: new motion from segments of a film."""
+"""``snakewalk animal fish synthesise``: new motion from segments of a film."""
 
 import math
 from itertools import pairwise
@@ -27,15 +27,15 @@ from snakewalk.controller.console.result_files import (
 
 
 @command(
-    "fish synthesise",
+    "animal fish synthesise",
     examples=(
-        "fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
-        "fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
+        "animal fish synthesise postures.npz --seconds 30 --seed 1 -o track.npz",
+        "animal fish synthesise postures.npz --through 3,0 --through 5,3 --mirror",
     ),
     results=("output", "picture"),
 )
 def synthesise(
-    postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk fish match")],
+    postures: Annotated[Path, typer.Argument(help="postures.npz of snakewalk animal fish match")],
     through: Annotated[
         list[str] | None,
         typer.Option(help="control point X,Y or X,Y,Z; may be repeated"),

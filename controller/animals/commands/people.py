@@ -1,4 +1,4 @@
-"""``snakewalk people``: a person who walks or runs, as a looping glTF, a film and a picture."""
+"""``snakewalk animal people``: a person who walks or runs, as looping glTF, film and picture."""
 
 from pathlib import Path
 from types import ModuleType
@@ -25,7 +25,7 @@ from snakewalk.controller.animals.people.feet_law import MOTIONS, FeetLaw
 from snakewalk.controller.animals.people.surface import Person
 from snakewalk.controller.animals.people.worn_mesh import worn_mesh
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import RECORDINGS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
@@ -37,12 +37,11 @@ from snakewalk.controller.images.mesh_files import read_mesh
 
 
 @command(
-    "people",
-    group=RECORDINGS,
+    "animal people",
     examples=(
-        "people walk --picture walk.png",
-        "people run -o run.glb --film run.mp4",
-        "people walk --feet printed --film printed.mp4",
+        "animal people walk --picture walk.png",
+        "animal people run -o run.glb --film run.mp4",
+        "animal people walk --feet printed --film printed.mp4",
     ),
 )
 def people(

@@ -1,4 +1,4 @@
-"""Photographs of ``snakewalk body``: their options, files and the texture of the skin."""
+"""Photographs of ``snakewalk animal body``: their options, files and the texture of the skin."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""``snakewalk stride``: from a tracked animal with legs to an animal's file."""
+"""``snakewalk animal stride``: from a tracked animal with legs to an animal's file."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +8,7 @@ import typer
 from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
 from snakewalk.controller.animals.legged.views import VIEWS
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import RECORDINGS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Force,
     Individual,
@@ -28,12 +28,11 @@ from snakewalk.controller.track.readers.load import load_keypoints
 
 
 @command(
-    "stride",
-    group=RECORDINGS,
+    "animal stride",
     examples=(
-        "stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip "
+        "animal stride TRACKED.h5 --spine nose,neck,hip,tail --girdles neck,hip "
         "--feet FL,FR,HL,HR -o mine.toml --picture stride.png",
-        "synthesise jacksboro-traverse --animal mine.toml --film",
+        "animal synthesise jacksboro-traverse --animal mine.toml --film",
     ),
 )
 def stride(

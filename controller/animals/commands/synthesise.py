@@ -1,4 +1,4 @@
-"""``snakewalk synthesise``: a motion without a robot."""
+"""``snakewalk animal synthesise``: a motion without a robot."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +13,7 @@ from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
 from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis
 from snakewalk.controller.animals.synthesis.tongue import TongueRecord
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import MOTION, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
@@ -96,17 +96,18 @@ Film = Annotated[
 Glb = Annotated[bool, typer.Option("--glb", help="write the skin as animated glTF to NAME.glb")]
 Look = Annotated[
     str,
-    typer.Option(help="body in film and glTF: animal, or a BODY that `snakewalk body` accepts"),
+    typer.Option(
+        help="body in film and glTF: animal, or a BODY that `snakewalk animal body` accepts"
+    ),
 ]
 
 
 @command(
-    "synthesise",
-    group=MOTION,
+    "animal synthesise",
     examples=(
-        "synthesise -o motion",
-        "synthesise my-run.toml --seed 3 --json",
-        "synthesise jacksboro-traverse --animal lizard -o lizard --film",
+        "animal synthesise -o motion",
+        "animal synthesise my-run.toml --seed 3 --json",
+        "animal synthesise jacksboro-traverse --animal lizard -o lizard --film",
     ),
 )
 def synthesise(
@@ -182,7 +183,7 @@ def _snake(
         raise InputError(f"--look {look}: is for --film and --glb")
     made = SnakeSynthesis(prepared, tongue).synthesise(frames)
     with atomic_write(files["track"]) as part:
-        made.save(part, files["track"].stem, f"snakewalk synthesise of {prepared.run.track}")
+        made.save(part, files["track"].stem, f"snakewalk animal synthesise of {prepared.run.track}")
     draw_walk(
         made, prepared.ground, files["picture"], f"{prepared.run.name}: {prepared.world.name}"
     )

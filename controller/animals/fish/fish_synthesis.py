@@ -51,7 +51,7 @@ class SynthesisOptions:
     tank: tuple[float, float, float, float] | None = None
     """Lowest x and y, highest x and y of the walls; None: no walls."""
     avoid: tuple[Path, ...] = ()
-    """Motions of other fish, made by ``fish synthesise``."""
+    """Motions of other fish, made by ``animal fish synthesise``."""
     apart: float = 0.5
     """Least distance from walls and other fish, body lengths."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -222,7 +222,9 @@ def _surroundings(source: Postures, options: SynthesisOptions) -> Surroundings:
     for file in options.avoid:
         held, _ = read_arrays(file, {"base", "rate_hz"})
         if set(held) != {"base", "rate_hz"}:
-            raise InputError(f"{file}: is not a track of snakewalk fish synthesise; make one")
+            raise InputError(
+                f"{file}: is not a track of snakewalk animal fish synthesise; make one"
+            )
         base, rate_hz = np.asarray(held["base"], float), float(held["rate_hz"])
         time_s = np.arange(len(base)) / rate_hz
         even = np.arange(0.0, time_s[-1] + 1e-9, 1.0 / source.rate_hz)

@@ -173,17 +173,18 @@ def load_postures(path: Path) -> Postures:
     try:
         held, _ = read_arrays(path)
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file; snakewalk fish match writes one") from None
+        raise InputError(f"{path}: no such file; snakewalk animal fish match writes one") from None
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder; postures are an .npz") from None
     except (ValueError, OSError):
         raise InputError(
-            f"{path}: holds no postures; snakewalk fish match writes them, as .npz"
+            f"{path}: holds no postures; snakewalk animal fish match writes them, as .npz"
         ) from None
     missing = _POSTURES - held.keys()
     if missing:
         raise InputError(
-            f"{path}: lacks {', '.join(sorted(missing))}; postures come from snakewalk fish match"
+            f"{path}: lacks {', '.join(sorted(missing))}; "
+            "postures come from snakewalk animal fish match"
         )
     length_m = float(held.get("length_m", np.array(np.nan)))
     joints_at = tuple(float(at) for at in held["joints_at"])

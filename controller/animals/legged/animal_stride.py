@@ -17,7 +17,7 @@ from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypo
 
 _FEWEST_POINTS = 3
 _HEAD = """An animal by the stride of a tracked one; height, knees and skin are those of {like}.
-  snakewalk synthesise jacksboro-traverse --animal {name}.toml --film
+  snakewalk animal synthesise jacksboro-traverse --animal {name}.toml --film
 A line behind # shows a key with its default."""
 
 

@@ -1,4 +1,4 @@
-"""The body in a film by name: servos, the captured animal, or any skin of ``snakewalk body``."""
+"""The body in a film by name: servos, captured animal, or a skin of ``snakewalk animal body``."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -72,8 +72,8 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
 def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
     """Times (T,) and spines (T, P, 3) of a recording.
 
-    A fish is where it swam, with its lowest place on the ground. A track of ``synthesise`` has its
-    own heights. All others lie level on the ground.
+    A fish is where it swam, with its lowest place on the ground. A track of ``animal synthesise``
+    has its own heights. All others lie level on the ground.
     """
     path = Path(source)
     if holds_postures(path):

@@ -127,7 +127,9 @@ def fish_skin(file: Path) -> SkinConfig:
     """
     fish = load_postures(file).model
     if fish is None:
-        raise InputError(f"{file}: holds no fish; snakewalk fish match writes one from a film")
+        raise InputError(
+            f"{file}: holds no fish; snakewalk animal fish match writes one from a film"
+        )
     plain, config = fish_model(fish.build), load(locate("skins", fish.build), SkinConfig)
     higher = float(np.median(fish.half_height / plain.half_height))
     at = np.linspace(0.0, 1.0, len(fish.half_width))

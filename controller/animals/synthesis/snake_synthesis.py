@@ -148,7 +148,7 @@ class SynthesisedWalk:
             length_m=float(np.hypot(*np.diff(self.plan.points_m[0], axis=0).T).sum()),
             name=name,
             source=source,
-            licence="made by snakewalk synthesise",
+            licence="made by snakewalk animal synthesise",
             height_m=points[..., 2],
             radius_m=self.half_height_m,
             speed_m_s=self.plan.speed_m_s,

@@ -1,4 +1,4 @@
-"""``snakewalk bus identify``: the servos on a bus, and a robot file to begin with."""
+"""``snakewalk bus inventory``: the servos on a bus, and a robot file to begin with."""
 
 import json
 from pathlib import Path
@@ -17,8 +17,8 @@ from snakewalk.controller.console.result_files import atomic_write
 
 
 @command(
-    "bus identify",
-    examples=("bus identify", "bus identify --baud 1000000 -o mine.toml"),
+    "bus inventory",
+    examples=("bus inventory", "bus inventory --baud 1000000 -o mine.toml"),
     results=("out",),
 )
 def bus_identify(
@@ -77,4 +77,6 @@ def bus_identify(
         )
     console.print(table)
     if out is not None:
-        console.print(f"robot {out}: set its joint_axes, then: snakewalk calibrate --robot {out}")
+        console.print(
+            f"robot {out}: set its joint_axes, then: snakewalk bus calibrate --robot {out}"
+        )

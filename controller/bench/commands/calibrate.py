@@ -1,4 +1,4 @@
-"""``snakewalk calibrate``: find the joint of each servo, and write the robot's file."""
+"""``snakewalk bus calibrate``: find the joint of each servo, and write the robot's file."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from snakewalk.controller.bench.fingerprints import read_fingerprints, write_fin
 from snakewalk.controller.bench.homing_offset import homing_written, plan_homing, without_zeros
 from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import BUS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Port, console, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
@@ -43,7 +43,7 @@ ToEeprom = Annotated[
 ]
 
 
-@command("calibrate", group=BUS, examples=("calibrate --robot alternating16 -o my-robot.toml",))
+@command("bus calibrate", examples=("bus calibrate --robot alternating16 -o my-robot.toml",))
 def calibrate(
     out: Annotated[Path, typer.Option("--out", "-o", help="write the robot's file here (.toml)")],
     robot: Annotated[
@@ -87,7 +87,7 @@ def calibrate(
     device = pick_port(port)
     if resume:
         typer.echo(f"{answers.path}: {journal.known.summary}", err=True)
-    heading = f"Found by snakewalk calibrate, like {like.name}."
+    heading = f"Found by snakewalk bus calibrate, like {like.name}."
     facts: dict[str, object] = {"robot": str(out)}
     with (
         open_port(device, baud or like.servo.baud) as line,

@@ -1,15 +1,15 @@
-"""``snakewalk compile``: compile all loops in advance."""
+"""``snakewalk tools compile``: compile all loops in advance."""
 
 import importlib.util
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.loop_compiler import compile_loops
 from snakewalk.controller.console.options import Json, show
 from snakewalk.controller.console.progress import ProgressBar
 
 
-@command("compile", group=JOB, examples=("compile", "compile --json"))
+@command("tools compile", examples=("tools compile", "tools compile --json"))
 def compile_all(as_json: Json = False) -> None:
     """Compile all loops once, after installation, so that no later command waits for it."""
     if importlib.util.find_spec("numba") is None:

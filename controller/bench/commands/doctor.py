@@ -21,7 +21,7 @@ from snakewalk.controller.bench.port_lines import PortLines, open_lines
 from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.bench.servo_checks import unnamed_robot
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import BUS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.finding import Finding
 from snakewalk.controller.console.findings_table import show_findings
@@ -42,9 +42,7 @@ DoctorPort = Annotated[
 ]
 
 
-@command(
-    "doctor", group=BUS, examples=("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16")
-)
+@command("doctor", examples=("doctor", "doctor --port /dev/ttyUSB0 --robot alternating16"))
 def doctor(
     port: DoctorPort = None,
     robot: Robot = None,

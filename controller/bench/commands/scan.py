@@ -1,4 +1,4 @@
-"""``snakewalk scan``: the servos on the bus."""
+"""``snakewalk bus scan``: the servos on the bus."""
 
 import json
 from typing import Annotated
@@ -8,12 +8,12 @@ from rich.table import Table
 
 from snakewalk.controller.bench import scan as scanning
 from snakewalk.controller.bench.port_lines import open_lines
-from snakewalk.controller.console.command import BUS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.options import ChainPort, Json, console
 
 
-@command("scan", group=BUS, examples=("scan", "scan --port /dev/ttyUSB0 --baud 57600 --json"))
+@command("bus scan", examples=("bus scan", "bus scan --port /dev/ttyUSB0 --baud 57600 --json"))
 def scan(
     port: ChainPort = None,
     baud: Annotated[

@@ -43,5 +43,7 @@ Tracker = Annotated[
 ]
 TruthFile = Annotated[
     Path | None,
-    typer.Option("--truth", help="write the true poses here as JSON lines, for `snakewalk judge`"),
+    typer.Option(
+        "--truth", help="write the true poses here as JSON lines, for `snakewalk log judge`"
+    ),
 ]

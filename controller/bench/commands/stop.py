@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.bench import emergency_stop
 from snakewalk.controller.bench.scan import check_bauds, pick_port
 from snakewalk.controller.bench.torque_off import torque_off
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import stderr_console
 from snakewalk.controller.console.options import Json, console
 from snakewalk.drivers.errors import PortError
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 @command(
     "stop",
-    group=JOB,
     examples=("stop", "stop --port /dev/ttyUSB0 --json", "stop runs/flat-square-walk-seed0"),
 )
 def stop(
@@ -47,7 +46,10 @@ def stop(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Stop a run at once, latched; without a run, switch off the torque of all servos on a port."""
+    """Stop a run at once; without a run, switch off the servos of a port.
+
+    The stop is latched. Without a run, all servos on the port lose their torque.
+    """
     if run is not None and port is not None:
         raise InputError("stop: a run and --port exclude each other; leave one out")
     who = f"snakewalk stop (process {os.getpid()})"

@@ -1,4 +1,4 @@
-"""``snakewalk camera board``: the board of a calibration, to print."""
+"""``snakewalk pose board``: the board of a calibration, to print."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -39,8 +39,8 @@ def read_squares(text: str) -> tuple[int, int]:
 
 
 @command(
-    "camera board",
-    examples=("camera board -o board.pdf", "camera board -o a3.pdf --squares 9x6 --square 42"),
+    "pose board",
+    examples=("pose board -o board.pdf", "pose board -o a3.pdf --squares 9x6 --square 42"),
     results=("out",),
 )
 def board(
@@ -53,7 +53,7 @@ def board(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw the board for `camera calibrate`; print it without scaling, and glue it to a plate."""
+    """Draw the board for `pose calibrate`; print it without scaling, and glue it to a plate."""
     made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
     check_print(out)
     write_print(out, [made.picture(DOTS)])

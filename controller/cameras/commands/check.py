@@ -1,4 +1,4 @@
-"""``snakewalk camera check``: whether the overhead camera sees everything that a run needs."""
+"""``snakewalk pose camera``: whether the overhead camera sees everything that a run needs."""
 
 from contextlib import ExitStack
 from math import isnan
@@ -16,8 +16,8 @@ from snakewalk.controller.run.pose_provider import pose_faults
 
 
 @command(
-    "camera check",
-    examples=("camera check flat-square", "camera check my-run.toml --port /dev/ttyUSB0 --view"),
+    "pose camera",
+    examples=("pose camera flat-square", "pose camera my-run.toml --port /dev/ttyUSB0 --view"),
 )
 def check(
     run: RunName = "flat-square",

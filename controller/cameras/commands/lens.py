@@ -1,4 +1,4 @@
-"""``snakewalk camera calibrate``: the lens of a camera from pictures of a board."""
+"""``snakewalk pose calibrate``: the lens of a camera from pictures of a board."""
 
 import math
 from pathlib import Path
@@ -35,10 +35,10 @@ _PAUSE_S = 0.7
 
 
 @command(
-    "camera calibrate",
+    "pose calibrate",
     examples=(
-        "camera calibrate pictures -o lens.yml",
-        "camera calibrate 0 -o lens.yml --size 1280x720",
+        "pose calibrate pictures -o lens.yml",
+        "pose calibrate 0 -o lens.yml --size 1280x720",
     ),
     results=("out",),
 )
@@ -59,7 +59,7 @@ def calibrate_camera(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Calibrate a camera's lens with OpenCV from pictures of the board of `camera board`.
+    """Calibrate a camera's lens with OpenCV from pictures of the board of `pose board`.
 
     Hold the board at 15 places or more, also in the corners of the picture, tilted by up to 45
     degrees.

@@ -1,4 +1,4 @@
-"""``snakewalk camera markers``: sheets for the floor, one marker a page."""
+"""``snakewalk pose markers``: sheets for the floor, one marker a page."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,8 +13,8 @@ from snakewalk.controller.console.options import Force, Json, show
 
 
 @command(
-    "camera markers",
-    examples=("camera markers -o markers.pdf", "camera markers -o a3.pdf --side 250 --count 4"),
+    "pose markers",
+    examples=("pose markers -o markers.pdf", "pose markers -o a3.pdf --side 250 --count 4"),
     results=("out",),
 )
 def markers(

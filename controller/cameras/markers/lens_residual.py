@@ -54,8 +54,8 @@ class Distortion:
         """Warning with its remedy."""
         return (
             f"the floor's markers show that the lens distorts: places are up to "
-            f"{1e3 * self.error_m:.0f} mm off; calibrate it (snakewalk camera board, snakewalk "
-            "camera calibrate) and set [camera] lens"
+            f"{1e3 * self.error_m:.0f} mm off; calibrate it (snakewalk pose board, snakewalk "
+            "pose calibrate) and set [camera] lens"
         )
 
 

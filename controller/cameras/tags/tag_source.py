@@ -61,7 +61,7 @@ class TagsPose:
                 f"pose: tags: camera.{key} is missing; {advice}"
                 for key, advice in (
                     ("device", "set the number, device or address of the camera"),
-                    ("lens", "calibrate it with snakewalk camera calibrate"),
+                    ("lens", "calibrate it with snakewalk pose calibrate"),
                 )
                 if getattr(camera, key) is None
             ]

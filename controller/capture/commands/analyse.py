@@ -1,4 +1,4 @@
-"""``snakewalk analyse``: the motion of a recorded animal."""
+"""``snakewalk animal analyse``: the motion of a recorded animal."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import RECORDINGS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Individual,
     Json,
@@ -28,7 +28,8 @@ from snakewalk.controller.track.readers.load import check_rate, load_track
 
 
 @command(
-    "analyse", group=RECORDINGS, examples=("analyse worm-like", "analyse MIDLINES.csv --picture .")
+    "animal analyse",
+    examples=("animal analyse worm-like", "animal analyse MIDLINES.csv --picture ."),
 )
 def analyse(
     recordings: Annotated[

@@ -1,4 +1,4 @@
-"""``snakewalk capture``: from a film of an animal to a track that the robot can walk."""
+"""``snakewalk animal capture``: from a film of an animal to a track that the robot can walk."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +10,7 @@ from rich.table import Table
 from snakewalk.controller.capture.capturing import capture_recording, correct_recording
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
-from snakewalk.controller.console.command import RECORDINGS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console, show
 
 Footage = Annotated[
@@ -116,15 +116,14 @@ Trail = Annotated[
 
 
 @command(
-    "capture",
-    group=RECORDINGS,
+    "animal capture",
     examples=(
-        "capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
-        "capture frames/ --cropped --overlay overlay.mp4 --force --json",
-        "capture film.mp4 --review review.html",
-        "capture plate.mp4 --animals auto --overlay overlay.mp4",
-        "capture dish.mp4 --animals 3 -o fish.csv --wide",
-        "capture track.npz --corrections track-corrections.json -o corrected.npz",
+        "animal capture film.mp4 -o track.npz --length-m 0.4 --sheet sheet.png",
+        "animal capture frames/ --cropped --overlay overlay.mp4 --force --json",
+        "animal capture film.mp4 --review review.html",
+        "animal capture plate.mp4 --animals auto --overlay overlay.mp4",
+        "animal capture dish.mp4 --animals 3 -o fish.csv --wide",
+        "animal capture track.npz --corrections track-corrections.json -o corrected.npz",
     ),
 )
 def capture(

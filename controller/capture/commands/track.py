@@ -1,4 +1,4 @@
-"""``snakewalk track``: properties of recordings, and the share of them that a robot can do."""
+"""``snakewalk animal track``: properties of recordings, and the share that a robot can do."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import RECORDINGS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Force,
     GivenRobot,
@@ -39,9 +39,8 @@ from snakewalk.controller.track.track import UNSURE_HEAD
 
 
 @command(
-    "track",
-    group=RECORDINGS,
-    examples=("track", "track MIDLINES.csv --rate 60 --picture track.png"),
+    "animal track",
+    examples=("animal track", "animal track MIDLINES.csv --rate 60 --picture track.png"),
     results=("picture", "output"),
 )
 def track(

@@ -1,4 +1,4 @@
-"""``snakewalk export``: a run's log for other programs."""
+"""``snakewalk log export``: a run's log for other programs."""
 
 import json
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
@@ -26,13 +26,12 @@ from snakewalk.controller.runlog.reader import read_log
 
 
 @command(
-    "export",
-    group=JOB,
+    "log export",
     examples=(
-        "export runs/flat-square-walk-seed0/log.mcap --csv tables",
-        "export runs/flat-square-walk-seed0/log.mcap --parquet tables --foxglove body.mcap",
-        "export runs/flat-square-walk-seed0/log.mcap --ros2 bag.mcap --json",
-        "export runs/flat-square-walk-seed0/log.mcap --csv tables --joint-numbers",
+        "log export runs/flat-square-walk-seed0/log.mcap --csv tables",
+        "log export runs/flat-square-walk-seed0/log.mcap --parquet tables --foxglove body.mcap",
+        "log export runs/flat-square-walk-seed0/log.mcap --ros2 bag.mcap --json",
+        "log export runs/flat-square-walk-seed0/log.mcap --csv tables --joint-numbers",
     ),
 )
 def export(

@@ -1,4 +1,4 @@
-"""``snakewalk policy learn``: a wave with its feedback, learnt by CMA-ES."""
+"""``snakewalk gait policy learn``: a wave with its feedback, learnt by CMA-ES."""
 
 from pathlib import Path
 from statistics import fmean
@@ -20,8 +20,11 @@ from snakewalk.controller.learning.wave_search import (
 
 
 @command(
-    "policy learn",
-    examples=("policy learn -o mine.toml", "policy learn --seed 1 --workers 8 -o one.toml"),
+    "gait policy learn",
+    examples=(
+        "gait policy learn -o mine.toml",
+        "gait policy learn --seed 1 --workers 8 -o one.toml",
+    ),
     results=("out",),
 )
 def learn_policy(
@@ -82,7 +85,7 @@ def learn_policy(
     with atomic_write(out) as part:
         part.write_text(policy.toml(), encoding="utf-8")
     part_file.unlink(missing_ok=True)
-    console.print(f"{out}: {policy.origin.steps} steps in all; snakewalk policy run {out}")
+    console.print(f"{out}: {policy.origin.steps} steps in all; snakewalk gait policy run {out}")
 
 
 def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:

@@ -1,4 +1,4 @@
-"""``snakewalk policy list``: the shipped policies."""
+"""``snakewalk gait policy list``: the shipped policies."""
 
 import json
 
@@ -10,7 +10,7 @@ from snakewalk.controller.console.options import Json, console
 from snakewalk.controller.motion.policy import load_policy
 
 
-@command("policy list", examples=("policy list --json",))
+@command("gait policy list", examples=("gait policy list --json",))
 def list_policies(as_json: Json = False) -> None:
     """List the shipped policies, and how each was learnt."""
     policies = [load_policy(name) for name in shipped("policies")]

@@ -1,4 +1,4 @@
-"""``snakewalk policy run``: a learnt policy on servos or in the simulator."""
+"""``snakewalk gait policy run``: a learnt policy on servos or in the simulator."""
 
 from typing import Annotated
 
@@ -26,11 +26,11 @@ Name = Annotated[
 
 
 @command(
-    "policy run",
+    "gait policy run",
     examples=(
-        "policy run wave-cma --seconds 10",
-        "policy run mine.toml --set world.friction.across=0.3 --json",
-        "policy run wave-ppo --port /dev/ttyUSB0",
+        "gait policy run wave-cma --seconds 10",
+        "gait policy run mine.toml --set world.friction.across=0.3 --json",
+        "gait policy run wave-ppo --port /dev/ttyUSB0",
     ),
 )
 def run_policy(

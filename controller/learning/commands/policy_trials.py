@@ -1,4 +1,4 @@
-"""``snakewalk policy trials``: policies compared with gaits."""
+"""``snakewalk trials policy``: policies compared with gaits."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -19,10 +19,10 @@ from snakewalk.controller.learning.policy_trials import PolicyTrial, PolicyTrial
 
 
 @command(
-    "policy trials",
+    "trials policy",
     examples=(
-        "policy trials wave-cma wave-ppo lateral-undulation --first-seed 1000",
-        "policy trials mine.toml wave-cma --world flat --world flat-friction-3 --json",
+        "trials policy wave-cma wave-ppo lateral-undulation --first-seed 1000",
+        "trials policy mine.toml wave-cma --world flat --world flat-friction-3 --json",
     ),
 )
 def policy_trials(

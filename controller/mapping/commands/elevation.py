@@ -1,4 +1,4 @@
-"""``snakewalk terrain from``: a world from a file of real ground."""
+"""``snakewalk world from``: a world from a file of real ground."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -82,11 +82,11 @@ Classes = Annotated[
 
 
 @command(
-    "terrain from",
+    "world from",
     examples=(
-        "terrain from dem.tif --scale 0.002 -o hill.toml --picture hill.png",
-        "terrain from scan.pcd --crop 20,50,80,150 --scale 0.05 --fill 0.3 -o slope.toml",
-        "terrain from heights.png --cell 0.05 --height-step 0.001 -o garden.toml",
+        "world from dem.tif --scale 0.002 -o hill.toml --picture hill.png",
+        "world from scan.pcd --crop 20,50,80,150 --scale 0.05 --fill 0.3 -o slope.toml",
+        "world from heights.png --cell 0.05 --height-step 0.001 -o garden.toml",
     ),
 )
 def elevation(

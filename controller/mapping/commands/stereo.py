@@ -1,4 +1,4 @@
-"""``snakewalk terrain from-stereo``: a world from a calibrated pair of pictures."""
+"""``snakewalk world stereo``: a world from a calibrated pair of pictures."""
 
 import math
 from dataclasses import replace
@@ -68,10 +68,10 @@ Scale = Annotated[float, typer.Option(help="metres in the robot's world per metr
 
 
 @command(
-    "terrain from-stereo",
+    "world stereo",
     examples=(
-        "terrain from-stereo left.png right.png --calibration stereo.yml -o yard.toml",
-        "terrain from-stereo l.png r.png --calibration c.yml --height 0.5 --tilt 30 -o yard.toml",
+        "world stereo left.png right.png --calibration stereo.yml -o yard.toml",
+        "world stereo l.png r.png --calibration c.yml --height 0.5 --tilt 30 -o yard.toml",
     ),
 )
 def stereo(

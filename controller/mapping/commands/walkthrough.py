@@ -1,4 +1,4 @@
-"""``snakewalk terrain walkthrough``: a film along several stereo positions, and their ground."""
+"""``snakewalk world walkthrough``: a film along several stereo positions, and their ground."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -48,10 +48,10 @@ Alone = Annotated[
 
 
 @command(
-    "terrain walkthrough",
+    "world walkthrough",
     examples=(
-        "terrain walkthrough positions.toml -o film.mp4",
-        "terrain walkthrough positions.toml -o film.mp4 --world ravine.toml --spacing 0.02",
+        "world walkthrough positions.toml -o film.mp4",
+        "world walkthrough positions.toml -o film.mp4 --world ravine.toml --spacing 0.02",
     ),
 )
 def walkthrough(

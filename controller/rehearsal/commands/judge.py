@@ -1,11 +1,11 @@
-"""``snakewalk judge``: compare a run with the truth of the robot that was served."""
+"""``snakewalk log judge``: compare a run with the truth of the robot that was served."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json, show
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.rehearsal.judgement import judge as judged
@@ -13,7 +13,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.truth import read_truth
 
 
-@command("judge", group=JOB, examples=("judge truth.jsonl runs/my-run/log.mcap",))
+@command("log judge", examples=("log judge truth.jsonl runs/my-run/log.mcap",))
 def judge(
     truth: Annotated[Path, typer.Argument(help="file of `snakewalk bus serve --truth`")],
     log: Annotated[Path, typer.Argument(help="log.mcap of the run")],

@@ -1,4 +1,4 @@
-"""``snakewalk rehearse``: many runs against served robots, in simulated time."""
+"""``snakewalk trials rehearse``: many runs against served robots, in simulated time."""
 
 import json
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from rich.table import Table
 from snakewalk.config.loader import checked
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import FirstSeed, Json, console, key_values
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
@@ -26,9 +26,11 @@ _TRACKER = {"noise_m": 0.01, "noise_deg": 3.0, "delay_s": 0.1}
 
 
 @command(
-    "rehearse",
-    group=JOB,
-    examples=("rehearse flat-slalom --seeds 3", "rehearse --errors --seeds 20 -o errors.jsonl"),
+    "trials rehearse",
+    examples=(
+        "trials rehearse flat-slalom --seeds 3",
+        "trials rehearse --errors --seeds 20 -o errors.jsonl",
+    ),
 )
 def rehearse_runs(
     runs: Annotated[

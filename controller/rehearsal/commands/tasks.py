@@ -1,4 +1,4 @@
-"""``snakewalk tasks``: controllers on twelve tasks, as one table."""
+"""``snakewalk trials tasks``: controllers on twelve tasks, as one table."""
 
 import json
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import FirstSeed, Json, console
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
@@ -28,12 +28,11 @@ from snakewalk.controller.rehearsal.tasks import (
 
 
 @command(
-    "tasks",
-    group=JOB,
+    "trials tasks",
     examples=(
-        "tasks --conditions",
-        "tasks slalom pegs --controller walk --controller gait --json",
-        "tasks --controller my_motion -o mine.jsonl",
+        "trials tasks --conditions",
+        "trials tasks slalom pegs --controller walk --controller gait --json",
+        "trials tasks --controller my_motion -o mine.jsonl",
     ),
 )
 def tasks(

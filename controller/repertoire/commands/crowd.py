@@ -1,4 +1,4 @@
-"""``snakewalk repertoire crowd``: many bodies on a terrain, as a film."""
+"""``snakewalk gait repertoire crowd``: many bodies on a terrain, as a film."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,8 +18,8 @@ from snakewalk.controller.repertoire.repertoire import load_repertoire
 
 
 @command(
-    "repertoire crowd",
-    examples=("repertoire crowd", "repertoire crowd --bodies 300 -o herd.mp4"),
+    "gait repertoire crowd",
+    examples=("gait repertoire crowd", "gait repertoire crowd --bodies 300 -o herd.mp4"),
     results=("out",),
 )
 def crowd(

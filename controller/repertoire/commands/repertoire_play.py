@@ -1,4 +1,4 @@
-"""``snakewalk repertoire play``: recorded actions by wanted speed and turn."""
+"""``snakewalk gait repertoire play``: recorded actions by wanted speed and turn."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -54,10 +54,10 @@ Patience = Annotated[
 
 
 @command(
-    "repertoire play",
+    "gait repertoire play",
     examples=(
-        "repertoire play --speed 0.6 --turn 0.3",
-        "repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture wanted.png",
+        "gait repertoire play --speed 0.6 --turn 0.3",
+        "gait repertoire play repertoire-yaw16-flat.npz --schedule wanted.toml --picture w.png",
     ),
     results=("picture",),
 )

@@ -1,4 +1,4 @@
-"""``snakewalk repertoire record``: actions from the physics."""
+"""``snakewalk gait repertoire record``: actions from the physics."""
 
 from pathlib import Path
 from typing import Annotated
@@ -27,8 +27,8 @@ from snakewalk.controller.repertoire.repertoire_planning import default_file, fl
 
 
 @command(
-    "repertoire record",
-    examples=("repertoire record", "repertoire record -o yaw16.npz --json"),
+    "gait repertoire record",
+    examples=("gait repertoire record", "gait repertoire record -o yaw16.npz --json"),
     results=("out", "picture"),
 )
 def record(

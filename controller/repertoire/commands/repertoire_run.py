@@ -1,4 +1,4 @@
-"""``snakewalk repertoire run``: a plan of recorded actions."""
+"""``snakewalk gait repertoire run``: a plan of recorded actions."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,8 +18,8 @@ from snakewalk.controller.run.finish import write_artifacts
 
 
 @command(
-    "repertoire run",
-    examples=("repertoire run plan.json", "repertoire run plan.json --open-loop --json"),
+    "gait repertoire run",
+    examples=("gait repertoire run plan.json", "gait repertoire run plan.json --open-loop --json"),
     results=("picture",),
 )
 def run_plan(

@@ -1,4 +1,4 @@
-"""``snakewalk repertoire show``: the actions of a repertoire."""
+"""``snakewalk gait repertoire show``: the actions of a repertoire."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +17,9 @@ from snakewalk.controller.repertoire.repertoire import load_repertoire
 
 
 @command(
-    "repertoire show", examples=("repertoire show repertoire-yaw16-flat.npz",), results=("picture",)
+    "gait repertoire show",
+    examples=("gait repertoire show repertoire-yaw16-flat.npz",),
+    results=("picture",),
 )
 def show_file(
     file: Annotated[Path, typer.Argument(help="file of recorded actions")] = Path(

@@ -1,11 +1,11 @@
-"""``snakewalk report``: the page and the film of a run, from its log alone."""
+"""``snakewalk log report``: the page and the film of a run, from its log alone."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Look, show
 from snakewalk.controller.console.result_files import refuse_mixture
@@ -14,7 +14,7 @@ from snakewalk.controller.run.finish import write_artifacts
 from snakewalk.controller.runlog.reader import read_log
 
 
-@command("report", group=JOB, examples=("report runs/flat-square-walk-seed0/log.mcap",))
+@command("log report", examples=("log report runs/flat-square-walk-seed0/log.mcap",))
 def report(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
     out: Annotated[

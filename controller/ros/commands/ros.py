@@ -8,7 +8,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Force,
@@ -66,7 +66,6 @@ FirstGait = Annotated[
 
 @command(
     "ros",
-    group=JOB,
     examples=(
         "ros",
         "ros --robot my.toml --port /dev/ttyUSB0 --domain 7 --namespace snake",
@@ -96,7 +95,10 @@ def ros(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Connect a robot or the simulator to ROS 2, which can command, watch and stop it."""
+    """Connect robot or simulator to ROS 2: command, watch and stop.
+
+    It runs until ^C or a stop.
+    """
     if not timeout > 0.0:
         raise InputError(f"--timeout {timeout:g}: expected seconds over 0, or inf")
     if not re.fullmatch(r"(/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*)?", namespace, re.ASCII):

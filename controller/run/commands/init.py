@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world, shipped
 from snakewalk.config.template import template
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 
@@ -25,14 +25,13 @@ A line behind # shows a key with its default; take the # away to change it."""
 _ROBOT = """The robot: links, joints and servos, from the head to the tail.
   snakewalk robot show robot.toml
 A line behind # shows a key with its default. IDs, signs and zeros are found out by
-snakewalk calibrate."""
+snakewalk bus calibrate."""
 _WORLD = """The world: what the robot moves on.
 A line behind # shows a key with its default. Another ground: replace the table [ground]."""
 
 
 @command(
     "init",
-    group=JOB,
     examples=("init mine", "init mine --robot xl330-16", "init mine --from ramp-10-up"),
 )
 def init(
@@ -54,7 +53,7 @@ def init(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write run.toml, robot.toml and world.toml for editing, with schemas for editors."""
+    """Write run, robot and world files to edit, with schemas for editors."""
     if from_ is None:
         known = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
         fitting = (name for name, body in known.items() if body == (robot or "yaw16"))

@@ -5,14 +5,14 @@ import json
 from rich.table import Table
 
 from snakewalk.config.loader import load_gait, load_robot, load_run, load_world, shipped
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json, console
 from snakewalk.controller.console.plugins import OWN, plugins
 
 
-@command("list", group=JOB, examples=("list --json",))
+@command("list", examples=("list --json",))
 def list_(as_json: Json = False) -> None:
-    """List shipped and installed items: runs, robots, worlds, recordings, policies, plug-ins."""
+    """List runs, robots, worlds, recordings, policies and plug-ins."""
     rows = {
         "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
         "robots": [
@@ -21,8 +21,10 @@ def list_(as_json: Json = False) -> None:
             for b in [load_robot(n)]
         ],
         "worlds": [[n, load_world(n).ground.kind] for n in shipped("worlds")],
-        "recordings": [[n, "snakewalk track, play, run --track"] for n in shipped("recordings")],
-        "policies": [[n, "snakewalk policy list, run"] for n in shipped("policies")],
+        "recordings": [
+            [n, "snakewalk animal track, play, run --track"] for n in shipped("recordings")
+        ],
+        "policies": [[n, "snakewalk gait policy list, run"] for n in shipped("policies")],
         "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
         "plug-ins": [
             [f"{each.kind} {each.name}", each.package]

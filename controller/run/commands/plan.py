@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
@@ -34,7 +34,6 @@ from snakewalk.drivers.safety.trip_hold import TripHold
 
 @command(
     "plan",
-    group=JOB,
     examples=(
         "plan",
         "plan flat-slalom --motion serpenoid --json",
@@ -75,7 +74,10 @@ def plan(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Check a run without servos or simulator: library of states, path and joint limits."""
+    """Check states, path and joint limits of a run; nothing moves.
+
+    Needs neither servos nor simulator.
+    """
     if with_ is not None:
         planner = require("planner", with_, "--with")
         if motion is not None or track is not None or seed is not None or set_:

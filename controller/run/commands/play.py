@@ -6,7 +6,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import MOTION, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Robot,
     Set,
@@ -22,7 +22,6 @@ from snakewalk.controller.run.finish import show_run
 
 @command(
     "play",
-    group=MOTION,
     examples=(
         "play worm-like",
         "play fish.npz --robot yaw16 --speed 0.5 --json",
@@ -75,7 +74,10 @@ def play(
     *,
     options: RunOptions,
 ) -> None:
-    """Play a recording or joint angles on servos or in the simulator; leaves a log and a film."""
+    """Play a recording or joint angles on servos or in the simulator.
+
+    It leaves a log and a film.
+    """
     prepared = prepare_playback(
         track,
         robot=robot,

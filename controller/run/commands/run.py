@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Compliant,
@@ -26,7 +26,6 @@ from snakewalk.controller.run.job import Job
 
 @command(
     "run",
-    group=JOB,
     examples=("run", "run flat-slalom --seed 3", "run my-run.toml --port /dev/ttyUSB0"),
 )
 def run(
@@ -78,7 +77,7 @@ def run(
     *,
     options: RunOptions,
 ) -> None:
-    """Run a job on servos or in the simulator; leaves a log, a report and a film."""
+    """Run a job on servos or in the simulator; leaves log, report, film."""
     job = Job(
         run=run, robot=robot, world=world, track=track, seed=seed, motion=motion, pose=pose,
         map_source=map_, keys=set_, compliance=compliance, live=live, observe=observe,

@@ -1,4 +1,4 @@
-"""``snakewalk schema``: JSON Schema of the TOML files."""
+"""``snakewalk tools schema``: JSON Schema of the TOML files."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ import typer
 from snakewalk.config.document import SCHEMAS, json_schema
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.motion.policy import Policy
@@ -25,7 +25,7 @@ KINDS: Final = (
 """Names of ``models``, known before they are built."""
 
 
-@command("schema", group=JOB, examples=("schema run", "schema robot -o robot.json"))
+@command("tools schema", examples=("tools schema run", "tools schema robot -o robot.json"))
 def schema(
     kind: Annotated[
         str,

@@ -333,7 +333,7 @@ class WalkRun(PathRun):
         return (
             f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
             f"walk is made of {len(self.library.shapes_rad)} random ones "
-            f"(why: snakewalk track {self.run.track})"
+            f"(why: snakewalk animal track {self.run.track})"
         )
 
     def walker(self, library: StateLibrary, filters: Mapping[str, ShapeFilter]) -> Walker:

@@ -1,4 +1,4 @@
-"""``snakewalk compare``: several runs side by side, from their logs."""
+"""``snakewalk log compare``: several runs side by side, from their logs."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import typer
 from rich.table import Column, Table
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.result_files import check_picture
@@ -24,11 +24,10 @@ _LONGEST = 44
 
 
 @command(
-    "compare",
-    group=JOB,
+    "log compare",
     examples=(
-        "compare runs/flat-square-walk-seed0/log.mcap runs/flat-square-walk-seed1/log.mcap",
-        "compare runs/*/log.mcap --picture compared.png --json",
+        "log compare runs/flat-square-walk-seed0/log.mcap runs/flat-square-walk-seed1/log.mcap",
+        "log compare runs/*/log.mcap --picture compared.png --json",
     ),
     results=("picture",),
 )

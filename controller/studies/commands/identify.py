@@ -1,4 +1,4 @@
-"""``snakewalk identify``: constants of a servo from recordings, friction of the belly from runs."""
+"""``snakewalk robot identify``: a servo's constants from recordings, friction from runs."""
 
 import json
 import math
@@ -15,7 +15,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import checked, load_robot, load_world, with_keys
 from snakewalk.config.template import robot_toml, template
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.console.command import BUS, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Robot, World, check_files, console
 from snakewalk.controller.console.progress import ProgressBar
@@ -76,15 +76,14 @@ class _Outs(NamedTuple):
 
 
 @command(
-    "identify",
-    group=BUS,
+    "robot identify",
     examples=(
-        "identify kp200.json kp800.json -o xl330.json",
-        "identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
-        "identify kp400.json kp800.json --backlash --robot xl330-16 --robot-out mine.toml",
-        "identify kp400.json --start xl330.json --no-fit --json",
-        "identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
-        "identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
+        "robot identify kp200.json kp800.json -o xl330.json",
+        "robot identify kp200.json kp800.json --robot xl330-16 --robot-out mine.toml",
+        "robot identify kp400.json kp800.json --backlash --robot xl330-16 --robot-out mine.toml",
+        "robot identify kp400.json --start xl330.json --no-fit --json",
+        "robot identify runs/flat-slalom-walk-seed0/log.mcap -o found.toml",
+        "robot identify runs/NAME/log.mcap -o found.toml --robot-out mine.toml",
     ),
 )
 def identify(
@@ -323,7 +322,7 @@ def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path
 
     after = with_mass(robot, float(f"{mass.value:.4g}")).model_copy(update={"name": out.stem})
     comment = (
-        f"Mass found by `snakewalk identify` from {', '.join(map(str, paths))}:\n"
+        f"Mass found by `snakewalk robot identify` from {', '.join(map(str, paths))}:\n"
         f"{mass.value:.4g} times that of {robot.name}, 95 % of {mass.low:.4g} to {mass.high:.4g}"
     )
     with atomic_write(out) as part:

@@ -1,4 +1,4 @@
-"""``snakewalk replay``: a log run again on the simulator."""
+"""``snakewalk log replay``: a log run again on the simulator."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import ProgressBar
@@ -18,7 +18,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies import replay as replaying
 
 
-@command("replay", group=JOB, examples=("replay runs/flat-square-walk-seed0/log.mcap --json",))
+@command("log replay", examples=("log replay runs/flat-square-walk-seed0/log.mcap --json",))
 def replay(
     log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on servos")],
     tolerance_rad: Annotated[

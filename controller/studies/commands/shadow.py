@@ -1,4 +1,4 @@
-"""``snakewalk shadow``: differences between a robot, by its log, and the simulator."""
+"""``snakewalk log shadow``: differences between a robot, by its log, and the simulator."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import typer
 
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_world
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Json, World, check_files, console
 from snakewalk.controller.console.progress import ProgressBar
@@ -17,10 +17,9 @@ from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of
 
 
 @command(
-    "shadow",
-    group=JOB,
+    "log shadow",
     examples=(
-        "shadow runs/gait-lateral-undulation-yaw16/log.mcap",
+        "log shadow runs/gait-lateral-undulation-yaw16/log.mcap",
         "gait run lateral-undulation --port /dev/ttyUSB0 --shadow",
     ),
 )

@@ -1,4 +1,4 @@
-"""``snakewalk sweep``: gaits on the physics over many parameters."""
+"""``snakewalk gait sweep``: gaits on the physics over many parameters."""
 
 import json
 from collections import Counter
@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import MOTION, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Dask, Force, Json, Set, console, key_values
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
@@ -38,11 +38,10 @@ _HEADS = {
 
 
 @command(
-    "sweep",
-    group=MOTION,
+    "gait sweep",
     examples=(
-        "sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
-        "sweep --dask tcp://cluster:8786 --points 5000 --parquet sweep.parquet",
+        "gait sweep sidewinding rolling --points 30 -o sweep.csv --picture sweep.png",
+        "gait sweep --dask tcp://cluster:8786 --points 5000 --parquet sweep.parquet",
     ),
     results=("picture", "parquet"),
     tables=("out",),

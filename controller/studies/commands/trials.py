@@ -1,4 +1,4 @@
-"""``snakewalk trials``: runs over seeds, motions, robots, worlds and steepnesses."""
+"""``snakewalk trials run``: runs over seeds, motions, robots, worlds and steepnesses."""
 
 import json
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from rich.table import Table
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
@@ -107,9 +107,8 @@ class _Where(NamedTuple):
 
 
 @command(
-    "trials",
-    group=JOB,
-    examples=("trials flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
+    "trials run",
+    examples=("trials run flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
     results=("picture", "parquet"),
     tables=("out",),
 )

@@ -1,4 +1,4 @@
-"""``snakewalk tune``: better parameters of a gait, found on the physics."""
+"""``snakewalk gait tune``: better parameters of a gait, found on the physics."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
-from snakewalk.controller.console.command import MOTION, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json, Robot, Set, key_values, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
@@ -20,9 +20,8 @@ from snakewalk.controller.studies.sweep_points import robot_file
 
 
 @command(
-    "tune",
-    group=MOTION,
-    examples=("tune sidewinding --for speed --out mine.toml", "gait run mine.toml"),
+    "gait tune",
+    examples=("gait tune sidewinding --for speed --out mine.toml", "gait run mine.toml"),
     results=("out",),
 )
 def tune(

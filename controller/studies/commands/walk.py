@@ -1,4 +1,4 @@
-"""``snakewalk walk``: rules of walking compared on graphs of states."""
+"""``snakewalk animal graph``: rules of walking compared on graphs of states."""
 
 import json
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from snakewalk.controller.console.command import MOTION, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 
 
 @command(
-    "walk",
-    group=MOTION,
-    examples=("walk", "walk --graph er:1000:9 --rule snake --rule stack --repeats 30 --json"),
+    "animal graph",
+    examples=(
+        "animal graph",
+        "animal graph --graph er:1000:9 --rule snake --rule stack --repeats 30 --json",
+    ),
     results=("picture",),
 )
 def walk(

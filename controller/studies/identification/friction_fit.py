@@ -218,7 +218,7 @@ class FrictionFit:
 
     def comment(self, paths: Sequence[Path]) -> list[str]:
         """Lines for the head of a world's file."""
-        lines = [f"Friction found by `snakewalk identify` from {', '.join(map(str, paths))}:"]
+        lines = [f"Friction found by `snakewalk robot identify` from {', '.join(map(str, paths))}:"]
         for name, one in self.found.items():
             note = "" if one.determined else "; not identified from these logs"
             lines.append(

@@ -206,7 +206,9 @@ def robot_with(robot: RobotConfig, constants: ServoConstants) -> RobotConfig:
 
 def robot_comment(constants: ServoConstants, paths: Sequence[Path]) -> str:
     """Words for the head of a robot's file: where its constants are from, and their intervals."""
-    lines = [f"Servo constants found by `snakewalk identify` from {', '.join(map(str, paths))}."]
+    lines = [
+        f"Servo constants found by `snakewalk robot identify` from {', '.join(map(str, paths))}."
+    ]
     lines += [
         f"{constant.name.replace('_', ' ')} {constants[constant.name]:.4g}, 95 % of {low:.4g} to "
         f"{high:.4g}"

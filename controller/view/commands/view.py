@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.command import JOB, command
+from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
 from snakewalk.controller.runlog.reader import read_log
@@ -20,7 +20,6 @@ _MOST = 2
 
 @command(
     "view",
-    group=JOB,
     examples=("view runs/flat-square-walk-seed0/log.mcap", "gait run sidewinding --view"),
 )
 def view(
@@ -33,15 +32,18 @@ def view(
     ],
     view_at: ViewAt = VIEW_AT,
 ) -> None:
-    """Show a log in the browser: body, path, servos and curves, with a time slider. ^C ends it.
+    """Show a log in the browser: body, path, servos and curves.
 
-    Two logs are shown side by side, or over each other if they have the same ground.
+    A slider sets the time. ^C ends it. Two logs are shown side by side, or over each other if they
+    have the same ground.
 
     To watch a run, use --view of run, gait run and play.
     """
     host, port = host_and_port(view_at)
     if len(logs) > _MOST:
-        raise InputError(f"{len(logs)} logs: the page shows one or two; more: snakewalk compare")
+        raise InputError(
+            f"{len(logs)} logs: the page shows one or two; more: snakewalk log compare"
+        )
     records = {}
     for log, name in zip(logs, log_names(logs), strict=True):
         records[name] = read_log(log).from_torque_on()

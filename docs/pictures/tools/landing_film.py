@@ -2,7 +2,7 @@
 
 docs/pictures/landing.webp was made from these results::
 
-    snakewalk capture FRAMES --cropped -o track.npz
+    snakewalk animal capture FRAMES --cropped -o track.npz
     snakewalk play worm-like
     snakewalk run jacksboro-traverse
 """

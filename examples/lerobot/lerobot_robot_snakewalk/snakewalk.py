@@ -77,7 +77,7 @@ class Snakewalk(Robot):
         return True
 
     def calibrate(self) -> None:
-        """Do nothing; ``snakewalk calibrate`` writes the robot file."""
+        """Do nothing; ``snakewalk bus calibrate`` writes the robot file."""
 
     def configure(self) -> None:
         """Do nothing; ``connect`` sets the servos up as a run does."""

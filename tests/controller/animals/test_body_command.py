@@ -1,4 +1,4 @@
-"""``snakewalk body``: skins of shipped animals, meshes and recordings, moved by all there is."""
+"""``snakewalk animal body``: skins of shipped animals, meshes and recordings, all moved."""
 
 import json
 from dataclasses import replace
@@ -34,13 +34,13 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def made(*words: str) -> dict[str, object]:
-    done = snakewalk("body", *words, "--json")
+    done = snakewalk("animal", "body", *words, "--json")
     assert done.returncode == 0, done.stderr
     return dict(json.loads(done.stdout))
 
 
 def refused(*words: str) -> str:
-    done = snakewalk("body", *words)
+    done = snakewalk("animal", "body", *words)
     assert done.returncode == 2
     assert done.stdout == ""
     return " ".join(done.stderr.split())

@@ -1,4 +1,4 @@
-"""``snakewalk synthesise``: a motion over hills on paper, and the recording that it writes."""
+"""``snakewalk animal synthesise``: a motion over hills on paper, and its recording."""
 
 import json
 from pathlib import Path
@@ -116,7 +116,14 @@ def test_aimed_as_printed_the_snake_leaves_its_path() -> None:
 
 def test_the_command_writes_a_recording_that_other_commands_take(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(BEHAVIOUR)
-    words = ["synthesise", str(tmp_path / "mine.toml"), "-o", str(tmp_path / "out"), "--json"]
+    words = [
+        "animal",
+        "synthesise",
+        str(tmp_path / "mine.toml"),
+        "-o",
+        str(tmp_path / "out"),
+        "--json",
+    ]
     done = snakewalk(*words, "--frames", "120")
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
@@ -142,7 +149,7 @@ def test_the_command_writes_a_recording_that_other_commands_take(tmp_path: Path)
 
 def test_what_is_not_a_walk_is_refused(tmp_path: Path) -> None:
     done = snakewalk(
-        "synthesise", "flat-square", "--motion", "serpenoid", "-o", str(tmp_path / "x")
+        "animal", "synthesise", "flat-square", "--motion", "serpenoid", "-o", str(tmp_path / "x")
     )
     assert done.returncode == 2
     assert "--motion serpenoid: walk, walk-printed, kp" in done.stderr
@@ -187,7 +194,15 @@ def test_rings_turn_green_when_the_mass_centre_is_there(traverse: SynthesisedWal
 
 
 def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
-    words = ["synthesise", "jacksboro-traverse", "--frames", "4", "-o", str(tmp_path / "out")]
+    words = [
+        "animal",
+        "synthesise",
+        "jacksboro-traverse",
+        "--frames",
+        "4",
+        "-o",
+        str(tmp_path / "out"),
+    ]
     wrong = snakewalk(*words, "--look", "shark")
     assert wrong.returncode == 2
     assert "--look shark: is for --film and --glb" in wrong.stderr
@@ -221,7 +236,7 @@ def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_p
     keys = ("world.ground.size_m=3.0", "run.start_m=[0.0,0.0]", "run.waypoints_m=[[0.5,0.0]]")
     sets = [word for key in keys for word in ("--set", key)]
     done = snakewalk(
-        *("synthesise", "flat-slalom", *how, *sets, "--frames", "600", "--json"),
+        *("animal", "synthesise", "flat-slalom", *how, *sets, "--frames", "600", "--json"),
         *("-o", str(tmp_path / "out")),
     )
     assert done.returncode == 0, done.stderr
@@ -235,7 +250,16 @@ def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_p
 
 def test_frames_do_not_end_a_motion_before_the_last_waypoint(tmp_path: Path) -> None:
     """The head left the floor 18 frames before the middle of the body reached the waypoint."""
-    words = ["synthesise", "flat-slalom", "--json", "-o", str(tmp_path / "out"), "--frames", "3000"]
+    words = [
+        "animal",
+        "synthesise",
+        "flat-slalom",
+        "--json",
+        "-o",
+        str(tmp_path / "out"),
+        "--frames",
+        "3000",
+    ]
     facts = json.loads(snakewalk(*words).stdout)
     assert facts["waypoints_reached"] == 5
     assert facts["frames"] < 3000
@@ -244,12 +268,12 @@ def test_frames_do_not_end_a_motion_before_the_last_waypoint(tmp_path: Path) -> 
 def test_a_motion_on_paper_is_refused_as_a_run() -> None:
     done = snakewalk("run", "jacksboro-traverse", "--motion", "kp")
     assert done.returncode == 2
-    assert "kp is a motion on paper: snakewalk synthesise" in done.stderr
+    assert "kp is a motion on paper: snakewalk animal synthesise" in done.stderr
 
 
 def test_an_animal_with_legs_is_led_over_the_hills(tmp_path: Path) -> None:
     out = tmp_path / "lizard"
-    run = ["synthesise", "jacksboro-traverse", "--animal", "lizard", "-o", str(out)]
+    run = ["animal", "synthesise", "jacksboro-traverse", "--animal", "lizard", "-o", str(out)]
     done = snakewalk(*run, "--json")
     assert done.returncode == 0
     facts = json.loads(done.stdout)
@@ -275,7 +299,15 @@ def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> 
     (tmp_path / "own.toml").write_text(locate("skins", "goat").read_text())
     out = tmp_path / "kid"
     done = snakewalk(
-        *("synthesise", "flat-square", "--animal", str(tmp_path / "kid.toml"), "-o", str(out)),
+        *(
+            "animal",
+            "synthesise",
+            "flat-square",
+            "--animal",
+            str(tmp_path / "kid.toml"),
+            "-o",
+            str(out),
+        ),
         *("--frames", "12", "--glb", "--film", "--json"),
     )
     assert done.returncode == 0
@@ -286,7 +318,7 @@ def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> 
 
 
 def test_the_feet_as_printed_are_an_option_and_their_slip_is_reported(tmp_path: Path) -> None:
-    words = ["synthesise", "flat-square", "--frames", "40", "--json"]
+    words = ["animal", "synthesise", "flat-square", "--frames", "40", "--json"]
     slip = {}
     for feet in ("footfall", "gc-printed"):
         out = ["-o", str(tmp_path / feet), "--animal", "goat", "--feet", feet]

@@ -1,4 +1,4 @@
-"""``scan``, ``doctor`` and ``bus set`` as a user calls them, on a line of 16 servos."""
+"""``bus scan``, ``doctor`` and ``bus set`` as a user calls them, on a line of 16 servos."""
 
 import json
 from collections.abc import Iterator
@@ -102,8 +102,8 @@ def test_bus_set_shows_asks_and_writes(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("scan", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE: no such port"),
-        (("scan", "--port", "DEVICE", "--baud", "1200"), "--baud 1200: servos have 9600"),
+        (("bus", "scan", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE: no such port"),
+        (("bus", "scan", "--port", "DEVICE", "--baud", "1200"), "--baud 1200: servos have 9600"),
         (("doctor", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE: no such port"),
         (("doctor", "--port", "DEVICE", "--robot", "nope"), "nope"),
         (("bus", "set", "--port", "/dev/ttyNOPE", "--id", "1"), "/dev/ttyNOPE: no such port"),

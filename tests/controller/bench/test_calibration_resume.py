@@ -1,4 +1,4 @@
-"""No answer to ``calibrate`` is lost, whatever ends it or the line does to it."""
+"""No answer to ``bus calibrate`` is lost, whatever ends it or the line does to it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -248,7 +248,7 @@ class Trio:
     @property
     def words(self) -> list[str]:
         like = str(self.folder / "like.toml")
-        return ["calibrate", "--port", "/dev/ttyUSB0", "--robot", like, "-o", str(self.out)]
+        return ["bus", "calibrate", "--port", "/dev/ttyUSB0", "--robot", like, "-o", str(self.out)]
 
     def __call__(self, *more: str, answers: str = ANSWERS) -> Result:
         return CliRunner().invoke(app, [*self.words, *more], input=answers)

@@ -78,7 +78,8 @@ def test_a_bus_of_another_make_is_named_as_a_cause() -> None:
         ServoChain(DynamixelBus(line, robot.servo.model), robot).enable()
     assert info.value.faults == (
         f"{line.name}: no answer from any of the servos 1 to 16 at 1000000 baud: power, cable, "
-        f"baud rate or another make; snakewalk scan --port {line.name} lists the servos that reply",
+        f"baud rate or another make; snakewalk bus scan --port {line.name} lists the servos that "
+        "reply",
     )
 
 

@@ -48,7 +48,7 @@ class Trio:
 
     def calibrate(self, *more: str) -> Result:
         like, out = str(self.like), str(self.out)
-        return self("calibrate", "--robot", like, "-o", out, "--json", *more)
+        return self("bus", "calibrate", "--robot", like, "-o", out, "--json", *more)
 
 
 @pytest.fixture
@@ -128,7 +128,7 @@ def test_servos_without_homing_offset_keep_their_zeros_in_the_file(trio: Trio) -
 
 
 def test_bus_identify_lists_the_servos_and_writes_a_robot_file(trio: Trio) -> None:
-    words = ["bus", "identify", "--baud", "1000000", "--json", "-o", str(trio.out)]
+    words = ["bus", "inventory", "--baud", "1000000", "--json", "-o", str(trio.out)]
     result = trio(*words)
     assert result.exit_code == 0, result.output
     servos = json.loads(result.stdout)["servos"]

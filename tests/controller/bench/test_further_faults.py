@@ -361,7 +361,7 @@ def test_a_chain_with_other_ids_is_sent_to_calibrate() -> None:
     moved_ids(line)
     remedy = check(doctor(line), "servo IDs").remedy
     assert "not calibrated" in remedy
-    assert "snakewalk calibrate --port simulated line -o my-robot.toml" in remedy
+    assert "snakewalk bus calibrate --port simulated line -o my-robot.toml" in remedy
     assert "cable" not in remedy
 
 

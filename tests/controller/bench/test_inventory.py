@@ -33,7 +33,7 @@ def line(monkeypatch: pytest.MonkeyPatch) -> SimLine:
 
 def call(*words: object):
     rates = ["--baud", "1000000", "--baud", "57600"]
-    return CliRunner().invoke(app, ["bus", "identify", "--port", "any", *rates, *map(str, words)])
+    return CliRunner().invoke(app, ["bus", "inventory", "--port", "any", *rates, *map(str, words)])
 
 
 def test_each_servo_is_told_with_its_state_and_nothing_changes(line: SimLine) -> None:

@@ -42,12 +42,12 @@ def service() -> Iterator[TwoPorts]:
 
 
 def test_scan_and_identify_ask_on_every_port(service: TwoPorts, tmp_path: Path) -> None:
-    found = json.loads(service("scan", "--baud", 1_000_000, "--json").stdout)["servos"]
+    found = json.loads(service("bus", "scan", "--baud", 1_000_000, "--json").stdout)["servos"]
     assert [each["servo_id"] for each in found] == list(range(1, 17))
     assert [each["port"] for each in found] == [path for path in service.paths for _ in range(8)]
-    assert all(path in service("scan", "--baud", 1_000_000).stdout for path in service.paths)
+    assert all(path in service("bus", "scan", "--baud", 1_000_000).stdout for path in service.paths)
     file = tmp_path / "found.toml"
-    done = service("bus", "identify", "--baud", 1_000_000, "-o", file)
+    done = service("bus", "inventory", "--baud", 1_000_000, "-o", file)
     assert done.returncode == 0, done.stderr
     robot = load_robot(str(file))
     assert tuple(each.port for each in robot.ports) == service.paths
@@ -56,7 +56,7 @@ def test_scan_and_identify_ask_on_every_port(service: TwoPorts, tmp_path: Path) 
 
 def test_a_servo_on_another_port_than_told_is_named(service: TwoPorts) -> None:
     first, second = service.paths
-    told = service("scan", "--baud", "1000000", port=f"1-7={first},8-16={second}").stderr
+    told = service("bus", "scan", "--baud", "1000000", port=f"1-7={first},8-16={second}").stderr
     assert f"{first}: servo 8 answers here; --port does not say so" in told
 
 
@@ -98,7 +98,7 @@ def test_the_doctor_examines_every_port_and_wiggles_the_whole_chain(service: Two
     ],
 )
 def test_a_port_map_that_no_bench_has_is_refused(port: str, said: str) -> None:
-    done = snakewalk("scan", "--port", port)
+    done = snakewalk("bus", "scan", "--port", port)
     assert done.returncode == 2
     assert said in done.stderr
 

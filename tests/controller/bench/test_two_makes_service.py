@@ -63,7 +63,7 @@ def service() -> Iterator[TwoMakes]:
 
 
 def test_scan_finds_the_servos_of_both_makes(service: TwoMakes) -> None:
-    found = json.loads(service("scan", "--baud", 1_000_000, "--json").stdout)["servos"]
+    found = json.loads(service("bus", "scan", "--baud", 1_000_000, "--json").stdout)["servos"]
     assert [(each["servo_id"], each["port"]) for each in found] == [
         (servo_id, service.paths[servo_id > 3]) for servo_id in range(1, 7)
     ]
@@ -124,7 +124,7 @@ def test_a_setting_is_written_on_the_port_of_its_servo(service: TwoMakes) -> Non
 
 def test_identify_writes_a_robot_of_two_makes(service: TwoMakes, tmp_path: Path) -> None:
     file = tmp_path / "found.toml"
-    done = service("bus", "identify", "--baud", 1_000_000, "-o", file)
+    done = service("bus", "inventory", "--baud", 1_000_000, "-o", file)
     assert done.returncode == 0, done.stderr
     robot = load_robot(str(file))
     assert robot.is_mixed
@@ -135,7 +135,7 @@ def test_identify_writes_a_robot_of_two_makes(service: TwoMakes, tmp_path: Path)
 def test_calibrate_names_the_way_out(service: TwoMakes, tmp_path: Path) -> None:
     robot = service.robot(tmp_path)
     done = snakewalk(
-        *("calibrate", "--robot", str(robot), "--port", service.paths[0]),
+        *("bus", "calibrate", "--robot", str(robot), "--port", service.paths[0]),
         *("-o", str(tmp_path / "mine.toml")),
     )
     assert done.returncode == 2

@@ -1,4 +1,4 @@
-"""``snakewalk camera check``: the simulated camera, a film as device, findings, the page."""
+"""``snakewalk pose camera``: the simulated camera, a film as device, findings, the page."""
 
 import json
 import re
@@ -54,7 +54,7 @@ MARKERS = """[camera.markers_m]
 
 
 def call(*words: str) -> tuple[int, dict[str, object]]:
-    done = CliRunner().invoke(app, ["camera", "check", *words, "--json"])
+    done = CliRunner().invoke(app, ["pose", "camera", *words, "--json"])
     if isinstance(done.exception, OffscreenError):
         pytest.skip(str(done.exception))
     assert done.stdout, done.exception
@@ -138,7 +138,7 @@ def test_joints_on_a_port_are_read_and_never_moved(
 )
 def test_what_cannot_be_looked_through_is_refused(words: tuple[str, ...], line: str) -> None:
     with pytest.raises(InputError, match=line):
-        CliRunner().invoke(app, ["camera", "check", *words], catch_exceptions=False)
+        CliRunner().invoke(app, ["pose", "camera", *words], catch_exceptions=False)
 
 
 FLOOR = FloorFit(np.eye(3), {1: 0.002, 2: 0.001}, {1: 0.15, 2: 0.151}, None)

@@ -1,4 +1,4 @@
-"""``snakewalk camera``: a board that is printed, pictures of it, the lens; and what is refused."""
+"""``snakewalk pose``: a board that is printed, pictures of it, the lens; and what is refused."""
 
 import json
 from pathlib import Path
@@ -36,7 +36,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_pictures_in_a_folder_give_the_lens(pictures: Path, tmp_path: Path) -> None:
     out = tmp_path / "lens.yml"
-    told = call("camera", "calibrate", str(pictures), "-o", str(out))
+    told = call("pose", "calibrate", str(pictures), "-o", str(out))
     assert told["used"] == told["pictures"] == 9
     assert float(str(told["residual_rms_px"])) < 0.4
     lens = Lens.read(out)
@@ -50,7 +50,7 @@ def test_a_film_does_as_well(pictures: Path, tmp_path: Path) -> None:
     for k in range(9):
         writer.write(cv2.imread(str(pictures / f"{k}.png")))
     writer.release()
-    told = call("camera", "calibrate", str(film), "-o", str(tmp_path / "lens.json"))
+    told = call("pose", "calibrate", str(film), "-o", str(tmp_path / "lens.json"))
     assert told["pictures"] == 9
     assert Lens.read(tmp_path / "lens.json").matrix[0, 0] == pytest.approx(300.0, rel=0.03)
 
@@ -58,7 +58,7 @@ def test_a_film_does_as_well(pictures: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["pdf", "png"])
 def test_the_board_is_drawn_in_its_size(ending: str, tmp_path: Path) -> None:
     out = tmp_path / f"board.{ending}"
-    told = call("camera", "board", "-o", str(out))
+    told = call("pose", "board", "-o", str(out))
     assert (told["width_mm"], told["height_mm"]) == (252.0, 180.0)
     if ending == "png":
         drawn = cv2.imread(str(out), cv2.IMREAD_GRAYSCALE)
@@ -73,10 +73,10 @@ def test_the_board_is_drawn_in_its_size(ending: str, tmp_path: Path) -> None:
 
 
 def test_markers_are_printed_in_their_size_one_a_page(tmp_path: Path) -> None:
-    told = call("camera", "markers", "-o", str(tmp_path / "m.pdf"), "--count", "3")
+    told = call("pose", "markers", "-o", str(tmp_path / "m.pdf"), "--count", "3")
     assert told["numbers"] == [0, 1, 2]
     assert (tmp_path / "m.pdf").read_bytes().count(b"/MediaBox") == 3
-    told = call("camera", "markers", "-o", str(tmp_path / "m.png"), "--count", "1", "--first", "7")
+    told = call("pose", "markers", "-o", str(tmp_path / "m.png"), "--count", "1", "--first", "7")
     drawn = np.asarray(cv2.imread(str(tmp_path / "m.png"), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
     small = cv2.resize(drawn, None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA)
     ((number, corners),) = find_markers(np.asarray(small, dtype=np.uint8)).items()
@@ -109,7 +109,7 @@ def test_what_cannot_be_done_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=line):
-        CliRunner().invoke(app, ["camera", *words], catch_exceptions=False)
+        CliRunner().invoke(app, ["pose", *words], catch_exceptions=False)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -118,6 +118,6 @@ def test_pictures_of_two_sizes_are_refused(pictures: Path, tmp_path: Path) -> No
         cv2.imwrite(str(tmp_path / f"{k}.png"), np.zeros((side, 160), np.uint8))
     with pytest.raises(InputError, match="160 x 100 and 160 x 120"):
         CliRunner().invoke(
-            app, ["camera", "calibrate", str(tmp_path), "-o", str(pictures / "l.yml")],
+            app, ["pose", "calibrate", str(tmp_path), "-o", str(pictures / "l.yml")],
             catch_exceptions=False,
         )  # fmt: skip

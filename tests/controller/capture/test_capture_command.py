@@ -1,4 +1,4 @@
-"""``snakewalk capture``: films in, a track out; bad input in one line; nothing overwritten."""
+"""``snakewalk animal capture``: films in, a track out; bad input in one line."""
 
 import json
 import os
@@ -44,7 +44,14 @@ def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_trail_holds_the_darkest_value_of_each_pixel(swim: Path, tmp_path: Path) -> None:
     trail = tmp_path / "trail.png"
     done = snakewalk(
-        "capture", str(swim), "-o", str(tmp_path / "t.npz"), "--trail", str(trail), "--json"
+        "animal",
+        "capture",
+        str(swim),
+        "-o",
+        str(tmp_path / "t.npz"),
+        "--trail",
+        str(trail),
+        "--json",
     )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["animal"] == "dark"
@@ -56,7 +63,14 @@ def test_a_trail_holds_the_darkest_value_of_each_pixel(swim: Path, tmp_path: Pat
     shadow = np.median(drawn) - darkest.mean(axis=2) > 30.0
     assert (shadow & same).sum() > 100  # and the animal is around them
     done = snakewalk(
-        "capture", str(swim), "-o", str(tmp_path / "u.npz"), "--cropped", "--trail", str(trail)
+        "animal",
+        "capture",
+        str(swim),
+        "-o",
+        str(tmp_path / "u.npz"),
+        "--cropped",
+        "--trail",
+        str(trail),
     )
     assert done.returncode == 2
     assert "--cropped and --trail" in done.stderr
@@ -80,8 +94,8 @@ def test_a_trail_shows_dark_and_light_animals(polarity: Polarity, tmp_path: Path
 def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Path) -> None:
     track, sheet, overlay = (tmp_path / name for name in ("t.npz", "s.png", "o.avi"))
     done = snakewalk(
-        "capture", str(swim), "-o", str(track), "--length-m", "0.35", "--sheet", str(sheet),
-        "--overlay", str(overlay), "--json",
+        "animal", "capture", str(swim), "-o", str(track), "--length-m", "0.35",
+        "--sheet", str(sheet), "--overlay", str(overlay), "--json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
@@ -214,15 +228,15 @@ def test_the_steps_show_the_animal_as_large_as_the_panel(tmp_path: Path) -> None
 
 
 def test_help_has_an_example() -> None:
-    done = snakewalk("capture", "--help")
+    done = snakewalk("animal", "capture", "--help")
     assert done.returncode == 0
-    assert "snakewalk capture film.mp4" in " ".join(done.stdout.split())
+    assert "snakewalk animal capture film.mp4" in " ".join(done.stdout.split())
 
 
 def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
     junk = tmp_path / "junk.mp4"
     junk.write_bytes(b"no film" * 50)
-    done = snakewalk("capture", str(junk), "-o", str(tmp_path / "t.npz"))
+    done = snakewalk("animal", "capture", str(junk), "-o", str(tmp_path / "t.npz"))
     assert done.returncode == 2
     told = [line for line in done.stderr.splitlines() if line.strip()]
     assert len(told) == 1

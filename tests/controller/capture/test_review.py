@@ -111,7 +111,7 @@ def test_the_command_writes_a_track_that_loads(
     words.write_text(said.model_dump_json())
     assert read_corrections(words) == said
     done = snakewalk(
-        "capture", str(folder / "track.npz"), "--corrections", str(words), "-o",
+        "animal", "capture", str(folder / "track.npz"), "--corrections", str(words), "-o",
         str(tmp_path / "new.npz"), "--json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -173,7 +173,7 @@ def test_wrong_files_and_options_are_refused(folder: Path, tmp_path: Path) -> No
         capture_recording(CaptureOptions(folder / "frames", new, review=tmp_path / "a.doc"))
     np.savez(tmp_path / "other.npz", points=np.zeros((3, 5, 2)))
     for file in (tmp_path / "other.npz", junk):
-        with pytest.raises(InputError, match=r"`capture` wrote"):
+        with pytest.raises(InputError, match=r"`animal capture` wrote"):
             load_capture(file)
 
 

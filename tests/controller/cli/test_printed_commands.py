@@ -5,7 +5,7 @@ They are run as printed, in this process, with a budget that the pages do not sh
 - a motion on simulated servos is cut ``MOTION_S`` after its ramp, and so is the motion on paper
   before, and that of ``plan`` with options; path, start-up, bus, log and summary are whole;
 - a camera is looked through for a second;
-- a film is made by ``report`` only, and a page without pictures;
+- a film is made by ``log report`` only, and a page without pictures;
 - of a study's runs the first one is made, in this process; of a graph's walks one; of actions the
   those of ``ACTIONS`` are recorded; a film of a crowd has two frames;
 - ``bus serve`` looks at its port a few times.
@@ -54,11 +54,11 @@ SEARCH = "a search takes 18 whole runs at least: tests/controller/run/test_set.p
 EPISODES = "takes hundreds of episodes: tests/controller/learning"
 NOT_RUN = {
     "--port": BUS,
-    "scan": BUS,
+    "bus scan": BUS,
     "doctor": BUS,
-    "calibrate": BUS,
+    "bus calibrate": BUS,
     "bus set": BUS,
-    "bus identify": BUS,
+    "bus inventory": BUS,
     "bus blink": BUS,
     "bus reboot": BUS,
     "bus backup": BUS,
@@ -70,27 +70,27 @@ NOT_RUN = {
     "view": "serves a page until it is closed: tests/controller/view",
     "ros": "holds a robot until it is stopped: tests/controller/ros",
     "--ros": "needs the extra ros and a graph: tests/controller/ros",
-    "camera calibrate 0": "needs a camera: tests/controller/cameras/test_camera_command.py",
+    "pose calibrate 0": "needs a camera: tests/controller/cameras/test_camera_command.py",
     "plan mine/run.toml --robot mine/found.toml": FOUND,
     "run mine/run.toml --robot mine/found.toml": FOUND,
-    "shadow": "needs four seconds of a run: tests/controller/studies/shadow/test_run_shadow.py",
+    "log shadow": "needs four seconds of a run: tests/controller/studies/shadow/test_run_shadow.py",
     "--link": "would take a name that others may hold: tests/controller/bench/test_bus_commands.py",
-    "fish synthesise": "needs a film of some beats: test_fish_command.py",
-    "tune": SEARCH,
+    "animal fish synthesise": "needs a film of some beats: test_fish_command.py",
+    "gait tune": SEARCH,
     "gait run mine.toml": SEARCH,
-    "policy learn": EPISODES,
-    "policy run mine.toml": EPISODES,
-    "policy trials": "takes whole runs: tests/controller/studies/test_policy_trials.py",
+    "gait policy learn": EPISODES,
+    "gait policy run mine.toml": EPISODES,
+    "trials policy": "takes whole runs: tests/controller/studies/test_policy_trials.py",
     "--dask": "needs a cluster: tests/controller/studies/test_pool.py",
-    "terrain from-stereo": "needs a calibrated pair: test_terrain_command.py",
+    "world stereo": "needs a calibrated pair: test_terrain_command.py",
     "--map": "looks through two cameras: tests/controller/run/test_stereo_head.py",
-    "camera check flat-square": "looks for seconds: test_camera_check_command.py",
-    "synthesise -o": "walks over all hills: test_synthesise_command.py",
-    "fish match top.mp4 -o": "searches every frame: test_fish_command.py",
-    "identify": PENDULUM,
+    "pose camera flat-square": "looks for seconds: test_camera_check_command.py",
+    "animal synthesise -o": "walks over all hills: test_synthesise_command.py",
+    "animal fish match top.mp4 -o": "searches every frame: test_fish_command.py",
+    "robot identify": PENDULUM,
     "pose check": "needs a sender: tests/docs/test_rehearsal_page.py",
-    "rehearse": "makes whole runs: tests/controller/rehearsal",
-    "judge": "needs a served run: tests/controller/rehearsal",
+    "trials rehearse": "makes whole runs: tests/controller/rehearsal",
+    "log judge": "needs a served run: tests/controller/rehearsal",
 }
 """Command, or option, and why no line with it is run here."""
 
@@ -130,7 +130,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
         return forecast(*parts, **options | ({} if now.plans else {"limit_s": MOTION_S}))
 
     def few_artifacts(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
-        if numbers is None:  # of ``report``
+        if numbers is None:  # of ``log report``
             return make(record, folder, numbers, **options)
         summary_file.write_summary(numbers, folder)
         return artifacts.Artifacts(None, None, ())
@@ -234,7 +234,9 @@ def _midlines(to: Path) -> None:
 def _fish(to: Path) -> None:
     """Both views of a fish whose every angle is known."""
     assert (
-        snakewalk("fish", "film", "tank", "--side", "--frames", "4", "--length-px", "60").returncode
+        snakewalk(
+            "animal", "fish", "film", "tank", "--side", "--frames", "4", "--length-px", "60"
+        ).returncode
         == 0
     )
     for view in ("top", "side"):
@@ -252,7 +254,7 @@ def _track() -> bytes:
     """Captured once for all pages."""
     if not Path("film.mp4").exists():
         _film(Path("film.mp4"))
-    _ran("capture film.mp4 -o")(Path("captured.npz"))
+    _ran("animal capture film.mp4 -o")(Path("captured.npz"))
     return Path("captured.npz").read_bytes()
 
 
@@ -323,14 +325,14 @@ STAND_INS: dict[str, Callable[[Path], object]] = {
     "tracked.csv": lambda to: table(to, read_animal("lizard")),
     "track.npz": _captured,
     "worm.npz": _captured,
-    "NAME.npz": lambda to: _ran("synthesise -o")(to.with_suffix("")),
+    "NAME.npz": lambda to: _ran("animal synthesise -o")(to.with_suffix("")),
     "top.mp4": _fish,
     "dem.tif": _elevation_model,
     "scan.pcd": _point_cloud,
     "heights.png": _heights,
     "my-run.toml": _initial("run.toml"),
     "my-robot.toml": _initial("robot.toml"),
-    "mine.obj": _ran("body worm-like -o"),
+    "mine.obj": _ran("animal body worm-like -o"),
     "snake.urdf": _ran("robot export yaw16 --urdf"),
     "track-corrections.json": _corrections,
     "docs/pictures/walks-fig9.png": lambda to: to.parent.mkdir(parents=True),

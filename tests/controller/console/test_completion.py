@@ -35,12 +35,12 @@ def completed(line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         ("snakewalk gait run sidew", ["sidewinding", "sidewinding-fast"]),
         ("snakewalk robot show yaw", ["yaw16"]),
         ("snakewalk play lam", ["lamprey-like"]),
-        ("snakewalk trials flat-sq", ["flat-square"]),
-        ("snakewalk tune roll", ["rolling"]),
-        ("snakewalk policy run wave-c", ["wave-cma"]),
+        ("snakewalk trials run flat-sq", ["flat-square"]),
+        ("snakewalk gait tune roll", ["rolling"]),
+        ("snakewalk gait policy run wave-c", ["wave-cma"]),
         ("snakewalk run --set world.friction.ac", ["world.friction.across="]),
         ("snakewalk run --set run.walk.no", []),
-        ("snakewalk schema ro", ["robot"]),
+        ("snakewalk tools schema ro", ["robot"]),
     ],
 )
 def test_a_value_is_completed(

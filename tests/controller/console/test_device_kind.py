@@ -37,7 +37,7 @@ def test_other_devices_files_and_links_of_servers_that_ended_are_rejected(tmp_pa
 
 @pytest.mark.parametrize(
     "command",
-    ["run flat-square", "gait run rolling", "doctor", "scan", "calibrate -o mine.toml"],
+    ["run flat-square", "gait run rolling", "doctor", "bus scan", "bus calibrate -o mine.toml"],
 )
 def test_commands_reject_it_before_any_plan(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -76,5 +76,5 @@ def test_the_notice_is_one_line_and_then_progress(monkeypatch: pytest.MonkeyPatc
         report_compiled(name)
     remove()
     report_compiled("f")
-    assert "snakewalk compile" in lines[0]
+    assert "snakewalk tools compile" in lines[0]
     assert lines[1:] == ["compiled 3 loops; last: c", "compiled 5 loops; last: e"]

@@ -113,7 +113,7 @@ def test_a_command_does_not_build_the_options_of_all(mocker: MockerFixture) -> N
     built = mocker.spy(command_line, "called")
     assert CliRunner().invoke(app, ["--help"]).exit_code == 0
     assert built.call_count == 0
-    assert CliRunner().invoke(app, ["schema", "run"]).exit_code == 0
+    assert CliRunner().invoke(app, ["tools", "schema", "run"]).exit_code == 0
     assert [call.args[0].__name__ for call in built.call_args_list] == ["schema"]
 
 
@@ -127,7 +127,9 @@ def test_every_command_has_these_options() -> None:
 def test_every_command_that_moves_a_body_may_be_watched() -> None:
     every = commands(typer.main.get_command(app))
     movers = {name: options for name, options in every.items() if {"--port", "--film"} <= options}
-    assert {"snakewalk run", "snakewalk repertoire run", "snakewalk policy run"} <= set(movers)
+    assert {"snakewalk run", "snakewalk gait repertoire run", "snakewalk gait policy run"} <= set(
+        movers
+    )
     wanted = {"--view", "--view-at", "--ros"}
     assert {name for name, options in movers.items() if not wanted <= options} == set()
 

@@ -160,13 +160,13 @@ def test_a_folder_that_takes_no_file_is_told_before_any_work() -> None:
 
 def arguments(command: str, out: Path) -> list[str]:
     return {
-        "match": ["fish", "match", "midlines.npz", "-o", str(out)],
-        "record": ["repertoire", "record", "-o", str(out)],
-        "tune": ["tune", "rolling", "-o", str(out)],
-        "mesh": ["body", "worm-like", "-o", str(out)],
-        "skin": ["body", "snake", "--animate", "worm-like", "-o", str(out)],
+        "match": ["animal", "fish", "match", "midlines.npz", "-o", str(out)],
+        "record": ["gait", "repertoire", "record", "-o", str(out)],
+        "tune": ["gait", "tune", "rolling", "-o", str(out)],
+        "mesh": ["animal", "body", "worm-like", "-o", str(out)],
+        "skin": ["animal", "body", "snake", "--animate", "worm-like", "-o", str(out)],
         "gait": ["gait", "show", "rolling", "--picture", str(out)],
-        "analysis": ["analyse", "midlines.npz", "--picture", str(out)],
+        "analysis": ["animal", "analyse", "midlines.npz", "--picture", str(out)],
     }[command]
 
 
@@ -269,23 +269,23 @@ def test_a_full_disk_ends_a_run_and_says_what_became_of_torque_and_log(
     part = folder / "log.mcap.part"
     assert capsys.readouterr().err.splitlines()[-1] == (
         f"snakewalk: {part}: File too large; torque is off; the run up to there: "
-        f"snakewalk report {part}"
+        f"snakewalk log report {part}"
     )
     assert [path.name for path in folder.iterdir()] == ["log.mcap.part"]
     assert len(read_log(part).cycle.time_s) > 0
 
 
 BEFORE_WORK = [
-    "sweep rolling -o nosuch/a.csv",
-    "sweep rolling --picture nosuch/a.png",
-    "trials -o nosuch/a.csv",
-    "trials --picture nosuch/a.png",
-    "trials --picture held.png",
-    "tune rolling -o nosuch/a.toml",
-    "repertoire record -o nosuch/a.npz",
-    "repertoire show --picture nosuch/a.png",
-    "track worm-like -o nosuch/a.npz",
-    "walk --picture nosuch/a.png",
+    "gait sweep rolling -o nosuch/a.csv",
+    "gait sweep rolling --picture nosuch/a.png",
+    "trials run -o nosuch/a.csv",
+    "trials run --picture nosuch/a.png",
+    "trials run --picture held.png",
+    "gait tune rolling -o nosuch/a.toml",
+    "gait repertoire record -o nosuch/a.npz",
+    "gait repertoire show --picture nosuch/a.png",
+    "animal track worm-like -o nosuch/a.npz",
+    "animal graph --picture nosuch/a.png",
     "gait show rolling --picture nosuch/a.png",
 ]
 PROGRAM = """

@@ -38,12 +38,14 @@ SLOW = pytest.mark.slow  # they use the pool of trials, which is the only one
 COMMANDS = [
     pytest.param(("robot", "import", "model.xml", "-o", "robot.toml"), id="import"),
     pytest.param(("gait", "run", GAIT, "--seconds", "0.1", "--no-film", *PAGE), id="page"),
-    pytest.param(("trials", GAIT, *SHORT), id="trials"),
-    pytest.param(("sweep", GAIT, "--robot", "yaw16", "--points", "1"), id="sweep", marks=SLOW),
-    pytest.param(("tune", GAIT, "--budget", "16", "--seeds", "1"), id="tune", marks=SLOW),
-    pytest.param(("policy", "trials", GAIT, *SHORT), id="policy-trials", marks=SLOW),
+    pytest.param(("trials", "run", GAIT, *SHORT), id="trials"),
     pytest.param(
-        ("policy", "learn", "-o", "p.toml", "--generations", "1", "--steps", "50"),
+        ("gait", "sweep", GAIT, "--robot", "yaw16", "--points", "1"), id="sweep", marks=SLOW
+    ),
+    pytest.param(("gait", "tune", GAIT, "--budget", "16", "--seeds", "1"), id="tune", marks=SLOW),
+    pytest.param(("trials", "policy", GAIT, *SHORT), id="policy-trials", marks=SLOW),
+    pytest.param(
+        ("gait", "policy", "learn", "-o", "p.toml", "--generations", "1", "--steps", "50"),
         id="policy-learn",
         marks=SLOW,
     ),
@@ -111,7 +113,7 @@ def test_studies_of_logs_execute_no_file_of_the_working_folder(folder: Folder) -
     words = ["lateral-undulation", "--seconds", "6", "--no-film", "--out", "run"]
     assert folder.run(folder.script, "gait", "run", *words).returncode == 0
     log = "run/log.mcap"
-    for command in (("shadow", log), ("identify", log)):
+    for command in (("log", "shadow", log), ("robot", "identify", log)):
         ended = folder.run(folder.script, *command)
         assert folder.executed == ""
         assert ended.returncode in {0, 1}, ended.stderr

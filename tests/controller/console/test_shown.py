@@ -33,9 +33,12 @@ def test_a_table_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> 
     ("words", "said"),
     [
         (["plan", "flat-square", "--motion", "gait"], "motion gait needs a table [gait]"),
-        (["body", "worm-like", "-o", "b.glb", "--aspect", "-1"], "aspect: height over width"),
-        (["fish", "match", ".", "-o", "postures.csv"], "is an .npz"),
-        (["fish", "synthesise", "."], "is a folder"),
+        (
+            ["animal", "body", "worm-like", "-o", "b.glb", "--aspect", "-1"],
+            "aspect: height over width",
+        ),
+        (["animal", "fish", "match", ".", "-o", "postures.csv"], "is an .npz"),
+        (["animal", "fish", "synthesise", "."], "is a folder"),
     ],
 )
 def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
@@ -49,7 +52,7 @@ def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["trials", "--seeds", "0"], "--seeds: "),
+        (["trials", "run", "--seeds", "0"], "--seeds: "),
         (["list", "--log-level", "loud"], "--log-level: 'loud' is not one of 'debug', 'info'"),
         (["run", "--bogus"], "No such option: --bogus"),
         (["gait", "show"], "name: is required"),
@@ -103,7 +106,7 @@ def test_a_narrow_table_of_trials_keeps_its_numbers(
     mocker.patch("snakewalk.controller.studies.trials.plan_trials", return_value=[])
     mocker.patch("snakewalk.controller.studies.trials.trials", return_value=found)
     monkeypatch.setattr(options.console, "_width", columns)
-    words = "trials jacksboro-traverse --motion walk-printed --robot alternating16 --relief 0.5"
+    words = "trials run jacksboro-traverse --motion walk-printed --robot alternating16 --relief 0.5"
     app(words.split(), standalone_mode=False)
     shown = capsys.readouterr().out
     for number in ("20 of 20", "61.2", "0.123", "0.46", "0.79", "12.3"):

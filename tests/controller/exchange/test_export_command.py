@@ -1,4 +1,4 @@
-"""``snakewalk export``: what it writes, and what it refuses."""
+"""``snakewalk log export``: what it writes, and what it refuses."""
 
 import csv
 import json
@@ -14,12 +14,12 @@ from snakewalk.controller.runlog.record import RunRecord
 
 
 def run(*words: str | Path) -> str:
-    done = CliRunner().invoke(app, ["export", *map(str, words)], catch_exceptions=False)
+    done = CliRunner().invoke(app, ["log", "export", *map(str, words)], catch_exceptions=False)
     return done.output
 
 
 def refused(*words: str | Path) -> str:
-    done = CliRunner().invoke(app, ["export", *map(str, words)])
+    done = CliRunner().invoke(app, ["log", "export", *map(str, words)])
     assert isinstance(done.exception, InputError), done.output
     return str(done.exception)
 

@@ -36,7 +36,7 @@ def test_a_file_with_a_gait_is_a_set_of_its_parameters(tmp_path: Path) -> None:
 def test_the_table_has_a_row_for_each_motion_and_world(monkeypatch: pytest.MonkeyPatch) -> None:
     work_in_this_process(monkeypatch)
     words = ["wave-cma", "lateral-undulation", "wave-cma", "--seeds", "1", "--first-seed", "40"]
-    done = snakewalk("policy", "trials", *words, "--seconds", "5", "--json", "-q")
+    done = snakewalk("trials", "policy", *words, "--seconds", "5", "--json", "-q")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert len(found["trials"]) == 2  # what is given twice is run once

@@ -154,7 +154,17 @@ def test_the_command_continues_and_names_what_differs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = ["policy", "learn", "-o", "mine.toml", "--generations", "4", "--population", "6"]
+    words = [
+        "gait",
+        "policy",
+        "learn",
+        "-o",
+        "mine.toml",
+        "--generations",
+        "4",
+        "--population",
+        "6",
+    ]
     words += ["--workers", "1"]
 
     def learn(*more: str) -> object:

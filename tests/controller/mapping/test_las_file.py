@@ -199,7 +199,7 @@ def test_too_many_points_are_asked_to_be_cropped(
 def test_the_command_reads_it_and_notes_what_it_left_out(tmp_path: Path) -> None:
     points, kinds = cloud()
     file, out = write(tmp_path / "a.laz", points, kinds, wkt=UTM), tmp_path / "w.toml"
-    words = ["terrain", "from", str(file), "-o", str(out), "--scale", "0.1", "--json"]
+    words = ["world", "from", str(file), "-o", str(out), "--scale", "0.1", "--json"]
     ran = CliRunner().invoke(app, words)
     assert ran.exit_code == 0, ran.output
     assert json.loads(ran.stdout)["notes"][0].startswith("3960 points of 6000 are used")

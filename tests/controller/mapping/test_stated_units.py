@@ -391,7 +391,7 @@ def test_points_without_numbers_and_a_pose_of_the_sensor_are_noted(tmp_path: Pat
 
 def test_the_result_and_the_worlds_file_hold_the_notes(tmp_path: Path) -> None:
     file, out = geotiff(tmp_path / "a.tif", unit="ft"), tmp_path / "w.toml"
-    words = ["terrain", "from", str(file), "-o", str(out), "--json", "--scale", "0.1"]
+    words = ["world", "from", str(file), "-o", str(out), "--json", "--scale", "0.1"]
     ran = CliRunner().invoke(app, words)
     assert ran.exit_code == 0, ran.output
     assert json.loads(ran.stdout)["notes"] == ["heights are in ft, as it states"]

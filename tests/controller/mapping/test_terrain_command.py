@@ -1,4 +1,4 @@
-"""``snakewalk terrain``: from a file to a world that is planned on; what is refused."""
+"""``snakewalk world``: from a file to a world that is planned on; what is refused."""
 
 import json
 from pathlib import Path
@@ -43,7 +43,7 @@ def test_a_file_becomes_a_world_that_is_planned_on(tmp_path: Path) -> None:
     file, world = hollow(tmp_path), tmp_path / "level.toml"
     picture = tmp_path / "level.png"
     made = call(
-        "terrain",
+        "world",
         "from",
         file,
         "-o",
@@ -70,7 +70,7 @@ def test_a_file_becomes_a_world_that_is_planned_on(tmp_path: Path) -> None:
 
 def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path: Path) -> None:
     file, world = hollow(tmp_path), tmp_path / "w.toml"
-    words = ("terrain", "from", file, "-o", world)
+    words = ("world", "from", file, "-o", world)
     for more, expected in (
         (("--scale", -1), "--scale -1: must be above 0"),
         (("--spacing", 0), "--spacing 0: must be above 0"),
@@ -86,10 +86,10 @@ def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path: Path) -> None:
         (("--cell", 0.1, "--unit", "deg"), "states no latitude"),
     ):
         assert expected in refused(*words, *more)
-    assert "a world's file ends in .toml" in refused("terrain", "from", file, "-o", "w")
+    assert "a world's file ends in .toml" in refused("world", "from", file, "-o", "w")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["level.npz"]
     (tmp_path / "w-map.npz").write_bytes(file.read_bytes())
-    own = ("terrain", "from", tmp_path / "w-map.npz", "-o", world, "--cell", 0.1)
+    own = ("world", "from", tmp_path / "w-map.npz", "-o", world, "--cell", 0.1)
     assert "w-map.npz: exists" in refused(*own)
     assert "is read, and would be overwritten" in refused(*own, "--force")
 
@@ -110,7 +110,7 @@ def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path
         cv2.imwrite(str(tmp_path / name), np.clip(map_coordinates(grain, at, order=3), 0, 255))
     k = [[f, 0.0, 159.5], [0.0, f, 119.5], [0.0, 0.0, 1.0]]
     np.savez(tmp_path / "c.npz", K1=k, K2=k, R=np.eye(3), T=[-1000 * baseline_m, 0.0, 0.0])
-    pair = ("terrain", "from-stereo", tmp_path / "l.png", tmp_path / "r.png")
+    pair = ("world", "stereo", tmp_path / "l.png", tmp_path / "r.png")
     plain = (*pair, "--calibration", tmp_path / "c.npz", "-o", tmp_path / "y.toml")
     words = (*plain, "--unit", "mm")
     made = call(*words, "--disparities", 64, "--far", 1.5, "--spacing", 0.04)

@@ -196,7 +196,7 @@ def test_results_are_continued(
             ("bus", "serve", "--robot", "yaw16", "--pose-out", "udp:9", "--tracker", "noise=1"),
             "noise",
         ),
-        (("judge", "nothing.jsonl", "log.mcap"), "log.mcap"),
+        (("log", "judge", "nothing.jsonl", "log.mcap"), "log.mcap"),
         (("run", "flat-slalom", "--pose", "udp:9870"), "measures a robot on a port; add --port"),
         (("run", "flat-slalom", "--port", "x", "--pose", "udp:"), "expected PORT or HOST:PORT"),
     ],

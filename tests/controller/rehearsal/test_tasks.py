@@ -39,7 +39,17 @@ def test_a_short_swim_and_a_walk_without_waypoints(
     )
     monkeypatch.setattr(tasks, "TASKS", short)
     out = tmp_path / "tasks.jsonl"
-    words = ["tasks", "swimming", "--controller", "gait", "--controller", "walk", "-o", str(out)]
+    words = [
+        "trials",
+        "tasks",
+        "swimming",
+        "--controller",
+        "gait",
+        "--controller",
+        "walk",
+        "-o",
+        str(out),
+    ]
     found = json.loads(CliRunner().invoke(app, [*words, "--json"], catch_exceptions=False).stdout)
     swum, walked = found["tasks"]
     assert 0.1 < swum["share"] < 1.0

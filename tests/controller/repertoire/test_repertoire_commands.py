@@ -1,4 +1,4 @@
-"""``snakewalk repertoire`` and ``snakewalk plan --with repertoire`` from outside."""
+"""``snakewalk gait repertoire`` and ``snakewalk plan --with repertoire`` from outside."""
 
 import json
 from pathlib import Path
@@ -16,9 +16,9 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_help_has_an_example() -> None:
     for command in ("record", "show", "play", "run"):
-        done = snakewalk("repertoire", command, "--help")
+        done = snakewalk("gait", "repertoire", command, "--help")
         assert done.returncode == 0, done.stderr
-        assert f"snakewalk repertoire {command}" in done.stdout
+        assert f"snakewalk gait repertoire {command}" in done.stdout
 
 
 def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Path) -> None:
@@ -33,7 +33,7 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
     again = snakewalk(*words)
     assert again.returncode == 2
     assert again.stderr == "snakewalk: plan.json: exists; --force overwrites it\n"
-    shown = snakewalk("repertoire", "show", "repertoire-yaw16-flat.npz", "--json")
+    shown = snakewalk("gait", "repertoire", "show", "repertoire-yaw16-flat.npz", "--json")
     rows = json.loads(shown.stdout)["actions"]
     assert [row["name"] for row in rows] == [segment.name for segment in repertoire.segments]
 
@@ -42,21 +42,24 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
     ("words", "said"),
     [
         (("plan", "--with", "physics"), "--with physics: unknown; valid: repertoire"),
-        (("plan", "flat-slalom", "--with", "repertoire"), "snakewalk repertoire record"),
+        (("plan", "flat-slalom", "--with", "repertoire"), "snakewalk gait repertoire record"),
         (
             ("plan", "flat-slalom", "--with", "repertoire", "--motion", "walk"),
             "does not use --motion",
         ),
         (("plan", "flat-slalom", "--run"), "belong to --with repertoire"),
-        (("repertoire", "record", "--world", "jacksboro-gentle"), "flat one"),
-        (("repertoire", "record", "-o", "no/where.npz"), "no such folder"),
-        (("repertoire", "record", "--robot", "nosuch"), "nosuch"),
-        (("repertoire", "show", "none.npz"), "no such file"),
-        (("repertoire", "run", "none.json"), "no such plan"),
-        (("repertoire", "play", "none.npz"), "no such file"),
-        (("repertoire", "play", "--speed", "1", "--schedule", "a.csv"), "leave out --speed"),
-        (("repertoire", "play", "--schedule", "none.toml"), "none.toml"),
-        (("repertoire", "play", "--seconds", "0"), "must be over 0"),
+        (("gait", "repertoire", "record", "--world", "jacksboro-gentle"), "flat one"),
+        (("gait", "repertoire", "record", "-o", "no/where.npz"), "no such folder"),
+        (("gait", "repertoire", "record", "--robot", "nosuch"), "nosuch"),
+        (("gait", "repertoire", "show", "none.npz"), "no such file"),
+        (("gait", "repertoire", "run", "none.json"), "no such plan"),
+        (("gait", "repertoire", "play", "none.npz"), "no such file"),
+        (
+            ("gait", "repertoire", "play", "--speed", "1", "--schedule", "a.csv"),
+            "leave out --speed",
+        ),
+        (("gait", "repertoire", "play", "--schedule", "none.toml"), "none.toml"),
+        (("gait", "repertoire", "play", "--seconds", "0"), "must be over 0"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(

@@ -115,7 +115,7 @@ def test_a_plan_reaches_its_waypoints_on_the_bus_though_each_action_misses_a_lit
     assert outcome.duration_s < 1.6 * job.route.duration_s
     _, blind = physics_route(job, job.route.actions)
     assert blind.route_errors()[-1, 0] > 2.0 * np.median(errors[:, 0])
-    with pytest.raises(InputError, match="repertoire run"):
+    with pytest.raises(InputError, match="gait repertoire run"):
         prepare_run(job.run, job.robot, job.world)
 
 

@@ -1,4 +1,4 @@
-"""``repertoire play``: wanted speed and turn become actions, on the simulated bus."""
+"""``gait repertoire play``: wanted speed and turn become actions, on the simulated bus."""
 
 from pathlib import Path
 
@@ -114,7 +114,7 @@ def test_a_direction_that_was_not_recorded_is_rejected_before_torque(
 ) -> None:
     out = ("--out", str(tmp_path / "run"), "--no-film")
     done = snakewalk(
-        *("repertoire", "play", str(file), "--speed=-0.4", "--turn", "0.3", *port, *out)
+        *("gait", "repertoire", "play", str(file), "--speed=-0.4", "--turn", "0.3", *port, *out)
     )
     assert done.returncode == 2
     assert "no action goes backward and turns left (-0.4 m/s, 0.3 rad/s from 0.0 s)" in done.stderr

@@ -35,7 +35,7 @@ COMMANDS = {
     "gait run": GAIT,
     "gait run --then": (*GAIT[:-1], "2", "--then", "lateral-undulation@1"),
     "play": ("play", "still.csv"),
-    "policy run": ("policy", "run", "wave-cma", "--seconds", "2"),
+    "gait policy run": ("gait", "policy", "run", "wave-cma", "--seconds", "2"),
 }
 OF_THE_POSE = {
     field.name.removeprefix("dead_reckoned_")

@@ -46,7 +46,7 @@ def test_an_interrupted_run_says_what_became_of_torque_and_log(
     log = tmp_path / "log.mcap"
     assert stop.value.__notes__ == [
         "torque is off",
-        f"log: {log}; its page: snakewalk report {log}",
+        f"log: {log}; its page: snakewalk log report {log}",
     ]
     assert [path.name for path in tmp_path.iterdir()] == ["log.mcap"]
     record = read_log(log)
@@ -84,7 +84,7 @@ def test_a_torque_off_that_is_not_confirmed_says_what_tripped_and_where_the_log_
     told = "; ".join(line.removeprefix("snakewalk: ") for line in lines)
     assert told.endswith(
         f"joint 3 is not confirmed; tripped by: a hand; log: {log}; its page: "
-        f"snakewalk report {log}"
+        f"snakewalk log report {log}"
     )
     assert read_log(log).events[-1].text == "joint 3 is not confirmed"
 
@@ -97,7 +97,9 @@ def test_a_run_that_is_over_is_whole_when_its_summary_is_interrupted(
     with pytest.raises(KeyboardInterrupt) as stop:
         execute(prepare_gait("lateral-undulation", seconds=0.2), tmp_path)
     log = tmp_path / "log.mcap"
-    assert stop.value.__notes__ == [f"the run is whole: {log}; its page: snakewalk report {log}"]
+    assert stop.value.__notes__ == [
+        f"the run is whole: {log}; its page: snakewalk log report {log}"
+    ]
     assert read_log(log).complete
 
 
@@ -116,7 +118,7 @@ def test_the_command_line_prints_it(
     assert end.value.code == 130
     log = Path("runs") / "gait-lateral-undulation-yaw16" / "log.mcap"
     assert capsys.readouterr().err.splitlines()[-1] == (
-        f"snakewalk: interrupted; torque is off; log: {log}; its page: snakewalk report {log}"
+        f"snakewalk: interrupted; torque is off; log: {log}; its page: snakewalk log report {log}"
     )
 
 
@@ -179,7 +181,9 @@ def test_what_is_imported_before_an_interrupt_is_caught_is_little() -> None:
     assert not loaded & {"typer", "rich", "pydantic", "numpy", "numba", "scipy", "mujoco"}
 
 
-@pytest.mark.parametrize("words", [("report", "{pipe}"), ("bus", "serve", "--faults", "{pipe}")])
+@pytest.mark.parametrize(
+    "words", [("log", "report", "{pipe}"), ("bus", "serve", "--faults", "{pipe}")]
+)
 def test_a_named_pipe_that_is_waited_for_is_told(
     words: tuple[str, ...],
     tmp_path: Path,
@@ -206,7 +210,7 @@ def test_a_named_pipe_that_is_waited_for_is_told(
         ("gait", "run", "lateral-undulation", "--robot", "{pipe}"),
         ("plan", "{pipe}"),
         ("gait", "fit", "{pipe}"),
-        ("capture", "{pipe}"),
+        ("animal", "capture", "{pipe}"),
     ],
 )
 def test_a_named_pipe_is_not_told_to_be_missing(

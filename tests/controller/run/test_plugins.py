@@ -81,7 +81,7 @@ def count(argument):
     counter.file.write_text(str(counter.rows))
 
 
-@command("hello", group="The job", examples=("hello",))
+@command("hello", examples=("hello",))
 def hello() -> None:
     """Say hello."""
     print("hello from another package")

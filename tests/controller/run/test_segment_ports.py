@@ -120,7 +120,7 @@ def test_ports_that_do_not_fit_are_refused(
 
 def test_a_command_for_one_port_says_so(tmp_path: Path) -> None:
     done = snakewalk(
-        *("calibrate", "--robot", "yaw16", "--port", "1-8=/dev/a,9-16=/dev/b"),
+        *("bus", "calibrate", "--robot", "yaw16", "--port", "1-8=/dev/a,9-16=/dev/b"),
         *("-o", str(tmp_path / "mine.toml")),
     )
     assert done.returncode == 2

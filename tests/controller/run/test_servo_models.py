@@ -72,10 +72,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "run short.toml --no-film",
         "gait run lateral-undulation --seconds 2 --no-film",
         "play bends.npz --no-film",
-        "sweep lateral-undulation --points 1 --seconds 4 -o sweep.csv",
-        "tune lateral-undulation --budget 16 --seconds 4 --seeds 1",
-        "repertoire record",
-        "trials short.toml --motion serpenoid --seeds 1 -o t.csv",
+        "gait sweep lateral-undulation --points 1 --seconds 4 -o sweep.csv",
+        "gait tune lateral-undulation --budget 16 --seconds 4 --seeds 1",
+        "gait repertoire record",
+        "trials run short.toml --motion serpenoid --seeds 1 -o t.csv",
     ],
 )
 def test_a_robot_from_the_pages_goes_through_every_command(

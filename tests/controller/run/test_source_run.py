@@ -186,7 +186,9 @@ def test_report_and_replay_need_the_log_alone(finished: Finished, tmp_path: Path
 
 def test_a_run_is_not_made_again_from_its_log(finished: Finished) -> None:
     header = finished.record.header
-    with pytest.raises(InputError, match=r"its motion was the user's own.*snakewalk replay LOG"):
+    with pytest.raises(
+        InputError, match=r"its motion was the user's own.*snakewalk log replay LOG"
+    ):
         prepare_run(header.run, header.robot, header.world)
 
 

@@ -79,7 +79,9 @@ def test_claims_of_the_paper_on_sparse_graphs() -> None:
 def test_the_command_compares_rules_as_json_and_draws_them(tmp_path: Path) -> None:
     picture = tmp_path / "curves.png"
     words = ("--graph", "er:60:5", "--graph", "ws:60:4:0.1", "--rule", "snake", "--rule", "stack")
-    done = snakewalk("walk", *words, "--repeats", "3", "--picture", str(picture), "--json")
+    done = snakewalk(
+        "animal", "graph", *words, "--repeats", "3", "--picture", str(picture), "--json"
+    )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert [(one["graph"], one["rule"]) for one in found] == [
@@ -91,7 +93,7 @@ def test_the_command_compares_rules_as_json_and_draws_them(tmp_path: Path) -> No
 
 
 def test_the_command_shows_a_table() -> None:
-    done = snakewalk("walk", "--graph", "er:60:5", "--repeats", "2")
+    done = snakewalk("animal", "graph", "--graph", "er:60:5", "--repeats", "2")
     assert done.returncode == 0, done.stderr
     for word in ("er:60:5", "snake-printed", "stack", "random", "degree", "2 graphs of each kind"):
         assert word in done.stdout
@@ -108,7 +110,7 @@ def test_the_command_shows_a_table() -> None:
     ],
 )
 def test_bad_input_ends_with_exit_code_2_before_any_walk(words: list[str], said: str) -> None:
-    done = snakewalk("walk", *words)
+    done = snakewalk("animal", "graph", *words)
     assert done.returncode == 2
     assert said in done.stderr
     assert "Traceback" not in done.stderr

@@ -102,7 +102,7 @@ def test_a_log_without_a_cycle_is_refused(record: RunRecord, tmp_path: Path) -> 
 
 def test_the_command_says_the_same_and_exits_by_it(log: Path, tmp_path: Path) -> None:
     kept = tmp_path / "kept.mcap"
-    done = CliRunner().invoke(app, ["replay", str(log), "--json", "--out", str(kept)])
+    done = CliRunner().invoke(app, ["log", "replay", str(log), "--json", "--out", str(kept)])
     assert done.exit_code == 0
     found = json.loads(done.stdout)
     assert found["identical"] is True

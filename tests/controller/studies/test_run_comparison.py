@@ -69,13 +69,13 @@ def test_the_command_compares_and_draws(make: Make, tmp_path: Path) -> None:
         for name, seconds, seed in (("one.mcap", 8.0, 0), ("two.mcap", 12.0, 3))
     ]
     picture = tmp_path / "both.png"
-    done = CliRunner().invoke(app, ["compare", *logs, "--picture", str(picture), "--json"])
+    done = CliRunner().invoke(app, ["log", "compare", *logs, "--picture", str(picture), "--json"])
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert told["differing"] == {"run.seed": [0, 3]}
     assert [s["duration_s"] > 10.0 for s in told["summaries"]] == [False, True]
     assert picture.read_bytes().startswith(b"\x89PNG")
-    table = CliRunner().invoke(app, ["compare", *logs]).stdout
+    table = CliRunner().invoke(app, ["log", "compare", *logs]).stdout
     assert "{" not in table
     assert "run.seed" in table
     assert "path error mean m" in table
@@ -90,6 +90,6 @@ def test_long_names_are_told_apart_at_80_columns(
         folder.mkdir()
         logs.append(str(make(folder / "log.mcap", seconds=4.0, seed=seed)))
     monkeypatch.setattr(options.console, "_width", 80)
-    table = CliRunner().invoke(app, ["compare", *logs]).stdout
+    table = CliRunner().invoke(app, ["log", "compare", *logs]).stdout
     assert all(table.count(f"seed{seed}") == 2 for seed in range(3))
     assert "\N{HORIZONTAL ELLIPSIS}" not in table

@@ -60,7 +60,7 @@ def test_without_the_extra_the_command_names_it(
         "snakewalk.config.extras.find_spec",
         lambda name: None if name in {"warp", "mujoco_warp"} else installed(name),
     )
-    ran = snakewalk("sweep", "rolling", "--points", "1", "--backend", "warp")
+    ran = snakewalk("gait", "sweep", "rolling", "--points", "1", "--backend", "warp")
     assert ran.returncode == 2
     fault = "--backend warp needs Warp and MuJoCo-Warp: pip install 'snakewalk[warp]'"
     assert ran.stderr.strip() == f"snakewalk: {fault}"

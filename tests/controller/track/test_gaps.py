@@ -123,10 +123,13 @@ def test_missing_frames_and_notes_are_in_the_result_of_both_commands(tmp_path: P
     for k, body in zip(four_gaps(37).tolist(), track.points[:, ::10], strict=True):
         rows += [f"{k / 25.0:.4f},{k},{n},{x:.6f},{y:.6f}" for n, (x, y) in enumerate(body)]
     (tmp_path / "gaps.csv").write_text("\n".join(rows))
-    (facts,) = json.loads(snakewalk("track", str(tmp_path / "gaps.csv"), "--json").stdout)
+    (facts,) = json.loads(snakewalk("animal", "track", str(tmp_path / "gaps.csv"), "--json").stdout)
     assert facts["frames_missing"] == 148
     for name in ("track", "analyse"):
-        assert "148 missing in the file" in snakewalk(name, str(tmp_path / "gaps.csv")).stdout
+        assert (
+            "148 missing in the file"
+            in snakewalk("animal", name, str(tmp_path / "gaps.csv")).stdout
+        )
 
 
 def test_notes_stay_in_the_file_that_is_written(tmp_path: Path) -> None:

@@ -212,7 +212,7 @@ def test_what_is_not_told_is_no_number_anywhere(tmp_path: Path) -> None:
     points = wave_track(0.8, frames=120).points + noise
     save_track(tmp_path / "noisy.npz", track_from_points("noisy", points, 40.0, scale_m=1.0))
     files = [str(tmp_path / name) for name in ("coarse.npz", "noisy.npz")]
-    done = snakewalk("analyse", *files, "--picture", str(tmp_path), "--json")
+    done = snakewalk("animal", "analyse", *files, "--picture", str(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
     assert "NaN" not in done.stdout
     few, noisy = json.loads(done.stdout)
@@ -226,7 +226,9 @@ def test_what_is_not_told_is_no_number_anywhere(tmp_path: Path) -> None:
         assert few[key] is None
     assert (tmp_path / "coarse.png").read_bytes().startswith(b"\x89PNG")
     for command in ("analyse", "track"):
-        assert "not stated: 3.2 frames" in " ".join(snakewalk(command, files[0]).stdout.split())
+        assert "not stated: 3.2 frames" in " ".join(
+            snakewalk("animal", command, files[0]).stdout.split()
+        )
 
 
 def test_nothing_to_analyse_is_one_line() -> None:
@@ -266,7 +268,14 @@ def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
 
 def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
     save_track(tmp_path / "mine.npz", wave_track(0.8))
-    words = ["analyse", str(tmp_path / "mine.npz"), "lamprey-like", "--picture", str(tmp_path)]
+    words = [
+        "animal",
+        "analyse",
+        str(tmp_path / "mine.npz"),
+        "lamprey-like",
+        "--picture",
+        str(tmp_path),
+    ]
     done = snakewalk(*words, "--json")
     assert done.returncode == 0, done.stderr
     mine, shipped = json.loads(done.stdout)
@@ -276,7 +285,7 @@ def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
     again = snakewalk(*words)
     assert again.returncode == 2
     assert "mine.png: exists; --force overwrites it" in again.stderr
-    table = snakewalk("analyse", words[1], "--min-score", "0").stdout
+    table = snakewalk("animal", "analyse", words[2], "--min-score", "0").stdout
     assert "sliding weight w_d" in table
 
 
@@ -290,7 +299,7 @@ def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_ends_with_2(words: list[str], said: str) -> None:
-    done = snakewalk("analyse", *words)
+    done = snakewalk("animal", "analyse", *words)
     assert done.returncode == 2
     assert said in done.stderr
     assert "Traceback" not in done.stderr

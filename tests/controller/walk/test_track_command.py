@@ -1,4 +1,4 @@
-"""``snakewalk track``: table, JSON, picture and refusals; what a robot refuses."""
+"""``snakewalk animal track``: table, JSON, picture and refusals; what a robot refuses."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("legible_figures")
 def test_a_file_and_a_shipped_name_as_json_with_a_picture(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", points=ends(wave_angles(), 0.3), rate_hz=20.0, length_m=0.3)
     done = snakewalk(
-        "track", "worm-like", str(tmp_path / "mine.npz"), "--json",
+        "animal", "track", "worm-like", str(tmp_path / "mine.npz"), "--json",
         "--robot", "alternating16", "--rate", "40", "--picture", str(tmp_path / "out.png"),
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -32,7 +32,7 @@ def test_a_file_and_a_shipped_name_as_json_with_a_picture(tmp_path: Path) -> Non
 
 def test_a_recording_that_is_listed_tail_first_is_warned_of(tmp_path: Path) -> None:
     np.savez(tmp_path / "tail.npz", points=ends(wave_angles())[:, ::-1], rate_hz=20.0)
-    done = snakewalk("track", str(tmp_path / "tail.npz"))
+    done = snakewalk("animal", "track", str(tmp_path / "tail.npz"))
     assert done.returncode == 0, done.stderr
     assert "or tail first" in done.stdout
 
@@ -45,7 +45,7 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
         (["--robot", "nosuch"], "no such robot"),
         (["worm-like", "--picture", str(tmp_path / "a.docx")], "a.docx"),
     ):
-        done = snakewalk("track", *words)
+        done = snakewalk("animal", "track", *words)
         assert done.returncode == 2, (words, done.stderr)
         assert said in done.stderr
         assert "Traceback" not in done.stderr

@@ -268,11 +268,11 @@ def test_a_url_without_host_and_port_is_told_what_is_expected(kind: str, place: 
 @pytest.mark.parametrize(
     "command",
     [
-        "scan",
+        "bus scan",
         "doctor",
         "stop",
-        "calibrate -o r.toml",
-        "bus identify",
+        "bus calibrate -o r.toml",
+        "bus inventory",
         "bus backup -o b.json",
         "bus blink --id 1",
         "bus reboot --id 1",

@@ -1,4 +1,4 @@
-"""``snakewalk fish``: from a rendered film to a track for a run; bad input in one line."""
+"""``snakewalk animal fish``: from a rendered film to a track for a run; bad input in one line."""
 
 import json
 from pathlib import Path
@@ -22,14 +22,16 @@ PNG = b"\x89PNG"
 
 
 def snakewalk(*words: object) -> dict[str, object]:
-    done = CliRunner().invoke(app, ["fish", *map(str, words), "--json"], catch_exceptions=False)
+    done = CliRunner().invoke(
+        app, ["animal", "fish", *map(str, words), "--json"], catch_exceptions=False
+    )
     assert done.exit_code == 0, done.output
     found: dict[str, object] = json.loads(done.stdout)
     return found
 
 
 def refused(*words: object) -> str:
-    done = CliRunner().invoke(app, ["fish", *map(str, words)])
+    done = CliRunner().invoke(app, ["animal", "fish", *map(str, words)])
     assert isinstance(done.exception, InputError), (words, done.output, done.exception)
     assert len(done.exception.faults) == 1
     assert "\n" not in done.exception.faults[0]
@@ -141,16 +143,24 @@ def test_bad_input_is_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["match", "synthesise", "film"])
 def test_help_shows_an_example(name: str) -> None:
-    done = CliRunner().invoke(app, ["fish", name, "--help"])
+    done = CliRunner().invoke(app, ["animal", "fish", name, "--help"])
     assert done.exit_code == 0
-    assert f"snakewalk fish {name}" in done.stdout
+    assert f"snakewalk animal fish {name}" in done.stdout
 
 
 def test_a_fish_that_cannot_keep_its_distance_is_reported(tmp_path: Path) -> None:
     """A fish of nearly straight segments left its tank by 15 lengths without a word."""
     save_postures(tmp_path / "postures.npz", swim())
     first = tmp_path / "first.npz"
-    words = ["fish", "synthesise", str(tmp_path / "postures.npz"), "--seconds", "6", "--json"]
+    words = [
+        "animal",
+        "fish",
+        "synthesise",
+        str(tmp_path / "postures.npz"),
+        "--seconds",
+        "6",
+        "--json",
+    ]
     for options, warning in (
         (["--tank=-20,-20,20,20", "-o", str(first)], ""),
         (["--tank=-1.2,-0.3,0.4,0.3", "--apart", "0.1"], "the fish leaves the tank by"),

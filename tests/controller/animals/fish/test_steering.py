@@ -80,7 +80,7 @@ def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
     assert ways[False] < 0.2
     assert ways[True] > 0.4
     np.savez(tmp_path / "x.npz", a=1)
-    with pytest.raises(InputError, match="not a track of snakewalk fish synthesise"):
+    with pytest.raises(InputError, match="not a track of snakewalk animal fish synthesise"):
         synthesise_motion(TRUTH, SynthesisOptions(through=[], avoid=(tmp_path / "x.npz",)))
 
 

@@ -136,7 +136,13 @@ def test_from_a_tracker_s_table_to_a_walk_on_hills(tmp_path: Path) -> None:
     table(tmp_path / "tracked.csv", lizard)
     rate = 24 / lizard.cycle_s
     words = [
-        *("stride", str(tmp_path / "tracked.csv"), "--spine", "nose,neck,mid,hip,tail,tip"),
+        *(
+            "animal",
+            "stride",
+            str(tmp_path / "tracked.csv"),
+            "--spine",
+            "nose,neck,mid,hip,tail,tip",
+        ),
         *("--girdles", "neck,hip", "--feet", "FL,FR,HL,HR", "--rate", str(rate)),
         *("-o", str(tmp_path / "mine.toml"), "--picture", str(tmp_path / "fit.png")),
     ]
@@ -148,7 +154,7 @@ def test_from_a_tracker_s_table_to_a_walk_on_hills(tmp_path: Path) -> None:
     assert mine.leg_pairs[1].turn_rad == pytest.approx(lizard.leg_pairs[1].turn_rad, abs=0.03)
     assert mine.leg_pairs[0].upper == lizard.leg_pairs[0].upper  # not measured from above
     made = snakewalk(
-        *("synthesise", "flat-square", "--animal", str(tmp_path / "mine.toml")),
+        *("animal", "synthesise", "flat-square", "--animal", str(tmp_path / "mine.toml")),
         *("-o", str(tmp_path / "walk"), "--frames", "20"),
     )
     assert made.returncode == 0, made.stderr
@@ -213,7 +219,7 @@ def test_wrong_names_are_told(option: str, value: str, fault: str, tmp_path: Pat
     given = {"--spine": "nose,neck,hip,tip", "--girdles": "neck,hip", "--feet": "FL,FR,HL,HR"}
     words = [word for pair in (given | {option: value}).items() for word in pair]
     done = snakewalk(
-        "stride", str(tmp_path / "tracked.csv"), *words, "-o", str(tmp_path / "a.toml")
+        "animal", "stride", str(tmp_path / "tracked.csv"), *words, "-o", str(tmp_path / "a.toml")
     )
     assert done.returncode == 2
     assert fault in done.stderr
@@ -225,6 +231,6 @@ def test_midlines_have_no_legs(tmp_path: Path) -> None:
     rows = [f"{0.1 * k},{k},{p},{-0.1 * p},0" for k in range(5) for p in range(5)]
     file.write_text("t,frame,point,x_m,y_m\n" + "\n".join(rows))
     words = ["--spine", "a,b,c", "--girdles", "a,b", "--feet", "d,e,f,g"]
-    done = snakewalk("stride", str(file), *words, "-o", str(tmp_path / "a.toml"))
+    done = snakewalk("animal", "stride", str(file), *words, "-o", str(tmp_path / "a.toml"))
     assert done.returncode == 2
     assert "names no keypoints" in done.stderr or "holds midlines" in done.stderr

@@ -127,7 +127,7 @@ def test_the_command_writes_reports_and_does_not_overwrite(tmp_path: Path) -> No
     write_track(tmp_path / "t.npz", length_m=0.4)
     Image.fromarray(picture()).save(tmp_path / "0.png")
     words = [
-        "body", str(tmp_path / "t.npz"), "--image", str(tmp_path / "0.png"),
+        "animal", "body", str(tmp_path / "t.npz"), "--image", str(tmp_path / "0.png"),
         "-o", str(tmp_path / "b.obj"), "--json",
     ]  # fmt: skip
     done = snakewalk(*words)
@@ -162,7 +162,7 @@ def test_bad_input_is_one_line(
     monkeypatch.chdir(tmp_path)
     write_track(tmp_path / "t.npz")
     Image.fromarray(picture()[:30, :30]).save("small.png")
-    done = snakewalk("body", *words)
+    done = snakewalk("animal", "body", *words)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
     assert said in done.stderr

@@ -153,7 +153,7 @@ def write_views(folder: Path) -> list[str]:
         )
     for view, gain in (("top", 1.0), ("left", 0.7), ("right", 1.0)):
         Image.fromarray(photograph(view, gain).image).save(folder / f"{view}.png")
-    return ["body", "top.npz", "--side", "side.npz", "--json"]
+    return ["animal", "body", "top.npz", "--side", "side.npz", "--json"]
 
 
 def test_the_command_reports_what_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,6 +196,6 @@ def test_wrong_photographs_are_rejected(
 def test_a_side_photograph_needs_its_track(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     write_views(tmp_path)
-    done = snakewalk("body", "top.npz", "--image", "left=left.png", "-o", "b.glb")
+    done = snakewalk("animal", "body", "top.npz", "--image", "left=left.png", "-o", "b.glb")
     assert done.returncode == 2
     assert "a photograph from the left needs the skeletons in it" in " ".join(done.stderr.split())

@@ -188,7 +188,7 @@ def test_limbs_begin_on_the_trunk(person: Person) -> None:
 def test_the_file_plays_the_same_cycle_and_closes(
     person: Person, walk: PersonMotion, tmp_path: Path
 ) -> None:
-    done = snakewalk("people", "walk", "-o", str(tmp_path / "a.glb"), "--json")
+    done = snakewalk("animal", "people", "walk", "-o", str(tmp_path / "a.glb"), "--json")
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
     assert facts["feet_slide_m"] == 0.0
@@ -229,6 +229,6 @@ def test_another_mesh_moves_with_the_person(person: Person, walk: PersonMotion) 
     ],
 )
 def test_bad_input_is_refused(words: tuple[str, ...], fault: str) -> None:
-    done = snakewalk("people", *words)
+    done = snakewalk("animal", "people", *words)
     assert done.returncode == 2
     assert fault in " ".join(done.stderr.split())

@@ -1,4 +1,4 @@
-"""``snakewalk terrain walkthrough``: two positions of a ravine to a film and a world."""
+"""``snakewalk world walkthrough``: two positions of a ravine to a film and a world."""
 
 import json
 from pathlib import Path
@@ -33,7 +33,7 @@ def call(*words: object) -> dict:
 
 
 def refused(*words: object) -> str:
-    found = CliRunner().invoke(app, ["terrain", "walkthrough", *map(str, words)])
+    found = CliRunner().invoke(app, ["world", "walkthrough", *map(str, words)])
     assert isinstance(found.exception, InputError), found.output
     return str(found.exception)
 
@@ -41,7 +41,7 @@ def refused(*words: object) -> str:
 def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) -> None:
     film, world = tmp_path / "film.mp4", tmp_path / "ravine.toml"
     made = call(
-        "terrain", "walkthrough", route, "-o", film, "--size", "240x180", "--fps", 4,
+        "world", "walkthrough", route, "-o", film, "--size", "240x180", "--fps", 4,
         "--seconds", 1, "--world", world, "--spacing", 0.03,
     )  # fmt: skip
     assert made["inliers"][0] > 40
@@ -72,7 +72,7 @@ def test_a_real_pair_is_a_single_position(tmp_path: Path) -> None:
     """Middlebury's motorcycle at half the size; depths against its truth."""
     folder, film = tmp_path / "motorcycle", tmp_path / "film.mp4"
     file = write_motorcycle(folder, smaller=2)
-    words = ["terrain", "walkthrough", str(file), "-o", str(film), "--size", "160x120"]
+    words = ["world", "walkthrough", str(file), "-o", str(film), "--size", "160x120"]
     found = CliRunner().invoke(app, [*words, "--fps", "2", "--seconds", "1"])
     assert found.exit_code == 0, found.exception or found.output
     assert "valid share" in found.output

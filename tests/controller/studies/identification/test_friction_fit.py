@@ -47,14 +47,25 @@ def record(log: Path) -> RunRecord:
 
 
 def refused(*words: str | Path) -> str:
-    done = CliRunner().invoke(app, ["identify", *map(str, words)])
+    done = CliRunner().invoke(app, ["robot", "identify", *map(str, words)])
     assert isinstance(done.exception, InputError), done.output
     return str(done.exception)
 
 
 def test_planted_friction_comes_back_and_goes_into_a_world(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "found.toml"
-    words = ("identify", str(log), "--world", "flat", "--workers", "1", "-o", str(out), "--json")
+    words = (
+        "robot",
+        "identify",
+        str(log),
+        "--world",
+        "flat",
+        "--workers",
+        "1",
+        "-o",
+        str(out),
+        "--json",
+    )
     done = CliRunner().invoke(app, words, catch_exceptions=False)
     told = json.loads(done.stdout)
     true = PLANTED | {"across_over_along": PLANTED["across"] / PLANTED["along"]}
@@ -125,7 +136,7 @@ def test_a_planted_mass_comes_back_and_goes_into_a_robot(
     light = with_mass(record.header.robot, 0.1 / 0.13)
     believed = replace(record, header=replace(record.header, robot=light))
     monkeypatch.setattr("snakewalk.controller.runlog.reader.read_log", lambda path: believed)
-    words = ("identify", str(lifting), "--workers", "1", "--robot-out", str(out), "--json")
+    words = ("robot", "identify", str(lifting), "--workers", "1", "--robot-out", str(out), "--json")
     told = json.loads(CliRunner().invoke(app, words, catch_exceptions=False).stdout)
     low_kg, high_kg = told["mass_interval_95_kg"]
     assert low_kg < 0.91 < high_kg < 1.3 * low_kg

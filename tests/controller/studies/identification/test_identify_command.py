@@ -1,4 +1,4 @@
-"""``snakewalk identify``: BAM's files in and out, and what it refuses."""
+"""``snakewalk robot identify``: BAM's files in and out, and what it refuses."""
 
 import json
 from pathlib import Path
@@ -35,12 +35,12 @@ BAM = {
 
 
 def run(*words: str | Path) -> str:
-    done = CliRunner().invoke(app, ["identify", *map(str, words)], catch_exceptions=False)
+    done = CliRunner().invoke(app, ["robot", "identify", *map(str, words)], catch_exceptions=False)
     return done.output
 
 
 def refused(*words: str | Path) -> str:
-    done = CliRunner().invoke(app, ["identify", *map(str, words)])
+    done = CliRunner().invoke(app, ["robot", "identify", *map(str, words)])
     assert isinstance(done.exception, InputError), done.output
     return str(done.exception)
 

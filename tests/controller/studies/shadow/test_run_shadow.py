@@ -56,7 +56,9 @@ def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     assert "differs from its shadow" in events[0]
     assert "a weaker servo: joint yaw_02" in events[-1]
     assert [text for kind, text in told if kind == "shadow"] == events
-    ended = CliRunner().invoke(app, ["shadow", str(finished.log), "--workers", "1", "--json"])
+    ended = CliRunner().invoke(
+        app, ["log", "shadow", str(finished.log), "--workers", "1", "--json"]
+    )
     said = json.loads(ended.stdout)  # the log alone says the same
     assert (ended.exit_code, said["named"], said["at"]) == (1, "weaker servo", 1)
     assert said["text"] == events[-1]

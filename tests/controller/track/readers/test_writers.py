@@ -39,7 +39,7 @@ def test_the_command_writes_tables_for_r_and_tierpsy(tmp_path: Path) -> None:
     track = track_from_points("eel", ends(wave_angles())[:, ::4], RATE_HZ, notes=["one note"])
     write_track(tmp_path / "eel.npz", track, ".npz")
     wcon = tmp_path / "out.wcon"
-    assert snakewalk("track", str(tmp_path / "eel.npz"), "-o", str(wcon)).returncode == 0
+    assert snakewalk("animal", "track", str(tmp_path / "eel.npz"), "-o", str(wcon)).returncode == 0
     held = json.loads(wcon.read_text())
     assert held["metadata"]["notes"] == ["one note"]
     assert held["units"] == {"t": "s", "x": "1", "y": "1"}
@@ -49,6 +49,8 @@ def test_the_command_writes_tables_for_r_and_tierpsy(tmp_path: Path) -> None:
         rows = list(csv.DictReader(stream))
     assert list(rows[0]) == ["t", "frame", "point", "x_lengths", "y_lengths"]
     assert len(rows) == FRAMES * 26
-    refused = snakewalk("track", str(tmp_path / "eel.npz"), "-o", str(tmp_path / "out.xlsx"))
+    refused = snakewalk(
+        "animal", "track", str(tmp_path / "eel.npz"), "-o", str(tmp_path / "out.xlsx")
+    )
     assert refused.returncode == 2
     assert ".npz, .csv, .wcon" in refused.stderr
