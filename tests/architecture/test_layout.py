@@ -18,6 +18,8 @@ from tests.architecture.layout import (
     package_of,
 )
 
+pytestmark = pytest.mark.costs("reads every source file")
+
 SAFETY_MUST_NOT_KNOW = ("drivers.bus", "dynamixel_sdk")
 
 

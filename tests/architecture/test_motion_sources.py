@@ -4,6 +4,10 @@ import ast
 from collections import Counter
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.costs("reads every source file")
+
 ROOT = Path(__file__).resolve().parents[2]
 PROPERTIES = ("needs", "done")
 METHODS = ("goal_rad", "velocity_rad_s", "pace")

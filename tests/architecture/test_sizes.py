@@ -15,6 +15,8 @@ import pytest
 
 from tests.architecture.layout import TOPS
 
+pytestmark = pytest.mark.costs("reads every source file")
+
 ROOT: Final = Path(__file__).resolve().parents[2]
 PACKAGE_SHARE: Final = 0.20
 FILE_LINES: Final = 500

@@ -2,7 +2,11 @@
 
 from collections import defaultdict
 
+import pytest
+
 from tests.architecture.imports import sources
+
+pytestmark = pytest.mark.costs("reads every source file")
 
 
 def test_no_public_class_name_is_defined_in_two_files() -> None:

@@ -11,6 +11,8 @@ from snakewalk.controller.exchange import foxglove_scene, ros_messages
 from snakewalk.controller.runlog import row_line
 from snakewalk.controller.runlog.topics import TABLES
 
+pytestmark = pytest.mark.costs("reads every source file")
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -120,6 +120,7 @@ def test_only_what_names_a_change_counts_as_noticed(*, other: bool) -> None:
     assert (rig.changes.noticed, rig.changes.ended_otherwise) == ((0, 1) if other else (1, 0))
 
 
+@pytest.mark.slow
 def test_some_pairs_of_faults() -> None:
     pairs = [kinds for kinds in SCENARIOS if len(kinds) == 2][::31]
     whole, by_kind = campaign([(kinds, k) for k, kinds in enumerate(pairs)], cycles=70)

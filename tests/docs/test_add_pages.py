@@ -18,6 +18,8 @@ from tests.architecture import manifests
 from tests.helpers.command import snakewalk
 from tests.helpers.page_steps import Library, Page, page
 
+pytestmark = pytest.mark.costs("extends a copy of the library")
+
 IN_THE_TREE = {
     "add-a-gait": 1,
     "add-a-command": 1,

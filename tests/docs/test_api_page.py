@@ -7,6 +7,8 @@ import pytest
 
 import snakewalk
 
+pytestmark = pytest.mark.costs("runs the examples of the page")
+
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
 
 

@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 
 from snakewalk.controller.cli.command_line import app
 
+pytestmark = pytest.mark.costs("reads the help of every command")
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 COMMAND = re.compile(

@@ -10,6 +10,8 @@ from tests.prose.findings import LONG, count
 from tests.prose.patterns import EXAMPLES, PATTERNS
 from tests.prose.texts import KINDS, docstring_paragraphs, page_paragraphs, sentences
 
+pytestmark = pytest.mark.costs("reads every text of the project")
+
 MOST = json.loads((Path(__file__).parent / "most_findings.json").read_text(encoding="utf-8"))
 """Findings that are left by kind and pattern. A count that falls is lowered here; none rises."""
 LONG_SHARE = 0.02

@@ -10,6 +10,8 @@ import pytest
 from snakewalk.controller.console.plugins import builtin_plugins
 from snakewalk.controller.runlog.column import registered_tables
 
+pytestmark = pytest.mark.costs("makes the reference of all commands")
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 

@@ -15,6 +15,7 @@ from tests.helpers.command import snakewalk
 PAGE = ROOT / "docs" / "start" / "rehearsal.md"
 
 
+@pytest.mark.costs("runs a page against a simulated robot in real time")
 def test_the_page_works_as_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The motion is cut after a second: the body cannot have arrived, and nobody claims it."""
     monkeypatch.chdir(tmp_path)

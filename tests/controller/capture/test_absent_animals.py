@@ -12,6 +12,7 @@ from snakewalk.controller.images.background import contrast_polarity
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.tiers import slow_except
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 
@@ -36,7 +37,8 @@ def visited(scene: SnakeScene, present: range) -> tuple[list[Image], Floats]:
     return list(film(scene, np.where(seen[:, None, None], truth, truth + away))), truth
 
 
-@pytest.mark.parametrize("kind", FILMS)
+@pytest.mark.costs("a film that the detector has to see as a whole")
+@pytest.mark.parametrize("kind", slow_except(["dark, rarely seen"], FILMS))
 def test_an_animal_that_is_mostly_absent_is_found_where_it_is(kind: str) -> None:
     scene, present = FILMS[kind]
     frames, truth = visited(scene, present)
@@ -49,6 +51,7 @@ def test_an_animal_that_is_mostly_absent_is_found_where_it_is(kind: str) -> None
         assert point_error(line, truth[k]) < 2.0 * seen.expected_px[k]
 
 
+@pytest.mark.slow
 def test_compressed_frames_without_an_animal_show_nothing() -> None:
     scene, present = FILMS["dark"]
     frames, _ = visited(scene, present)

@@ -41,6 +41,7 @@ def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_film(tmp_path_factory.mktemp("films") / "swim.avi", film(SCENE))
 
 
+@pytest.mark.slow
 def test_a_trail_holds_the_darkest_value_of_each_pixel(swim: Path, tmp_path: Path) -> None:
     trail = tmp_path / "trail.png"
     done = snakewalk(
@@ -91,6 +92,7 @@ def test_a_trail_shows_dark_and_light_animals(polarity: Polarity, tmp_path: Path
     assert (drawn[31, 12:18] == (220 if light else 100)).all()
 
 
+@pytest.mark.costs("a film from its frames to the pictures")
 def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Path) -> None:
     track, sheet, overlay = (tmp_path / name for name in ("t.npz", "s.png", "o.avi"))
     done = snakewalk(
@@ -119,6 +121,7 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
     assert sorted(p.name for p in tmp_path.iterdir()) == ["o.avi", "s.png", "t.npz"]
 
 
+@pytest.mark.costs("a film from its frames to the pictures")
 def test_nothing_is_overwritten_without_force(tmp_path: Path) -> None:
     swim = write_film(tmp_path / "short.avi", film(replace(SCENE, frames=6)))
     track = tmp_path / "t.npz"
@@ -190,6 +193,7 @@ def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path)
     assert np.array_equal(next(footage.read()), next(film(SCENE)))
 
 
+@pytest.mark.costs("a film from its frames to the pictures")
 def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
     ground = tmp_path / "ground.png"
     cv2.imwrite(str(ground), empty(SCENE))
@@ -277,6 +281,7 @@ def test_bad_options_are_told_before_any_work(
     assert not (tmp_path / "t.npz").exists()
 
 
+@pytest.mark.slow
 def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path) -> None:
     """Some frames of a colour film are exactly grey: they become two-dimensional arrays."""
     folder = tmp_path / "film"
@@ -292,6 +297,7 @@ def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path)
     assert facts.head_by == "travel"
 
 
+@pytest.mark.slow
 def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
     swim: Path, tmp_path: Path
 ) -> None:
@@ -309,6 +315,7 @@ def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
     assert load_track(str(again)).head_sure == load_track(str(cropped)).head_sure
 
 
+@pytest.mark.slow
 def test_a_head_that_is_not_sure_is_a_warning(
     swim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

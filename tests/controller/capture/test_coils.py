@@ -80,6 +80,7 @@ def test_a_coil_with_which_the_film_ends_is_not_guessed(
     assert np.isnan(found.expected_px).all()
 
 
+@pytest.mark.costs("a film of a coil")
 def test_what_the_body_does_not_explain_is_told_apart(
     images: list[Image], coils: list[int]
 ) -> None:
@@ -93,6 +94,7 @@ def test_what_the_body_does_not_explain_is_told_apart(
     assert FrameStatus.COIL_UNLIKE in status
 
 
+@pytest.mark.slow
 def test_ends_that_changed_places_in_a_coil_are_put_right(
     images: list[Image], coils: list[int]
 ) -> None:

@@ -18,8 +18,11 @@ from snakewalk.controller.images.body_detector import (
 )
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.tiers import slow_except
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
+
+pytestmark = pytest.mark.costs("each test captures a rendered film")
 
 SCENE = SnakeScene(rows=300, columns=400, length_px=140.0, frames=10, wave_hz=0.6)
 WHITE = replace(SCENE, ground=250.0, gain=1.15, body=15.0, noise=2.0)
@@ -46,7 +49,7 @@ def errors_px(scene: SnakeScene, seen: Capture) -> tuple[np.ndarray, np.ndarray]
     return np.array(off), seen.expected_px[used]
 
 
-@pytest.mark.parametrize("name", FILMS)
+@pytest.mark.parametrize("name", slow_except(["small, stained"], FILMS))
 def test_the_whole_body_is_found_and_its_expected_error_holds(name: str) -> None:
     scene = FILMS[name]
     frames = list(film(scene))

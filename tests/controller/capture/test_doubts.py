@@ -55,6 +55,7 @@ def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
     assert head_end(points[::-1], even, 15.0, None, fixed=True)[0] < -0.9
 
 
+@pytest.mark.costs("a film of a slow animal")
 def test_a_slow_larva_with_a_faint_tail_is_seen_whole() -> None:
     scene = replace(SCENE, head=1.8, faint=0.15, tip=0.05, taper=0.6, slender=18.0)
     frames, truth = list(film(scene)), true_midlines(scene)
@@ -165,6 +166,7 @@ def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
     assert goes_on_faintly(align_ends(found).skeletons, store) is expected
 
 
+@pytest.mark.slow
 def test_an_animal_as_bright_as_its_ground_is_rejected_with_that_reason(tmp_path: Path) -> None:
     scene = replace(SCENE, rows=220, columns=260)
     rng = np.random.default_rng(4)

@@ -50,6 +50,7 @@ def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(capturing, "PART_FRAMES", 10)
 
 
+@pytest.mark.costs("a film in parts")
 @pytest.mark.usefixtures("short_parts")
 def test_an_interrupted_capture_is_continued(
     frames: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -92,6 +93,7 @@ def test_an_interrupted_capture_is_continued(
         capture_recording(replace(options, resume=True))
 
 
+@pytest.mark.costs("a film in parts")
 @pytest.mark.usefixtures("short_parts")
 def test_parts_are_joined_with_the_head_first_in_all(frames: Path, tmp_path: Path) -> None:
     facts = capture_recording(options_of(frames, tmp_path))
@@ -118,6 +120,7 @@ def test_a_part_without_the_animal_has_no_points() -> None:
     assert not captured.used[10:28].any()
 
 
+@pytest.mark.costs("a film in parts")
 def test_frames_of_finished_parts_do_not_stay_in_memory() -> None:
     """The second half of a film keeps no more frames alive than the first."""
     ground = empty(SCENE)
@@ -137,6 +140,7 @@ def test_frames_of_finished_parts_do_not_stay_in_memory() -> None:
     assert len(parts.finished) >= 3
 
 
+@pytest.mark.slow
 def test_a_finished_part_leaves_no_points_in_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

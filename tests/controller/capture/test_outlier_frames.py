@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
 
 from snakewalk.controller.capture.capture import capture
 from snakewalk.controller.capture.outlier_frames import mark_outliers
@@ -68,6 +69,7 @@ def with_something(draw: object) -> tuple[list[np.ndarray], np.ndarray]:
     return frames, empty(SCENE)
 
 
+@pytest.mark.costs("a film of a disturbed animal")
 def test_a_small_animal_that_touches_the_body_is_noticed() -> None:
     def beside(frame: np.ndarray, line: np.ndarray) -> None:
         ahead = line[50] - line[44]
@@ -96,6 +98,7 @@ def test_a_small_animal_elsewhere_is_counted_and_the_body_still_used() -> None:
     assert (seen.distractors[ODD] < 0.4).all()
 
 
+@pytest.mark.slow
 def test_a_tail_folded_on_the_body_without_a_hole_is_noticed() -> None:
     frames, ground = with_something(lambda frame, line: None)
     bare = make_detector(frames[::4], ground)

@@ -9,8 +9,11 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.silhouette import Polarity
+from tests.helpers.tiers import slow_except
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
+
+pytestmark = pytest.mark.costs("each test captures a rendered film")
 
 CLEAN = SnakeScene(rows=240, columns=320, frames=10, rate_hz=15.0, wave_hz=0.6)
 HARSH = replace(CLEAN, noise=6.0, blur_px=1.2, light=0.3, shadow=0.25, texture=5.0)
@@ -27,7 +30,7 @@ def median_error(scene: SnakeScene, seen: Capture) -> float:
     return float(np.median([point_error(seen.points_px[k], truth[k]) for k in good]))
 
 
-@pytest.mark.parametrize("length_px", [20.0, 40.0, 100.0])
+@pytest.mark.parametrize("length_px", slow_except([20.0], [20.0, 40.0, 100.0]))
 def test_the_error_is_below_a_hundredth_of_the_body(length_px: float) -> None:
     scene = replace(CLEAN, length_px=length_px)
     seen = watch(scene)
@@ -38,7 +41,7 @@ def test_the_error_is_below_a_hundredth_of_the_body(length_px: float) -> None:
     assert seen.head_by == "travel"
 
 
-@pytest.mark.parametrize("length_px", [50.0, 130.0])
+@pytest.mark.parametrize("length_px", slow_except([130.0], [50.0, 130.0]))
 def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
     scene = replace(HARSH, length_px=length_px)
     seen = watch(scene)
@@ -79,6 +82,7 @@ def test_the_head_stays_the_head_after_a_gap() -> None:
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 
 
+@pytest.mark.slow
 def test_the_user_may_say_where_the_head_is() -> None:
     scene = replace(CLEAN, length_px=80.0)
     frames = list(film(scene))
@@ -130,6 +134,7 @@ def test_the_skeleton_s_thickness_is_the_body_s() -> None:
     assert np.allclose(middle, half_width(scene)[15:70], rtol=0.15)
 
 
+@pytest.mark.slow
 def test_the_same_film_gives_the_same_skeletons_bit_for_bit() -> None:
     scene = replace(CLEAN, length_px=30.0, frames=5)
     one, other = watch(scene), watch(scene)

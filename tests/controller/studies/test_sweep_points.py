@@ -30,6 +30,7 @@ def test_points_are_in_range_and_within_the_joints(name: str) -> None:
     assert len({tuple(p.parameters.items()) for p in points}) == 30
 
 
+@pytest.mark.costs("runs each point")
 def test_replaced_values_go_with_each_point_into_its_run() -> None:
     pytest.importorskip("mujoco")
     keys = {"world.friction.across": 0.35, "robot.yaw_limit_rad": 0.7, "run.cycle_hz": 40}

@@ -33,6 +33,7 @@ def test_starts_are_normal_about_the_run_s_own_and_repeat() -> None:
     assert (starts_m(FLAT, 3, 0.0) == 0.0).all()
 
 
+@pytest.mark.slow
 def test_a_moved_start_is_on_safe_ground() -> None:
     """The spread is so large that about half of the draws are off the safe ground."""
     relief = prepare_case(HILLS, 0, 0.0, {}).planner.relief
@@ -145,6 +146,7 @@ def test_keys_replace_values_of_the_three_files() -> None:
     assert found.world.friction.across == plain.world.friction.across
 
 
+@pytest.mark.costs("walks in a process of their own")
 def test_each_world_is_a_row(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -238,6 +240,7 @@ def test_the_table_gives_back_what_it_was_given(tmp_path: Path) -> None:
     assert "world.ground.slope_deg=20" in path.read_text()
 
 
+@pytest.mark.costs("walks in a process of their own")
 def test_an_estimated_pose_is_judged_by_where_the_body_truly_is(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     run = tmp_path / "near.toml"

@@ -66,6 +66,7 @@ def test_every_curve_ends_at_its_goal_and_bends_no_more_than_it_may() -> None:
     np.testing.assert_allclose(one, points[3, k], atol=1e-12)
 
 
+@pytest.mark.costs("searches all curves of three pieces")
 def test_no_shorter_curve_among_all_of_three_pieces() -> None:
     """Brute force: every left, right, straight word over a grid of its first two pieces.
 

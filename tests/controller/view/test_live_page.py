@@ -290,6 +290,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
     assert 1.0 < at["end"] - at["reached"] < 1.5
 
 
+@pytest.mark.costs("starts a page of its own")
 def test_on_servos_it_is_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, servo_bus: Callable[..., ServoBus]
 ) -> None:

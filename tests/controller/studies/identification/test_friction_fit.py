@@ -52,6 +52,7 @@ def refused(*words: str | Path) -> str:
     return str(done.exception)
 
 
+@pytest.mark.costs("fits a simulated body to a run")
 def test_planted_friction_comes_back_and_goes_into_a_world(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "found.toml"
     words = (
@@ -83,6 +84,7 @@ def test_planted_friction_comes_back_and_goes_into_a_world(log: Path, tmp_path: 
     assert "found.toml: exists" in refused(log, "-o", out)
 
 
+@pytest.mark.slow
 def test_a_body_without_its_currents_still_tells_the_ratio(record: RunRecord) -> None:
     given = FrictionLog.of(record, load_world("flat"))
     answers = given.answers.copy()
@@ -128,6 +130,7 @@ def lifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return execute.execute(replace(prepared, robot=robot, run=run), folder, stoppable=False).log
 
 
+@pytest.mark.slow
 def test_a_planted_mass_comes_back_and_goes_into_a_robot(
     lifting: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

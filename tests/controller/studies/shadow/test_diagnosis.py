@@ -102,6 +102,7 @@ def test_a_load_comes_on_top_of_a_head_with_cameras() -> None:
     )
 
 
+@pytest.mark.costs("a run with its shadow")
 def test_a_host_that_computes_for_some_milliseconds_is_no_cause(
     goals: Goals, signatures: Signatures
 ) -> None:

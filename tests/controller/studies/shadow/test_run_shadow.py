@@ -32,6 +32,7 @@ def short_run(seconds: float) -> Any:
     return replace(prepared, robot=robot, run=run)
 
 
+@pytest.mark.slow
 def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,6 +81,7 @@ def test_a_stop_during_the_diagnosis_learns_that_the_run_has_ended(
     assert runs_of() == []
 
 
+@pytest.mark.costs("half a minute of a run with its shadow")
 def test_a_run_of_half_a_minute_is_judged_by_its_last_seconds(tmp_path: Path) -> None:
     finished = execute.execute(short_run(30.0), tmp_path / "run", shadow=True, stoppable=False)
     record = finished.record

@@ -66,6 +66,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         yield Bench(opened, monkeypatch)
 
 
+@pytest.mark.costs("builds a simulator beside a run")
 def test_the_simulator_is_built_before_torque_is_on(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -96,6 +97,7 @@ def test_the_simulator_is_built_before_torque_is_on(
     assert events[0].startswith("nothing differs from the shadow")
 
 
+@pytest.mark.slow
 def test_a_shadow_starts_again_after_an_interruption(bench: Bench, tmp_path: Path) -> None:
     """The joints hold meanwhile; the shadow neither catches up nor loses its own watchdogs."""
     plan = checked(FaultPlan, {"fault": [{"kind": "drop", "at_s": 4.0, "for_s": 1.5}]}, "test")
