@@ -20,6 +20,8 @@ from snakewalk.controller.terrain.route_advice import route_advice
 from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
+_APART_M = 0.01
+"""Step of a path's table: a path passes a waypoint within this distance of the point before it."""
 _CHECK_STEP_M = 0.02  # spacing of the safety check of a spline
 _UNSAFE = 30.0  # cost of a metre of unsafe ground in a turn, as metres of level path
 _ROUNDS = 7  # halvings: the last pieces have a hundredth of a side's length
@@ -51,7 +53,8 @@ class TerrainPlanner:
         self._waypoint_turns = WaypointTurns(
             self._turn_cost_per_m, self._least_per_m, self._all_safe, config.bend_radius_m
         )
-        self._number = 1
+        self._numbers = [0]
+        """Number of each point of a call, for messages; 0 is the start."""
         self._planned: tuple[Floats, SplinePath] | None = None
         """Points and path of the last plan that began in any direction."""
 
@@ -78,7 +81,8 @@ class TerrainPlanner:
             number: number of the first waypoint, for messages.
 
         Raises:
-            InputError: a waypoint is off the world, on unsafe ground, or unreachable.
+            InputError: a waypoint is off the world, on unsafe ground, or unreachable, or all are
+                within a centimetre of the first point.
 
         """
         return at_once(self.in_steps(points_m, heading_rad, turn_radius_m, avoid_m, number))
@@ -93,7 +97,14 @@ class TerrainPlanner:
     ) -> Steps[SplinePath]:
         """Plan as a call does, in steps."""
         points, avoid = np.asarray(points_m, float), np.asarray(avoid_m, float).reshape(-1, 2)
-        self._number = number
+        kept = _apart(points)
+        self._numbers = [number - 1 + k for k in kept]
+        if len(kept) < 2:
+            raise InputError(
+                f"waypoints_m: no waypoint leads farther than {_APART_M * 100:g} cm from "
+                f"{self._name(0, points[0])}; move or add one"
+            )
+        points = points[kept]
         if heading_rad is None:
             base = yield from self._base(points, avoid)
             path = yield from self._waypoint_turns.in_steps(base, points[1:], any_start=True)
@@ -171,6 +182,8 @@ class TerrainPlanner:
             return None
         until_next = planned[1 : len(planned) - len(points) + 2]
         passes = path.passes(until_next) or [0.0]  # the plan may have started at that point
+        if path.length_m - passes[-1] < _APART_M:
+            return None
         onward = path.piece_m(passes[-1], path.length_m)
         if self.relief is not None and len(avoid):
             gap = np.hypot(*(onward[:, None] - avoid[None]).T)
@@ -186,7 +199,7 @@ class TerrainPlanner:
 
         """
         points = np.asarray(points_m, float)
-        self._number = 1
+        self._numbers = list(range(len(points)))
         faults = [f for k in range(len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
@@ -288,8 +301,23 @@ class TerrainPlanner:
         """Name of the k-th point; 0 is the start, or the position of the head."""
         where = f"({point[0]:.2f}, {point[1]:.2f})"
         if k == 0:
-            return f"start {where}" if self._number == 1 else where
-        return f"waypoint {self._number + k - 1} {where}"
+            return f"start {where}" if self._numbers[0] == 0 else where
+        return f"waypoint {self._numbers[k]} {where}"
+
+
+def _apart(points: Floats) -> list[int]:
+    """Indices of points (n, 2) that are apart: of close ones the first, or the end of the path."""
+    kept, last = [0], len(points) - 1
+    for k in range(1, last + 1):
+        while k == last and len(kept) > 1 and _is_close(points, kept[-1], k):
+            kept.pop()
+        if not _is_close(points, kept[-1], k):
+            kept.append(k)
+    return kept
+
+
+def _is_close(points: Floats, j: int, k: int) -> bool:
+    return bool(np.hypot(*(points[k] - points[j])) < _APART_M)
 
 
 def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:

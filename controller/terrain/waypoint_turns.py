@@ -29,6 +29,8 @@ _ALL_ROUND_RAD = np.arange(16) * 2.0 * np.pi / 16
 _STEP_M = 0.01
 _NEAR_M = 0.5
 """Way before and after a waypoint in which a bend counts as being there."""
+_SHORTEST_M = 0.02
+"""Shortest leg: two steps, because the direction at its end needs two points after its first."""
 _JOIN_M = 0.1
 _JOINS = 16, 64
 
@@ -74,6 +76,8 @@ class WaypointTurns:
     ) -> Steps[SplinePath]:
         """Run a call in steps."""
         yield 500
+        if path.length_m < _SHORTEST_M:
+            return path
         legs, turned = _legs(path, np.asarray(waypoints_m, float)), False
         for k in range(0 if any_start else 1, len(legs) + 1):
             yield 200
@@ -160,9 +164,12 @@ class WaypointTurns:
 
 
 def _legs(path: SplinePath, waypoints_m: Floats) -> list[Floats]:
-    """Points (n, 2) of the path's legs between waypoints."""
-    marks = [0.0, *path.passes(waypoints_m[:-1]), path.length_m]
-    return [path.piece_m(begin, end) for begin, end in pairwise(marks)]
+    """Points (n, 2) of the path's legs between waypoints; a short leg is a part of the next."""
+    marks = [0.0]
+    for at_m in path.passes(waypoints_m[:-1]):
+        if min(at_m - marks[-1], path.length_m - at_m) >= _SHORTEST_M:
+            marks.append(at_m)
+    return [path.piece_m(begin, end) for begin, end in pairwise([*marks, path.length_m])]
 
 
 def _near_m(legs: Sequence[Floats], k: int) -> Floats:

@@ -281,3 +281,50 @@ def test_a_path_from_elsewhere_goes_onto_one_that_was_planned_from_the_next_poin
     rest_m = path.piece_m(path.length_m - 0.5 * onward.length_m, path.length_m)
     planned_m = onward.piece_m(0.0, onward.length_m)
     assert max(np.hypot(*(planned_m - at).T).min() for at in rest_m) < 0.02
+
+
+def drawn_points(seed: int) -> np.ndarray:
+    """(n, 2) points of which some are equal, or within a few steps of a path's table."""
+    rng = np.random.default_rng(seed)
+    start, other = rng.uniform(-1.2, -0.8, 2), rng.uniform(0.8, 1.2, 2)
+    away_m = rng.choice([0.0, 1e-9, 0.001, 0.005, 0.0099, 0.0101, 0.012, 0.015, 0.02, 0.05])
+    angle = rng.choice([0.0, 0.5, 1.0, 1.5]) * np.pi + np.arctan2(*(other - start)[::-1])
+    step = away_m * np.array([np.cos(angle), np.sin(angle)])
+    orders = [
+        [start, start + step],
+        [start, start + step, other],
+        [start, other, other + step],
+        [start, other, other + step, start],
+        [start, other, start + step],
+        [start, start + step, start, start + step],
+    ]
+    return np.array(orders[rng.integers(len(orders))])
+
+
+def test_close_waypoints_give_a_path_or_a_fault_that_says_what_to_write() -> None:
+    """80 draws: next to the start or to each other, on flat ground and hills, from any heading."""
+    planners = TerrainPlanner(None, CONFIG), TerrainPlanner(field(hill, spacing=0.1), CONFIG)
+    paths, faults = 0, []
+    for seed in range(80):
+        points, planner = drawn_points(seed), planners[seed % 4 == 0]
+        heading = None if seed % 5 else 0.1 * seed
+        try:
+            path = planner(points, heading)
+        except InputError as error:
+            faults.append((np.hypot(*(points - points[0]).T).max(), str(error)))
+        else:
+            passes_m = path.position(path.passes(points[1:]))
+            assert np.hypot(*(passes_m - points[1:]).T).max() < 0.021
+            paths += 1
+    assert paths > 60
+    for farthest_m, fault in faults:
+        assert farthest_m < 0.021
+        assert "farther than 1 cm from start (" in fault
+        assert fault.endswith("; move or add one")
+
+
+def test_a_fault_names_waypoints_by_their_number_in_the_file() -> None:
+    """A waypoint that is dropped because it is next to the start still counts."""
+    points = np.array([(-1.5, -0.3), (-1.5, -0.301), (0.0, 9.0)])
+    with pytest.raises(InputError, match=r"waypoint 2 \(0\.00, 9\.00\) is outside"):
+        TerrainPlanner(field(hill, spacing=0.1), CONFIG)(points)
